@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.display import of_last_digit
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.model.noise import noise_of
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 from cmm_uq.screening.copies import counted_with
 from cmm_uq.screening.finding import finding
 from cmm_uq.screening.moved import moved_stretches, recurring_points, words_of_point, words_of_stretch
@@ -35,33 +35,45 @@ def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Fi
     least = of_last_digit(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
     outliers = gross_outliers(estimate.linear, artefact.measurement[chosen], least)
     times_off = {int(chosen[index]): times for index, times in outliers}
-    used[list(times_off)] = False
-    return replace(model, used=used), [replace(each, set_aside=True) for each in _told(artefact, times_off)]
-
-
-def _told(artefact: Artefact, times_off: Mapping[int, float]) -> Iterator[Finding]:
-    """Outliers one by one, but those of one cause together, where the worst of them stands."""
-    points, untold = artefact.points, dict(times_off)
     rows = {i: int(artefact.rows[i][0]) for i in times_off}
+    outlying = np.array(sorted(set(rows.values())), dtype=np.int64)
+    recurring = recurring_points(artefact.points, outlying)
+    kept = {row for each in recurring for row in each.tolist()}  # what is so each time is no gross error
+    used[[i for i in times_off if rows[i] not in kept]] = False
+    return replace(model, used=used), list(_told(artefact, times_off, rows, recurring))
+
+
+def _told(
+    artefact: Artefact, times_off: Mapping[int, float], rows: Mapping[int, int], recurring: Sequence[Ints]
+) -> Iterator[Finding]:
+    """Outliers one by one, but those of one cause together, where the worst of them stands.
+
+    Parameters
+    ----------
+    times_off : of each observation, in its own standard deviations.
+    rows : of the recording, of each of these observations.
+    recurring : rows that stay, of points that are off each time.
+    """
+    points, untold = artefact.points, dict(times_off)
     outliers = np.array(sorted(set(rows.values())), dtype=np.int64)
     causes = [
-        *((each, words_of_point) for each in recurring_points(points, outliers)),
-        *((each, words_of_stretch) for each in moved_stretches(points, outliers)),
+        *((each, words_of_point, False) for each in recurring),
+        *((each, words_of_stretch, True) for each in moved_stretches(points, outliers)),
     ]
     for i, times in times_off.items():
         if i not in untold:
             continue
-        for together, words in causes:
+        for together, words, aside in causes:
             if rows[i] in together:
                 off = [untold.pop(j) for j in tuple(untold) if rows[j] in together]
-                yield finding("outlier", points, together, words(points, together, off))
+                yield replace(finding("outlier", points, together, words(points, together, off)), set_aside=aside)
                 break
         else:
             why = say(
                 "{what} is {times:.1f} of its standard deviations off what the others say",
                 what=artefact.words_of(i), times=times,
             )  # fmt: skip
-            yield finding("outlier", points, artefact.rows[i], why)
+            yield replace(finding("outlier", points, artefact.rows[i], why), set_aside=True)
 
 
 def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, float | None]:

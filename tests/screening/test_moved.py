@@ -10,11 +10,16 @@ import pandas as pd
 import pytest
 
 from cmm_uq.commands.diagnosing import screened_model
+from cmm_uq.commands.estimation import without_outliers
 from cmm_uq.commands.reading import read_job
+from cmm_uq.kinds import artefact_facts, artefact_of
+from cmm_uq.model import MeasurementModel
 from cmm_uq.screening.moved import moved_stretches, recurring_points, words_of_point
 from cmm_uq.screening.screened import Finding
 from tests.conftest import ROOT
+from tests.kinds.constructions import step_gauge
 
+FACE = 9
 BY_MM = (0.03, -0.02, 0.025)
 """A shift along all axes: far more than the noise of any example, along whichever line a gauge lies."""
 
@@ -64,6 +69,24 @@ def test_a_point_is_told_once_where_it_is_off_in_most_readings_of_several_set_up
     told = words_of_point(points, rows[1:], [5.0, 9.0])
     assert told.startswith("point 3 is 5.0 to 9.0 of its standard deviations off")
     assert f"in {len(rows) - 1} of its {len(rows)} readings" in told
+
+
+def test_a_face_that_is_off_on_every_line_is_told_once_and_stays_in_the_estimate() -> None:
+    """Face 9 of 22 is 20 µm farther along the gauge wherever it lies: no gross error, but the artefact itself."""
+    gauge = step_gauge()
+    lines = [gauge.xyz[gauge.measurement == number] for number in np.unique(gauge.measurement)]
+    along = np.concatenate(
+        [np.tile((line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0]), (22, 1)) for line in lines]
+    )
+    off = np.where(gauge.point == FACE, 0.02, 0.0) + np.random.default_rng(4).normal(0, 5e-4, len(gauge.xyz))
+    facts = artefact_facts(kind="step_gauge", length_mm=420.0, u_um=0.1)
+    model, (told,) = without_outliers(
+        MeasurementModel(artefact_of(facts, gauge.at(gauge.xyz + off[:, None] * along)), ())
+    )
+    assert told.why.startswith(f"point {FACE} is ")
+    assert f"in {len(lines)} of its {len(lines)} readings" in told.why
+    assert not told.set_aside
+    assert model.used.all()
 
 
 def test_a_point_that_is_off_in_one_set_up_or_in_few_readings_is_told_reading_by_reading() -> None:
