@@ -42,7 +42,9 @@ def number_problem(cell: str, fix: str = GIVE) -> tuple[str, str] | None:
     try:
         value = float(cell)
     except ValueError:
-        return f"{shown} is not a number", "Write decimals with a point" if "," in cell else fix
+        if "," in cell:
+            fix = "Write it without groups of digits" if "." in cell else "Write decimals with a point"
+        return f"{shown} is not a number", fix
     if _plain(cell):
         return _size_problem(cell, value, shown)
     if not isfinite(value):
