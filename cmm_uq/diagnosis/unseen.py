@@ -146,12 +146,12 @@ def _never(effect: Effect) -> Smallest:
 
 
 def _motionless(model: MeasurementModel, known: set[str]) -> Iterator[Effect]:
-    """Common effects of which nothing shows in such observations, though all that they need is recorded."""
+    """Common effects of which nothing shows in such observations, though they could act and all that they need is recorded."""
     points = model.artefact.points
     for effect in every().values():
         if effect.name in known or effect.tier != CONTRACT or effect.shape:
             continue
-        if any(column not in points.columns for column in effect.columns):
+        if any(column not in points.columns for column in effect.columns) or effect.unfit(points) is not None:
             continue
         try:
             effect.basis(points)

@@ -1,4 +1,4 @@
-"""Names cut to the room that a picture has for them; they stand whole in a table."""
+"""Names folded or cut to the room that a picture has for them; they stand whole in a table."""
 
 from __future__ import annotations
 
@@ -22,6 +22,23 @@ def narrowed(text: Text, room_mm: float) -> Text:
     if kept == text:
         return text
     return Verbatim(kept) if said is text else Said(kept, text)
+
+
+def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "normal") -> list[Text]:
+    """A name as it is lettered, in two lines where one has no room for it, the first as long as it goes; the second is cut.
+
+    They are for texts of their own: the ends of several lines of one would not stand below each other in other fonts.
+    """
+    whole = str.__str__(lettered(text))
+    if width_mm(whole, size, weight) <= room_mm:
+        return [text]
+    blanks = [i for i, letter in enumerate(whole) if letter == " "]
+    ends = [i for i in blanks or range(1, len(whole)) if width_mm(whole[:i], size, weight) <= room_mm]
+    if not ends:
+        return [narrowed(text, room_mm)]
+    rest = whole[ends[-1] :].strip()
+    kept = rest if width_mm(rest, size, weight) <= room_mm else _longest(rest, room_mm * SMALL / size)
+    return [Said(line, text) for line in (whole[: ends[-1]], kept)]
 
 
 def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:

@@ -11,6 +11,7 @@ import numpy as np
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.measured import width_mm
+from cmm_uq.documents.narrowing import folded
 from cmm_uq.documents.plot_style import (
     ACCENT,
     INK,
@@ -43,6 +44,7 @@ _REACH, _BELOW = 0.04, 0.064
 _LABEL_MM = 1.7
 """Half the height of a name, with some room."""
 
+_ROOM_MM = WIDTH_MM * (1 / A_ROW - 0.05)
 _TEXT_MM = 15.0
 
 
@@ -80,14 +82,10 @@ def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
             ax.axis("off")
             left = i / A_ROW + 0.008
             figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
-            figure.text(
-                left + 0.035,
-                1 - 4.5 / height,
-                placing.title,
-                fontsize=_size(placing.title),
-                color=INK,
-                fontweight="bold",
-            )
+            lines = _title(placing.title)
+            for line, below in zip(lines, (4.5,) if len(lines) == 1 else (3.6, 6.4), strict=True):
+                figure.text(left + 0.035, 1 - below / height, line, fontsize=min(_size(one) for one in lines), color=INK,
+                            fontweight="bold")  # fmt: skip
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
         last = first + len(placings) - 1
         numbers = (
@@ -208,10 +206,14 @@ def gain_plot(
         return drawn(figure, both, told)
 
 
+def _title(title: Text) -> list[Text]:
+    """In two lines where one would have to be of smaller letters than are used anywhere."""
+    return [title] if _size(title) >= TINY else folded(title, _ROOM_MM, TINY, "bold")
+
+
 def _size(title: Text) -> float:
     """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
-    room = WIDTH_MM * (1 / A_ROW - 0.05)
-    return SMALL * min(1.0, room / width_mm(lettered(title), SMALL, "bold"))
+    return SMALL * min(1.0, _ROOM_MM / width_mm(lettered(title), SMALL, "bold"))
 
 
 def _edge(last: Text) -> float:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.lettering import lettered
 from cmm_uq.documents.measured import width_mm
-from cmm_uq.documents.narrowing import NAMES_MM, narrowed
+from cmm_uq.documents.narrowing import NAMES_MM, folded
 from cmm_uq.documents.plot_style import (
     ACCENT,
     BAND,
@@ -23,6 +23,7 @@ from cmm_uq.documents.plot_style import (
     INK,
     MUTED,
     RULE,
+    SMALL,
     TINY,
     WIDTH_MM,
     bars,
@@ -34,7 +35,7 @@ from cmm_uq.documents.plot_style import (
 )
 from cmm_uq.documents.shown import shown, told
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text, Verbatim, say, semicolons, signed
+from cmm_uq.messages import NOTHING, Text, say, semicolons, signed
 from cmm_uq.points import Floats
 
 if TYPE_CHECKING:
@@ -325,8 +326,9 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         raise CmmUqError("a budget without a source has no picture")
     order = np.argsort(-share, kind="stable")
     rows = np.arange(len(order))
+    names = [folded(sources[index], NAMES_MM) for index in order]
     with house_style():
-        height = 10 + 6.0 * len(order)
+        height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
         figure = new_figure(height)
         ax = figure.subplots()
         figure.subplots_adjust(left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height)
@@ -335,17 +337,23 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         for row, value in zip(rows, share[order], strict=True):
             text = say("{share} %", share=signed(100 * value, ".1f"))
             ax.annotate(text, (max(value, 0), row), (4, 0), textcoords="offset points", va="center", color=INK)
-        ax.set_yticks(rows, [_cut(sources[index], 44) for index in order])
+        ax.set_yticks(rows, [lines[0] if len(lines) == 1 else NOTHING for lines in names])
         ax.set(xlim=(min(share.min() * 1.15, 0), max(share.max(), 1e-9) * 1.02), xticks=[])
         ax.invert_yaxis()
         ax.tick_params(left=False)
+        for place, lines in enumerate(names):
+            if len(lines) > 1:
+                _two_lines(ax, place, lines)
         for side in ("bottom", "left"):
             ax.spines[side].set_visible(False)
         return drawn(figure, caption, alternative)
 
 
-def _cut(text: Text, length: int) -> Text:
-    """A name for the room beside the bars of a picture, at most so many letters long; it stands whole in a table."""
-    if lettered(text) is not text:  # longer or wider letters than English ones
-        return narrowed(text, NAMES_MM)
-    return text if len(text) <= length else Verbatim(text[: length - 1] + "…")
+def _two_lines(ax: Axes, row: int, lines: Sequence[Text]) -> None:
+    """Where the label of a row would stand."""
+    from matplotlib import rcParams
+
+    left = -rcParams["ytick.major.pad"] - rcParams["ytick.major.size"]
+    for line, up in zip(lines, (0.6, -0.6), strict=True):
+        ax.annotate(line, (0, row), (left, up * SMALL), xycoords=("axes fraction", "data"), textcoords="offset points",
+                    ha="right", va="center", fontsize=SMALL, color=INK)  # fmt: skip

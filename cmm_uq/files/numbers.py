@@ -19,23 +19,36 @@ SMALLEST, LARGEST = 1e-30, 1e15
 _CHARACTERS = b"0123456789+-.eE"
 """Of what is written with these alone, ``float`` takes exactly the numbers of this module."""
 
+GIVE = "Give a number"
+GIVE_OR_REMOVE = "Give a number, or remove the column"
+"""Of a column that need not be there."""
+MEASURE = "Measure the point again, or leave out its measurement"
+"""Of a coordinate."""
+
 _SHOWN = 40
 
 
-def number_problem(cell: str) -> tuple[str, str] | None:
-    """Why a cell of a table is no number that can be used and what to do about it, or ``None``."""
+def number_problem(cell: str, fix: str = GIVE) -> tuple[str, str] | None:
+    """Why a cell of a table is no number that can be used and what to do about it, or ``None``.
+
+    Parameters
+    ----------
+    cell : as text, without blanks around it.
+    fix : what to do where there is no number.
+    """
     if not cell:
-        return "no value", "Give a number, or remove the column"
+        return "no value", fix
     shown = repr(cell[:_SHOWN])
     try:
         value = float(cell)
     except ValueError:
-        fix = "Write decimals with a point" if "," in cell else "Give a number, or remove the column"
+        if "," in cell:
+            fix = "Write it without groups of digits" if "." in cell else "Write decimals with a point"
         return f"{shown} is not a number", fix
     if _plain(cell):
         return _size_problem(cell, value, shown)
     if not isfinite(value):
-        return f"{shown} is not a finite number", "Measure the point again, or leave out its measurement"
+        return f"{shown} is not a finite number", fix
     return f"{shown} is not a number", "Write it with digits 0 to 9 alone, a point and an exponent, as in 1.5e-3"
 
 
@@ -51,13 +64,14 @@ def _size_problem(cell: str, value: float, shown: str) -> tuple[str, str] | None
     return None
 
 
-def numbers(cells: Sequence[str], where: Callable[[int], str]) -> Floats:
+def numbers(cells: Sequence[str], where: Callable[[int], str], fix: str = GIVE) -> Floats:
     """Values (n,) of the cells of a column.
 
     Parameters
     ----------
     cells : as text, without blanks around them.
     where : place of a cell by its index, for messages.
+    fix : what to do where there is no number.
 
     Raises
     ------
@@ -74,7 +88,7 @@ def numbers(cells: Sequence[str], where: Callable[[int], str]) -> Floats:
         doubtful = [i for i in beyond if cells[i] != "0"] if _plain("".join(cells)) else range(len(cells))
     wrong = Gathered()
     for i in doubtful:
-        if problem := number_problem(cells[i]):
+        if problem := number_problem(cells[i], fix):
             wrong.add(CmmUqError(problem[0], where=where(i), fix=problem[1]))
     wrong.refuse()
     return values

@@ -18,12 +18,11 @@ from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.files.cells import Cells, cells_of
 from cmm_uq.files.content import text_of
 from cmm_uq.files.numbers import numbers
-from cmm_uq.jobs.recording import WHOLE, largest
+from cmm_uq.jobs.recording import COORDINATES, WHOLE, largest
 from cmm_uq.jobs.simulation import KEY, UNIT_MM, SimulationFacts
 from cmm_uq.points import Floats, Ints
 from cmm_uq.units import MICROMETRE
 
-COORDINATES = ("x_mm", "y_mm", "z_mm")
 LENGTH, UNCERTAINTY = "length_mm", "u_um"
 KNOWN = (*WHOLE, *COORDINATES, LENGTH, UNCERTAINTY)
 

@@ -263,7 +263,7 @@ def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[Job
     """
     if PART in data and "artefact" not in data:
         raise CmmUqError("is the job of a part, not of a machine", where=f"{path}: [{PART}]",
-                         fix="cmm-uq check JOB says what it lacks")  # fmt: skip
+                         fix="cmm-uq part JOB reports it; cmm-uq check JOB says what it lacks")  # fmt: skip
     artefact = data.get("artefact")
     kind = artefact.get("kind") if isinstance(artefact, dict) else None
     if not isinstance(kind, str):

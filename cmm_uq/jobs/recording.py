@@ -15,12 +15,13 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.files.cells import cells_of, column_problem
-from cmm_uq.files.numbers import LARGEST, numbers
+from cmm_uq.files.numbers import GIVE, GIVE_OR_REMOVE, LARGEST, MEASURE, numbers
 from cmm_uq.jobs.other_units import conversion
 from cmm_uq.jobs.table import LONGEST_MM
 from cmm_uq.points import Floats, Machine, Points
 
-REQUIRED = ("measurement", "point", "x_mm", "y_mm", "z_mm")
+COORDINATES = ("x_mm", "y_mm", "z_mm")
+REQUIRED = ("measurement", "point", *COORDINATES)
 OPTIONAL = (
     "repeat", "reference_mm", "approach_x", "approach_y", "approach_z", "reference_x_mm", "reference_y_mm",
     "reference_z_mm", "nx", "ny", "nz", "time_s", "temp_x_c", "temp_y_c", "temp_z_c", "temp_artefact_c",
@@ -68,7 +69,8 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
         wrong.refuse()  # the cells of another table are another's
 
     def column_of(i: int) -> Floats:
-        return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}")
+        fix = MEASURE if header[i] in COORDINATES else GIVE if header[i] in REQUIRED else GIVE_OR_REMOVE
+        return numbers([row[i] for row in rows], lambda row: f"{name} line {lines[row]}, column {header[i]}", fix)
 
     for i, column in enumerate(header):
         if column in without:

@@ -221,8 +221,9 @@ def _frame(prediction: Prediction, rows: Ints, recorded: Floats) -> Frame:
     i = int(np.argmax(best))
     mirrored = _turned(predicted * [1, 1, -1], recorded)
     if np.linalg.norm(mirrored.of(predicted * [1, 1, -1]) - recorded, axis=1).max() <= NEAR:
-        raise CmmUqError("its frame is mirrored against the recording's: one axis has the other sign",
-                         where=prediction.where, fix="Turn the sign of one coordinate round, in both alike")  # fmt: skip
+        raise CmmUqError("its frame is mirrored against the recording's: one axis has the other sign, or two are exchanged",
+                         where=prediction.where,
+                         fix="Name each column rightly, or turn the sign of one round, in both alike")  # fmt: skip
     raise CmmUqError(
         f"measurement {prediction.measurement[rows[i]]}, point {prediction.point[rows[i]]} is predicted {best[i]:.4g} mm "
         "from where it was recorded", where=f"{prediction.where} line {prediction.lines[rows[i]]}",

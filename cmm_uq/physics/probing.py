@@ -9,6 +9,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Text, say
 from cmm_uq.physics.effect import Amount, Effect, Harmonic, Parameter
+from cmm_uq.physics.rigid_body import tip_offsets
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import MICROMETRE, unit
 
@@ -101,13 +102,13 @@ class ArtefactSag(Effect):
         for rows in points.rows_of_groups:
             bar, about = _bar(points, rows)
             length = float(np.linalg.norm(bar))
-            if length > 0 and _on_line(bar, about):
+            if _on_line(bar, about):
                 level = 1 - (bar[2] / length) ** 2
                 basis[rows, :, 0] = MICROMETRE * level * (about @ bar / length**2)[:, None] * bar / length
         return basis
 
     def unfit(self, points: Points) -> CmmUqError | None:
-        """See :meth:`Effect.unfit`: of a plate, a triangle, a sphere."""
+        """See :meth:`Effect.unfit`: of a plate, a triangle, a sphere, also one that is seen from a carriage's mount."""
         beside = [rows[0] for rows in points.rows_of_groups if not _on_line(*_bar(points, rows))]
         if not beside:
             return None
@@ -119,14 +120,21 @@ class ArtefactSag(Effect):
 
 
 def _bar(points: Points, rows: Ints) -> tuple[Floats, Floats]:
-    """From the first of some points to the farthest from it, (3,); and all of them about their middle, (n, 3), mm."""
+    """From the first of some points to the farthest from it, (3,); and all of them about their middle, (n, 3), mm.
+
+    Where readings are of a mount that carries what touches, as a digitizer's are, the artefact is where that is.
+    """
     xyz = points.xyz[rows]
+    if points.machine.tip_on_every_carriage:
+        xyz = xyz + tip_offsets(points)[rows]
     first = xyz[np.argmin(points.point[rows])]
     return xyz[np.argmax(np.linalg.norm(xyz - first, axis=1))] - first, xyz - xyz.mean(axis=0)
 
 
 def _on_line(bar: Floats, about: Floats) -> bool:
-    along = (about @ bar / max(float(bar @ bar), np.finfo(np.float64).tiny))[:, None] * bar
+    if not bar.any():
+        return False
+    along = (about @ bar / float(bar @ bar))[:, None] * bar
     return bool(np.linalg.norm(about - along, axis=1).max() <= _OFF_LINE * np.linalg.norm(bar))
 
 

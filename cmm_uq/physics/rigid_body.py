@@ -165,12 +165,18 @@ class Rotation(Effect):
 def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     """Basis (n, 3, 1) of carriage ``axis`` turning about ``about`` by ``angle`` (n,) rad: ε × what it carries."""
     chain = Chain.of(points.machine.chain)
-    tip = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
     acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
-    carried = carried_offset(axis, points.carriages, tip if acts_on_tip else None, chain, points.directions)
+    carried = carried_offset(
+        axis, points.carriages, tip_offsets(points) if acts_on_tip else None, chain, points.directions
+    )
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
     return np.cross(rotation, carried)[:, :, None]
+
+
+def tip_offsets(points: Points) -> Floats:
+    """Of each point from the ram to the stylus tip, (n, 3) mm; zero where none is recorded."""
+    return np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
 
 
 SCALE = MappingProxyType({a: Scale(a) for a in AXES})

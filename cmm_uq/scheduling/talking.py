@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import pickle
+import queue
 import signal
 import subprocess
 import sys
@@ -225,7 +226,7 @@ def serve(begin: Callable[[Any], Callable[[int, Any], Any]]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides
     asked, told = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints is no answer
-    with contextlib.suppress(EOFError, BrokenPipeError):
+    with contextlib.suppress(BrokenPipeError):
         values = _given(asked)
         setting = next(values)
         try:
@@ -256,5 +257,19 @@ def _opened(value: Any) -> Any:
 
 
 def _given(stream: BinaryIO) -> Iterator[Any]:
+    """What is asked; when whoever asks is gone, interrupted or killed, this process ends at once, whatever it is at."""
+    asked: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def read() -> None:
+        code = 1
+        try:
+            while True:
+                asked.put(pickle.load(stream))  # noqa: S301 - of the process that began this one
+        except EOFError:
+            code = 0
+        finally:
+            os._exit(code)
+
+    threading.Thread(target=read, daemon=True).start()
     while True:
-        yield pickle.load(stream)  # noqa: S301 - of the process that began this one
+        yield asked.get()

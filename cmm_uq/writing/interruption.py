@@ -1,7 +1,8 @@
 """What a signal finds: whether anything is staged, being put in place, or written.
 
 A thread waits for SIGINT and SIGTERM, because the main thread may be far inside a library when they come, and libraries
-swallow or print exceptions. It tells the truth about what was written, removes what was staged, and ends the process.
+swallow or print exceptions. It tells the truth about what was written, removes what was staged, and ends the process. From
+the signal on no other thread begins to stage or to place anything: what it wrote after its stage was removed would stay.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from typing import Protocol
 PATIENCE_S = 1.2
 """How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
 
+_LONGER_S = 5 * PATIENCE_S
+"""Longer than the process has left."""
+
 
 class Unplaced(Protocol):
     """Something on its way to its place."""
@@ -33,6 +37,8 @@ _placing = threading.Lock()
 _stages: list[Unplaced] = []
 _written: list[Path] = []
 _going_in: list[Path] = []
+_inside: list[tuple[Path, Unplaced | None]] = []
+_changing: list[int] = []
 _signalled: list[int] = []
 _speaking: list[Callable[[], None]] = []
 _keeping: list[Callable[[], str]] = []
@@ -49,17 +55,53 @@ def staged(place: Unplaced) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def placing(folder: Path) -> Iterator[None]:
-    """While files are put in place, a signal waits; afterwards it says that they were written."""
+def changing() -> Iterator[None]:
+    """While a thread writes to what is staged, a signal waits for it; after one, nobody begins to."""
+    thread = threading.get_ident()
+    _changing.append(thread)  # before one looks: a signal in between waits, or is seen here
+    try:
+        if _signalled:
+            _changing.remove(thread)
+            give_way()
+            _changing.append(thread)
+        yield
+    finally:
+        _changing.remove(thread)
+        give_way()
+
+
+@contextlib.contextmanager
+def placing(folder: Path, staged: Unplaced | None = None) -> Iterator[None]:
+    """While files are put in place, a signal waits; afterwards it says that they were written.
+
+    Parameters
+    ----------
+    folder : where they are put.
+    staged : what they were before, which nobody removes meanwhile.
+    """
     give_way()  # of a thread that is not the one that a signal stops
     _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
     try:
-        with _placing:
+        _turn()
+        _inside.append((folder, staged))
+        try:
             yield
             if not _keeping:  # or there may be a hundred thousand of them, and what is kept is said
                 _written.append(folder)
+        finally:
+            _inside.clear()
+            _placing.release()
     finally:
         _going_in.remove(folder)
+
+
+def _turn() -> None:
+    """Take the lock; where a signal came while others had it, it is not for who waited."""
+    _placing.acquire()
+    while _signalled:
+        _placing.release()
+        give_way()
+        _placing.acquire()
 
 
 @contextlib.contextmanager
@@ -107,7 +149,7 @@ def watch() -> None:
 def give_way() -> None:
     """Where a signal came, it decides how the process ends."""
     if _signalled:
-        time.sleep(2 * PATIENCE_S)
+        time.sleep(_LONGER_S)
 
 
 def done() -> None:
@@ -120,7 +162,7 @@ def done() -> None:
 def _stand_still(number: int, frame: FrameType | None) -> None:
     """The main thread starts nothing new while the other one ends the process, but completes what it puts in place."""
     _signalled.append(number)
-    if not _going_in:
+    if not _going_in and threading.get_ident() not in _changing:
         give_way()
 
 
@@ -132,22 +174,33 @@ def _wait(reading: int) -> None:
 
 
 def _end(number: int) -> None:
+    try:
+        _signalled.append(number)
+        said = _removed()
+        for hush in _speaking.copy():
+            hush()
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            if sys.stderr.isatty():
+                sys.stderr.write("\r\x1b[2K\x1b[?25h")  # a progress bar hides the cursor
+            sys.stderr.write(f"cmm-uq: interrupted{said}\n")
+            sys.stderr.flush()
+    finally:
+        os._exit(128 + number)
+
+
+def _removed() -> str:
+    """Remove what is staged, and say what is true of the rest."""
+    deadline = time.monotonic() + PATIENCE_S
     alone = _placing.acquire(timeout=PATIENCE_S)
-    if alone:
-        for place in _stages.copy():
+    inside = [] if alone else _inside.copy()
+    while _changing and time.monotonic() < deadline:
+        time.sleep(0.002)
+    for place in _stages.copy():
+        if all(place is not staged for _, staged in inside):
             place.discard()
     if _written:
-        said = f"interrupted; what was asked for is written in {', '.join(map(str, _written))}"
-    elif alone:
-        said = f"interrupted; {_keeping[-1]() if _keeping else 'nothing was written'}"
-    else:
-        where = ", ".join(map(str, _going_in))
-        said = f"interrupted while files were put in place; the next command in {where} completes it or takes it back"
-    for hush in _speaking.copy():
-        hush()
-    with contextlib.suppress(OSError, ValueError, AttributeError):
-        if sys.stderr.isatty():
-            sys.stderr.write("\r\x1b[2K\x1b[?25h")  # a progress bar hides the cursor
-        sys.stderr.write(f"cmm-uq: {said}\n")
-        sys.stderr.flush()
-    os._exit(128 + number)
+        return f"; what was asked for is written in {', '.join(map(str, _written))}"
+    if inside:
+        where = ", ".join(str(folder) for folder, _ in inside)
+        return f" while files were put in place; the next command in {where} completes it or takes it back"
+    return f"; {_keeping[-1]() if _keeping else 'nothing was written'}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from cmm_uq.writing import interruption
 from cmm_uq.writing.placing import free_name
 
 _TAKEN, _FOLDER = "Name another file; nothing is overwritten", "Name a folder that exists"
+_MENDED = "Free the disk, mend the permissions, or name another file"
 
 
 def write_new(out: Path, content: bytes) -> None:
@@ -69,7 +71,8 @@ def new_file(out: Path, *, force: bool = False) -> Iterator[Path]:
         except FileExistsError:
             raise OutputError("is there already", where=str(out), fix=_TAKEN) from None
         except OSError as error:
-            raise OutputError(f"cannot be written: {error.strerror}", where=str(out), fix=_FOLDER) from error
+            fix = _FOLDER if error.errno in (errno.ENOENT, errno.ENOTDIR) else _MENDED
+            raise OutputError(f"cannot be written: {error.strerror}", where=str(out), fix=fix) from error
         finally:
             unfinished.discard()
 

@@ -119,11 +119,14 @@ class Staged:
             whole = {**contents, MANIFEST: Manifest(self.owner, hashes).as_json(sizes)}
             for name, content in whole.items():
                 self._check(name)
-                _write(self.stage / NEW / name, content)
+                with interruption.changing():
+                    for folder in [*Path(name).parents][-2::-1]:  # none above: a stage that was removed stays so
+                        (self.stage / NEW / folder).mkdir(exist_ok=True)
+                    _write(self.stage / NEW / name, content)
             if ledger is not None:
                 ledger.intend(self.token, self.folder.absolute(), sha256(whole[MANIFEST]).hexdigest())
             try:
-                with interruption.placing(self.folder):
+                with interruption.placing(self.folder, self):
                     self._commit(tuple(hashes), hashes, ledger)
             except BaseException:
                 if ledger is not None and not self._in_doubt():
@@ -220,10 +223,12 @@ def staged(
                     raise CmmUqError(
                         "is a file, not a folder", where=str(folder), fix="Choose another folder with --out"
                     )
-                folder.mkdir(parents=True, exist_ok=True)
+                with interruption.changing():
+                    folder.mkdir(parents=True, exist_ok=True)
                 finish_interrupted(folder)
                 journal_for(folder, owner, dict.fromkeys(expected, ""), inputs=given, force=force)
-                _open(place)
+                with interruption.changing():
+                    _open(place)
             yield place
         finally:
             place.discard()
@@ -354,7 +359,6 @@ def _drop(folder: Path, token: str) -> None:
 
 
 def _write(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("wb") as file:
         file.write(content)
         file.flush()

@@ -265,6 +265,8 @@ def test_another_origin_is_a_shift_alone() -> None:
 
 def test_a_mirrored_frame_is_refused() -> None:
     assert "mirrored" in refused(RECORDED, COMPLETE.assign(z_mm=-COMPLETE.z_mm)).problem
+    exchanged = COMPLETE.assign(x_mm=COMPLETE.y_mm, y_mm=COMPLETE.x_mm)
+    assert "or two are exchanged" in refused(RECORDED, exchanged).problem
 
 
 def test_an_exchanged_measurement_is_refused_with_its_line() -> None:

@@ -10,11 +10,13 @@ import pytest
 from cmm_uq.diagnosis.comparison.search import Found, model_comparison
 from cmm_uq.diagnosis.power import powers, without_fault
 from cmm_uq.diagnosis.unseen import Smallest, smallest_effects
+from cmm_uq.documents.document import Table
 from cmm_uq.kinds.ballbar.plan import ballbar
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.planning.placing import along, joined
 from cmm_uq.planning.ready import ready_plan
+from tests.kinds.simulated import diagnosed
 from tests.planning.plans import BALLBAR, GAUGE, setting
 
 ALPHA = 0.01
@@ -114,3 +116,13 @@ def test_a_period_that_divides_the_pitch_is_not_resolved() -> None:
     for part in range(1, 6):
         assert any(low / 1.01 < 60.0 / part < 1.01 * high for low, high in periods.unresolved)
     assert not any(low < 60.0 / 1.5 < high for low, high in periods.unresolved)
+
+
+@pytest.mark.parametrize("job", ["digitizer-simulated", "plate-simulated", "step-gauge-simulated"])
+def test_sag_is_of_bars_and_gauges_alone(job: str) -> None:
+    """A digitizer's mount moves along lines past its sphere, and neither sphere nor plate is shortened along a line."""
+    listed = next(
+        block for section in diagnosed(job).sections for block in section.blocks
+        if isinstance(block, Table) and block.caption == "Smallest errors that would have shown"
+    )  # fmt: skip
+    assert ("Sag of the artefact" in [row[0] for row in listed.rows]) is job.startswith("step-gauge")

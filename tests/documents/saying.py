@@ -12,6 +12,7 @@ from typing import Any
 from cmm_uq.documents.document import Document, Plot
 from cmm_uq.languages.catalogue import Catalogue, catalogue
 from cmm_uq.languages.language import Code
+from cmm_uq.languages.saying import Said
 from cmm_uq.messages import Day, Message, Number, Plural, Text, Verbatim
 from cmm_uq.units import Unit
 
@@ -91,7 +92,8 @@ def lettered(plot: Plot) -> Iterator[str]:
     sorts = {str.__str__(text): text for text in plot.lettering}
     for found in _LETTERING.findall(plot.svg):
         text = html.unescape(re.sub(r"<[^>]*>", "", found))
-        yield sorts.get(text, text)
+        known = sorts.get(text, text)
+        yield known.source if isinstance(known, Said) else known
 
 
 def said(text: object, known: str) -> bool:

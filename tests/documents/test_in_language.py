@@ -22,15 +22,17 @@ from cmm_uq.documents.document import Document, Paragraph, Plot, Section
 from cmm_uq.documents.html import render_html
 from cmm_uq.documents.in_language import said
 from cmm_uq.documents.lettering import lettered_in
+from cmm_uq.documents.measured import width_mm
+from cmm_uq.documents.narrowing import NAMES_MM
 from cmm_uq.documents.pdf import render_pdf
-from cmm_uq.documents.plan_picture import _edge, _size
-from cmm_uq.documents.plot_style import SMALL
+from cmm_uq.documents.plan_picture import _edge, _size, _title
+from cmm_uq.documents.plot_style import SMALL, TINY
 from cmm_uq.documents.plots import budget_bars
 from cmm_uq.documents.results_file import head
 from cmm_uq.errors import CmmUqError
 from cmm_uq.languages.language import LANGUAGES, Code
 from cmm_uq.languages.saying import Said, said_in
-from cmm_uq.messages import Day, Message, Number, Text, Verbatim, say
+from cmm_uq.messages import Day, Message, Number, Text, Verbatim, commas, say
 from tests.conftest import ROOT
 from tests.documents.saying import figures, lettering, messages
 from tests.documents.test_every_layout import CUT_LABELS, HEADS_RUN_TOGETHER, HIDDEN_COLUMNS
@@ -136,7 +138,7 @@ def test_a_picture_is_lettered_in_the_language_with_its_decimal_sign(code: Code)
             source = sources.get(text)
             assert source is not None or not re.search(r"[^\W\d_]{2}", text), text
             if source is not None and any(message.pattern for message in messages(source)):
-                assert said_in(source, code).startswith(text.removesuffix("…"))
+                assert text.removesuffix("…") in said_in(source, code)
             point = re.search(r"\d[.,]\d", text)
             assert point is None or LANGUAGES[code].decimal in point[0]
 
@@ -145,13 +147,28 @@ def test_english_letters_no_picture_again() -> None:
     assert [text for text in lettering(certificate("en")) if isinstance(text, Said)] == []
 
 
-def test_a_long_name_beside_a_bar_is_cut_to_its_room() -> None:
+@pytest.mark.parametrize("language", ["de", "ja"])
+def test_a_long_name_beside_a_bar_has_two_lines_and_is_cut_after_them(language: Code) -> None:
     name = say("Coordinate of a ball, along the bar, twice")
+    whole, letters = str.__str__(said_in(name, language)), say("Lengths")
+    for names, cut in (([name], False), ([commas([name] * 6)], True)):
+        with lettered_in(language):
+            plot = budget_bars(names, [1.0], caption=letters, alternative=letters)
+            lines = list(dict.fromkeys(str.__str__(text) for text in plot.lettering if not text.endswith("%")))
+            assert max(width_mm(line, SMALL) for line in lines) <= NAMES_MM
+        assert len(lines) <= 2
+        assert lines[-1].endswith("…") is cut
+        assert cut or "".join(lines).replace(" ", "") == whole.replace(" ", "")
+
+
+def test_a_title_of_a_placing_that_would_be_too_small_has_two_lines() -> None:
+    title = commas([say("along {direction}", direction=Verbatim("+X −Y +Z"))] * 3)
     with lettered_in("de"):
-        plot = budget_bars([name], [1.0], caption=say("Lengths"), alternative=say("Lengths"))
-    [cut] = {text for text in plot.lettering if text.endswith("…")}
-    assert said_in(name, "de").startswith(cut[:-1])
-    assert len(cut) > 25
+        assert _size(title) < TINY
+        lines = _title(title)
+        assert len(lines) == 2
+        assert min(map(_size, lines)) >= TINY
+        assert " ".join(map(str.__str__, lines)) == str.__str__(said_in(title, "de"))
 
 
 def test_a_long_title_of_a_placing_is_set_smaller_and_a_long_tick_has_room() -> None:

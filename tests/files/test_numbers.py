@@ -71,6 +71,7 @@ def test_a_column_is_read_as_its_cells_are(cells: list[str]) -> None:
         ("", "no value"),
         ("NaN", "'NaN' is not a finite number"),
         ("2,5", "'2,5' is not a number. Write decimals with a point"),
+        ("1,234.5", "'1,234.5' is not a number. Write it without groups of digits"),
         ("1_0", "'1_0' is not a number. Write it with digits 0 to 9"),
         ("1e16", "'1e16' is too large"),
         ("-1e400", "'-1e400' is too large"),

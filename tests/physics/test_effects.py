@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -137,6 +138,21 @@ def test_what_does_not_lie_on_a_line_does_not_sag_as_a_bar() -> None:
         raise CATALOGUE["artefact_sag"].unfit(flat) or AssertionError
     assert CATALOGUE["artefact_sag"].unfit(POINTS) is None
     assert not np.any(CATALOGUE["artefact_sag"].displacement(flat, {"um": 6.0}))
+
+
+def test_a_bar_that_is_seen_from_a_mount_is_where_the_mount_sees() -> None:
+    """The mount moves on an arc and looks at a bar; or along a line, and looks at what is none."""
+    turn = np.linspace(0.0, 3.0, 5)[:, None]
+    mount = 300.0 * np.hstack([np.cos(turn), np.sin(turn), 0 * turn])
+    bar = np.linspace(-100.0, 100.0, 5)[:, None] * np.array([1.0, 0.0, 0.0])
+    columns = {f"tip_{axis}_mm": (bar - mount)[:, i] for i, axis in enumerate("xyz")}
+    one = np.ones(5, int)
+    machine = replace(POINTS.machine, tip_on_every_carriage=True)
+    seen = Points(mount, one, np.arange(1, 6), one, machine, columns, np.arange(2, 7))
+    e = CATALOGUE["artefact_sag"].displacement(seen, {"um": 6.0})
+    np.testing.assert_allclose(e[-1] - e[0], [6e-3, 0.0, 0.0], atol=1e-15)
+    aside = replace(seen, xyz=bar, columns={f"tip_{axis}_mm": (mount - bar)[:, i] for i, axis in enumerate("xyz")})
+    assert CATALOGUE["artefact_sag"].unfit(aside) is not None
 
 
 def test_a_gauge_that_is_measured_forth_and_back_sags_from_its_first_face_to_the_farthest() -> None:

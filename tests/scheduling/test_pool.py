@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -96,6 +98,38 @@ def test_who_stops_listening_leaves_no_process_behind() -> None:
         os.kill(process.pid, 0)
     with pytest.raises(CmmUqError, match="stopped"):
         talk.ask(1, None)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux what runs")
+def test_a_process_whose_asker_is_killed_does_not_go_on_with_its_task() -> None:
+    script = f"""if 1:
+        import threading
+        from cmm_uq.scheduling.talking import Talk, Work
+        talk = Talk(Work({PROGRAM!r}, 0.0))
+        talk.ask(0, None)
+        threading.Thread(target=talk.ask, args=(1, "hang"), daemon=True).start()
+        print(talk._process.pid, flush=True)
+        threading.Event().wait()"""
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE) as asker:
+        assert asker.stdout is not None
+        worker = int(asker.stdout.readline())
+        time.sleep(0.5)
+        os.kill(worker, 0)
+        asker.kill()
+    for _ in range(100):
+        if not _runs(worker):
+            return
+        time.sleep(0.05)
+    os.kill(worker, signal.SIGKILL)
+    pytest.fail("it hangs on for its ten minutes")
+
+
+def _runs(process: int) -> bool:
+    """Whether it is there and no mere entry whose parent has not asked how it ended."""
+    try:
+        return "\nState:\tZ" not in Path(f"/proc/{process}/status").read_text()
+    except OSError:
+        return False
 
 
 @pytest.mark.parametrize("workers", [0, -1, 257])

@@ -79,6 +79,56 @@ def test_a_signal_ends_the_process_with_the_truth(
         assert list(tmp_path.iterdir()) == []
 
 
+THREADS = """
+import sys, threading, time
+from pathlib import Path
+from cmm_uq.writing import Owner, staged, interruption, staging
+interruption.watch()
+out = Path(sys.argv[1])
+discard = staging.Staged.discard
+def slowly(place):  # as on a busy disk
+    discard(place)
+    time.sleep(0.1)
+staging.Staged.discard = slowly
+real = staging._write
+def written(path, content):
+    time.sleep(0.01)
+    real(path, content)
+staging._write = written
+
+def write(name):
+    with interruption.keeping(lambda: "what is whole is kept"):
+        for turn in range(1000):
+            with staged(out / f"{name}{turn}", Owner("report", "job")) as place:
+                place.write({f"{n}": b"x" for n in range(3)})
+for name in "abcd":
+    threading.Thread(target=write, args=(name,), daemon=True).start()
+time.sleep(0.6)
+print("now", flush=True)
+time.sleep(60)
+"""
+
+
+def test_threads_that_write_leave_nothing_unfinished(tmp_path: Path) -> None:
+    """Of each thread a set is staged, or being placed, or just begun when the signal comes; the first goes first."""
+    with subprocess.Popen(
+        [sys.executable, "-c", THREADS, str(tmp_path / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "now\n"
+        process.send_signal(signal.SIGINT)
+        _, told = process.communicate(timeout=20)
+    assert (process.returncode, told) == (130, "cmm-uq: interrupted; what is whole is kept\n")
+    found = list((tmp_path / "out").iterdir())
+    assert found
+    assert {tuple(sorted(path.name for path in folder.iterdir())) for folder in found} == {
+        ("0", "1", "2", "manifest.json")
+    }
+
+
 def test_a_second_signal_changes_nothing(tmp_path: Path) -> None:
     with subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(tmp_path / "out"), "placing"],

@@ -20,11 +20,11 @@ _SHOWN = 4
 
 
 def costs_section(found: Diagnosed) -> Section:
-    """A table of what remains; without blocks where one explanation is settled."""
+    """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
     title, rivals = say("What the choice of an explanation costs"), found.diagnosis.remaining.rivals
-    if not rivals:
+    rows = (*_named(found), *_figures(found), *_decisions(found)) if rivals else ()
+    if not rows:  # as against a simulation, where no effect of the job takes part
         return Section(title, ())
-    rows = (*_named(found), *_figures(found), *_decisions(found))
     heads = (
         Column(say("Quantity"), numeric=False),
         *(

@@ -32,7 +32,7 @@ def effects_section(proof: Proof) -> Section:
             )
         )
     heads = (
-        Column(say("Effect"), numeric=False), Column(say("Found")), Column(say("Wrongly named")),
+        Column(say("Effect"), numeric=False), Column(say("Times found")), Column(say("Wrongly named")),
         Column(say("Found in 9 of 10 from")), Column(say("95 %")), Column(say("Physics allows")),
         Column(say("Unit"), numeric=False), Column(say("Hardly told from"), numeric=False),
     )  # fmt: skip

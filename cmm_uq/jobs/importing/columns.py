@@ -10,7 +10,8 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.files.limits import CELLS, COLUMNS, ROWS
-from cmm_uq.jobs.importing.header import COORDINATES, Header
+from cmm_uq.files.numbers import GIVE_OR_REMOVE, MEASURE
+from cmm_uq.jobs.importing.header import Header
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.lengths import lengths_unit
 from cmm_uq.jobs.importing.numbering import MEASUREMENT, NUMBERS, POINT, completed, numbered
@@ -18,6 +19,7 @@ from cmm_uq.jobs.importing.numerals import decimal_sign, is_number, split_units,
 from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
 from cmm_uq.jobs.importing.units import FAHRENHEIT, LENGTH, UNITS, WrittenUnit, converted, sort_of
 from cmm_uq.jobs.importing.vocabulary import NAME
+from cmm_uq.jobs.recording import COORDINATES
 from cmm_uq.messages import Verbatim, commas, names, number, say
 from cmm_uq.points import Floats, Ints
 
@@ -130,7 +132,8 @@ class _Table:
             cells, unit = split_units(self.cells(i), at)
             if name not in COORDINATES and not any(cell != "" and is_number(cell) for cell in cells):
                 return []
-            found.append((values_of(cells, sign, at), unit or self.header.units.get(i), i))
+            fix = MEASURE if name in COORDINATES else GIVE_OR_REMOVE
+            found.append((values_of(cells, sign, at, fix), unit or self.header.units.get(i), i))
         return found
 
     def named_units(self, written: dict[str, list[tuple[Floats, WrittenUnit | None, int]]]) -> dict[str, WrittenUnit]:

@@ -11,8 +11,8 @@ from cmm_uq.jobs.importing.numerals import is_number
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
 from cmm_uq.jobs.importing.units import WrittenUnit, unit_named
 from cmm_uq.jobs.importing.vocabulary import Heading, is_nominal, understood
+from cmm_uq.jobs.recording import COORDINATES
 
-COORDINATES = ("x_mm", "y_mm", "z_mm")
 LINES_BEFORE = 2000
 """Lines of text before a table that are searched for its header."""
 
@@ -146,8 +146,10 @@ def _unambiguous(found: Found, headings: Sequence[str], place: str) -> dict[str,
         several = count > 1 and None not in indices and len(set(indices)) == len(indices)
         if len(own) > 1 and not several:
             shown = " and ".join(repr(headings[i]) for _, i in own[:3])
+            first = own[0][1]
+            one = first + 1 if headings.count(headings[first]) > 1 else f'"{headings[first]}"'
             raise CmmUqError(f"columns {shown} could all be {name}", where=place,
-                             fix=f'Say which: columns = {{ {name} = "{headings[own[0][1]]}" }}')  # fmt: skip
+                             fix=f"Say which: columns = {{ {name} = {one} }}")  # fmt: skip
         columns[name] = tuple(i for _, i in sorted(own, key=lambda one: one[0] or 0))
     return _one_count(columns, place)
 

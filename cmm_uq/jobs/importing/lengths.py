@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.importing.header import COORDINATES
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.units import UNITS, WrittenUnit, length_named
+from cmm_uq.jobs.recording import COORDINATES
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.points import Floats
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.files.numbers import LARGEST, number_problem, numbers
+from cmm_uq.files.numbers import GIVE, LARGEST, number_problem, numbers
 from cmm_uq.jobs.importing.sheet import Cell
 from cmm_uq.jobs.importing.units import WrittenUnit, apart, unit_named
 from cmm_uq.points import Floats
@@ -121,7 +121,7 @@ def split_units(cells: Sequence[Cell], at: Callable[[int], str]) -> tuple[Sequen
     return bare, unit
 
 
-def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> Floats:
+def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str], fix: str = GIVE) -> Floats:
     """Values (n,) of cells.
 
     Parameters
@@ -129,6 +129,7 @@ def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> Flo
     cells : of a column.
     sign : its decimal sign.
     at : place of a cell by its index.
+    fix : what to do where there is no number.
 
     Raises
     ------
@@ -136,9 +137,9 @@ def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> Flo
     """
     sorts = set(map(type, cells))
     if str not in sorts:
-        return _of_numbers(np.array(cells, dtype=np.float64), at)
+        return _of_numbers(np.array(cells, dtype=np.float64), at, fix)
     if len(sorts) > 1:
-        return np.array([values_of([cell], sign, lambda _, row=row: at(row))[0] for row, cell in enumerate(cells)])  # type: ignore[misc]
+        return np.array([values_of([cell], sign, lambda _, row=row: at(row), fix)[0] for row, cell in enumerate(cells)])  # type: ignore[misc]
     texts: Sequence[str] = cells  # type: ignore[assignment]
     joined = "\n".join(texts)
     if "−" in joined:
@@ -148,14 +149,13 @@ def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str]) -> Flo
         texts = [_plain(text, sign, row, at) for row, text in enumerate(texts)]
     elif sign == ",":
         texts = joined.replace(",", ".").split("\n")
-    return numbers(texts, at)
+    return numbers(texts, at, fix)
 
 
-def _of_numbers(values: Floats, at: Callable[[int], str]) -> Floats:
+def _of_numbers(values: Floats, at: Callable[[int], str], fix: str) -> Floats:
     bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if bad.size:
-        raise CmmUqError(f"{values[bad[0]]:g} is no number that can be used", where=at(int(bad[0])),
-                         fix="Measure the point again, or leave out its measurement")  # fmt: skip
+        raise CmmUqError(f"{values[bad[0]]:g} is no number that can be used", where=at(int(bad[0])), fix=fix)
     return values
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.jobs.importing.header import COORDINATES
+from cmm_uq.jobs.recording import COORDINATES
 
 POINTS = (COORDINATES,)
 REFERENCES = (*POINTS, ("reference_mm",), ("reference_x_mm", "reference_y_mm", "reference_z_mm"))

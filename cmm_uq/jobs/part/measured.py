@@ -54,7 +54,9 @@ def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> F
 
 def _column(cells: Cells, i: int, where: str) -> Floats:
     return numbers(
-        [row[i] for row in cells.rows], lambda row: f"{where} line {cells.lines[row]}, column {cells.header[i]}"
+        [row[i] for row in cells.rows],
+        lambda row: f"{where} line {cells.lines[row]}, column {cells.header[i]}",
+        "Give a number: every point of the plan is needed",
     )
 
 

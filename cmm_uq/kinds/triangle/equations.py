@@ -22,7 +22,7 @@ from cmm_uq.kinds.triangle.placings import PLANES
 from cmm_uq.kinds.triangle.standard import SIDES_OF_DIMENSIONS, corners
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.placings import Placings
-from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS
+from cmm_uq.physics.rigid_body import ROTATION, SCALE, SQUARENESS, tip_offsets
 from cmm_uq.points import AXES, Floats
 from cmm_uq.units import ARCSECOND, METRE, PPM
 
@@ -126,7 +126,7 @@ def defects(triangle: Triangle, xyz: Floats, dimensions: Floats) -> list[Defects
     """
     points, nominal = triangle.points, corners(SIDES_OF_DIMENSIONS @ dimensions)
     readings = (xyz + points.machine.origin_mm) / triangle.expansion[:, None]
-    tips = np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
+    tips = tip_offsets(points)
     found = []
     for number in triangle.placings.numbers:
         rows = points.measurement == number

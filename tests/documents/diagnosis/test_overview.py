@@ -15,7 +15,7 @@ from cmm_uq.commands.diagnosing import diagnose_job
 from cmm_uq.diagnosis.rivals import Remaining, Rival
 from cmm_uq.documents.diagnosis.overview import overview_of, share_of
 from cmm_uq.documents.diagnosis.page import diagnosis_document
-from cmm_uq.documents.document import Document, Overview, Plot
+from cmm_uq.documents.document import Document, Overview, Plot, Table
 from cmm_uq.documents.html import render_html
 from cmm_uq.documents.result import Diagnosed
 from cmm_uq.documents.where_section import place_words, region_words
@@ -23,6 +23,7 @@ from cmm_uq.messages import say
 from cmm_uq.physics.catalogue import EVERY
 from tests.conftest import ROOT
 from tests.documents.saying import leaves
+from tests.kinds.simulated import diagnosed
 
 IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
 """Words that no technician says."""
@@ -193,3 +194,10 @@ def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(exp
     assert overview_of(open_).verdict == "Explained: more than one cause is possible"
     alone = replace(explained, diagnosis=replace(d, indistinguishable=(), remaining=Remaining()))
     assert overview_of(alone).verdict == "Explained: the cause is found"
+
+
+@pytest.mark.parametrize("job", ["iota-1102-20C-against-simulation", "plate-simulated"])
+def test_no_table_is_without_rows(job: str) -> None:
+    tables = [block for section in diagnosed(job).sections for block in section.blocks if isinstance(block, Table)]
+    assert tables
+    assert [table.caption for table in tables if not table.rows] == []

@@ -68,6 +68,8 @@ DAMAGES = [
     ("comma.csv", put("Z [mm]", "Z [furlong]"), r"line 1: the unit 'furlong' of 'Z \[furlong\]' is not known"),
     ("comma.csv", put("Y [mm]", "X old [mm]"), r"line 1: no column is y_mm among 'Measurement', 'Ball'"),
     ("comma.csv", put("Operator", "X actual"), r"columns 'X \[mm\]' and 'X actual' could all be x_mm.*columns = \{ x_mm"),
+    ("comma.csv", put("Operator", "X [mm]"), r"columns 'X \[mm\]' and 'X \[mm\]' could all be x_mm.*columns = \{ x_mm = 3 \}"),
+    ("comma.csv", put("500.022500000", ""), r"line 3, column X \[mm\]: no value. Measure the point again, or leave"),
     ("comma.csv", put("Measurement", "Kennung"), r"nothing says which points belong to one.*points_per_measurement"),
     ("comma.csv", put("2,1,300", "Mean,,\r\n2,1,300"), r"line 4: has no coordinates, and figures follow"),
     ("semicolon.csv", put("500,0225", "500.0225"),

@@ -43,7 +43,7 @@ def test_points_come_in_the_order_of_the_plan() -> None:
     (content([*rows(), "D,1,0,0,0"]), "there is no feature 'D'"),
     (content([*rows(), "A,13,0,0,0"]), "'A' has no point 13"),
     (content([*rows()[:-1], "bore,24,60,40"]), "has 4 cells, and the header 5"),
-    (content([*rows()[:-1], "bore,24,60,40,zero"]), "points.csv line 61, column z_mm"),
+    (content([*rows()[:-1], "bore,24,60,40,zero"]), r"points.csv line 61, column z_mm: .* Give a number: every point"),
     (content(rows(), "feature,point,x_mm,y_mm,z"), "has no column 'z_mm'"),
     (content(rows(6.0)), "lies 6 mm from where it is planned"),
     (content(scaled(1 / 25.4)), "0.03937 times those of the plan, as if they were in inches"),
