@@ -22,9 +22,14 @@ from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.messages import say
+from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.reducing import Way, spread
+from cmm_uq.parts.virtual import Circumstances, Virtual
 from tests.part_machines import by_certificate, plate_of
 
-TRIALS = 4000
+TRIALS = 1000
+"""Enough to be computed again to the byte; how near draws come to the truth is looked at elsewhere."""
 
 
 @cache
@@ -60,6 +65,11 @@ def sampled_once(model: LinearModel, noise: Components, estimate: LeastSquares, 
     if key not in _SAMPLED:
         _SAMPLED[key] = sample_with_noise(model, noise, estimate, seed)
     return _SAMPLED[key]
+
+
+def unchanged(plan: Plan, given: Circumstances, draws: int, seed: int, *, planned: Virtual, **_: object) -> list[Way]:
+    """The measurement as planned alone, for tests that are not about what would change its uncertainty."""
+    return [Way(say("as planned"), spread(planned, draws, seed), draws)]
 
 
 def found_again_once(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
