@@ -43,7 +43,8 @@ LONG = (
     "kinds/test_contract.py", "hostile/test_kills_and_collisions.py", "diagnosis/test_diagnosis.py",
     "kinds/shift_plate/test_plane.py", "commands/test_new.py", "site/test_snippets.py", "commands/test_part.py",
     "cli/test_ends.py", "commands/test_planning.py", "cli/test_outside_effect.py", "site/test_site.py",
-    "records/test_pending.py", "hostile/test_kernels.py", "serving/test_in_browser.py",
+    "records/test_pending.py", "hostile/test_kernels.py", "serving/test_in_browser.py", "conformity/test_grid.py",
+    "commands/test_analysis.py",
 )  # fmt: skip
 """Files of twenty seconds and more: each runs on one core, so none is to be begun when the others are done."""
 

@@ -26,6 +26,7 @@ from cmm_uq.messages import say
 from cmm_uq.parts.plan import Plan
 from cmm_uq.parts.reducing import Way, spread
 from cmm_uq.parts.virtual import Circumstances, Virtual
+from cmm_uq.verification.pdf_file import PdfFile
 from tests.part_machines import by_certificate, plate_of
 
 TRIALS = 1000
@@ -65,6 +66,18 @@ def sampled_once(model: LinearModel, noise: Components, estimate: LeastSquares, 
     if key not in _SAMPLED:
         _SAMPLED[key] = sample_with_noise(model, noise, estimate, seed)
     return _SAMPLED[key]
+
+
+_TEXTS: dict[bytes, list[str]] = {}
+_texts_of = PdfFile.pages.func
+
+
+def pages_once(file: PdfFile) -> list[str]:
+    """Text of a PDF's pages, read once for all verifications of the very same bytes."""
+    key = hashlib.sha256(file.content).digest()
+    if key not in _TEXTS:
+        _TEXTS[key] = _texts_of(file)
+    return _TEXTS[key]
 
 
 def unchanged(plan: Plan, given: Circumstances, draws: int, seed: int, *, planned: Virtual, **_: object) -> list[Way]:

@@ -24,12 +24,27 @@ from cmm_uq.commands.verify_part import _asked_again
 from cmm_uq.documents.part.found import PartFound
 from cmm_uq.documents.part.results import standing_data
 from cmm_uq.errors import CmmUqError
+from cmm_uq.verification.pdf_file import PdfFile
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
-from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, unchanged, with_inputs
+from tests.part_reports import (
+    TRIALS,
+    found_again_once,
+    pages_once,
+    plate_found,
+    plate_report,
+    put,
+    unchanged,
+    with_inputs,
+)
 
 PDF, PAGE = "part-simulated.pdf", "part-simulated.html"
 OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"
+
+
+@pytest.fixture(autouse=True)
+def pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PdfFile, "pages", property(pages_once))
 
 
 @pytest.fixture
