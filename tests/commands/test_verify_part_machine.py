@@ -17,12 +17,11 @@ from cmm_uq.commands.part_written import contents_of
 from cmm_uq.commands.verify import verify
 from cmm_uq.documents.part.found import PartFound
 from cmm_uq.errors import CmmUqError
-from cmm_uq.verification.pdf_file import PdfFile
 from tests.cli.test_due import recorded
 from tests.cli.test_history import scale
 from tests.part_machines import PDF as MACHINE_PDF
 from tests.part_machines import by_certificate, plate_of
-from tests.part_reports import pages_once, put, sampled_once, unchanged
+from tests.part_reports import put, sampled_once, unchanged
 
 PDF = "part-simulated.pdf"
 TRIALS = 4000
@@ -34,7 +33,6 @@ BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", 
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmm_uq.parts.conditional.sample_with_noise", sampled_once)
     monkeypatch.setattr("cmm_uq.commands.part.ways", unchanged)
-    monkeypatch.setattr(PdfFile, "pages", property(pages_once))
 
 
 def records(folder: Path) -> Path:
