@@ -8,12 +8,16 @@ where text is read or written; each factor stands here once. Every unit that a d
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from math import pi
 from types import MappingProxyType
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import NOTHING, Text, Verbatim
+
+if TYPE_CHECKING:
+    import pint
 
 MICROMETRE = 1e-3
 """1 µm in mm."""
@@ -131,3 +135,11 @@ def printed_unit(name: str) -> Text:
     word = name.rpartition(".")[2]
     fitting = [ending for ending in PRINTED if word == ending or word.endswith(f"_{ending}")]
     return PRINTED[max(fitting, key=len)] if fitting else NOTHING
+
+
+@cache
+def pint_units() -> pint.UnitRegistry[Any]:
+    """The units of pint, which take half a second to read: once, and only where somebody names a unit."""
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,6 +33,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 def pytest_configure(config: pytest.Config) -> None:
     """Workers of one run share what takes long to make: see tests/kinds/simulated.py."""
     os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
+    gc.disable()  # nothing of what is collected goes again
     if hasattr(config, "workerinput"):
         os.environ["CMM_UQ_TESTS_SHARE"] = str(Path(config.option.basetemp).parent)
 
@@ -42,20 +43,34 @@ LONG = (
     "kinds/test_contract.py", "hostile/test_kills_and_collisions.py", "diagnosis/test_diagnosis.py",
     "kinds/shift_plate/test_plane.py", "commands/test_new.py", "site/test_snippets.py", "commands/test_part.py",
     "cli/test_ends.py", "commands/test_planning.py", "cli/test_outside_effect.py", "site/test_site.py",
-    "records/test_pending.py", "hostile/test_kernels.py", "serving/test_in_browser.py",
+    "records/test_pending.py", "hostile/test_kernels.py", "serving/test_in_browser.py", "conformity/test_grid.py",
+    "commands/test_analysis.py",
 )  # fmt: skip
 """Files of twenty seconds and more: each runs on one core, so none is to be begun when the others are done."""
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(
+    collector: pytest.Collector,
+) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+    """Every other worker reads the files from the last on: what one has compiled, the other finds done."""
+    report = yield
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
+    if isinstance(collector, pytest.Directory) and int(worker.removeprefix("gw")) % 2:
+        report.result.reverse()
+    return report
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take longest; those of a folder otherwise stay in their order."""
+    """Begin with the files that take longest; those of a folder otherwise stay in their order, in every worker."""
     long = {ROOT / "tests" / name for name in LONG}
-    items.sort(key=lambda item: item.path not in long)
+    items.sort(key=lambda item: (item.path not in long, item.path.parts))
 
 
 def pytest_collection_finish() -> None:
     """Look for what refers to itself as seldom as the command does, and not at all through what the tests themselves are."""
     gc.freeze()
+    gc.enable()
     gc.set_threshold(_NEW_OBJECTS)
 
 

@@ -22,9 +22,15 @@ from cmm_uq.inference.noise import Components
 from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.messages import say
+from cmm_uq.parts.plan import Plan
+from cmm_uq.parts.reducing import Way, spread
+from cmm_uq.parts.virtual import Circumstances, Virtual
+from cmm_uq.verification.pdf_file import PdfFile
 from tests.part_machines import by_certificate, plate_of
 
-TRIALS = 4000
+TRIALS = 1000
+"""Enough to be computed again to the byte; how near draws come to the truth is looked at elsewhere."""
 
 
 @cache
@@ -60,6 +66,23 @@ def sampled_once(model: LinearModel, noise: Components, estimate: LeastSquares, 
     if key not in _SAMPLED:
         _SAMPLED[key] = sample_with_noise(model, noise, estimate, seed)
     return _SAMPLED[key]
+
+
+_TEXTS: dict[bytes, list[str]] = {}
+_texts_of = PdfFile.pages.func
+
+
+def pages_once(file: PdfFile) -> list[str]:
+    """Text of a PDF's pages, read once for all verifications of the very same bytes."""
+    key = hashlib.sha256(file.content).digest()
+    if key not in _TEXTS:
+        _TEXTS[key] = _texts_of(file)
+    return _TEXTS[key]
+
+
+def unchanged(plan: Plan, given: Circumstances, draws: int, seed: int, *, planned: Virtual, **_: object) -> list[Way]:
+    """The measurement as planned alone, for tests that are not about what would change its uncertainty."""
+    return [Way(say("as planned"), spread(planned, draws, seed), draws)]
 
 
 def found_again_once(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:

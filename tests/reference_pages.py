@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -47,25 +48,32 @@ EDITORS = (
 ALL = "all"
 
 
-def files() -> dict[Path, str]:
-    """Every generated file with what it must say."""
-    schemas = {SHIPPED / f"{name}.schema.json": as_text(schema_named(name)) for name in SCHEMAS}
-    pages = {
-        "job": job(),
-        "part": part(),
-        "plan": plan(),
-        "truth": truth(),
-        "budget": budget(),
-        "instrument": instrument(),
-        "schedule": schedule(),
-        "columns": columns(),
-        "commands": commands(),
-        "results": results(),
-        "part-results": part_results(),
-        "prove": prove(),
+def files() -> dict[Path, Callable[[], str]]:
+    """Every generated file with what says what it must say."""
+    schemas: dict[Path, Callable[[], str]] = {
+        SHIPPED / f"{name}.schema.json": partial(schema_text, name) for name in SCHEMAS
     }
-    schemas[PAGES.parent / "instruments" / "ready.md"] = ready_profiles()
+    pages = {
+        "job": job,
+        "part": part,
+        "plan": plan,
+        "truth": truth,
+        "budget": budget,
+        "instrument": instrument,
+        "schedule": schedule,
+        "columns": columns,
+        "commands": commands,
+        "results": results,
+        "part-results": part_results,
+        "prove": prove,
+    }
+    schemas[PAGES.parent / "instruments" / "ready.md"] = ready_profiles
     return schemas | {PAGES / f"{name}.md": text for name, text in pages.items()}
+
+
+def schema_text(name: str) -> str:
+    """A schema as it is shipped."""
+    return as_text(schema_named(name))
 
 
 def page(title: str, *parts: str) -> str:
@@ -430,9 +438,9 @@ def _parameters(command: CommandInfo) -> Iterable[tuple[str, str, str]]:
 
 def main() -> None:
     """Write them."""
-    for path, text in files().items():
+    for path, made in files().items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        path.write_text(made(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ FILES = files()
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_generated_file_says_what_the_readers_take(path: Path) -> None:
     """``python -m tests.reference_pages`` writes it anew."""
-    assert path.read_text(encoding="utf-8") == FILES[path]
+    assert path.read_text(encoding="utf-8") == FILES[path]()
 
 
 def test_every_column_that_something_goes_by_has_a_sentence() -> None:

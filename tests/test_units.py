@@ -6,17 +6,26 @@ import math
 import pickle
 from pathlib import Path
 
-import pint
 import pytest
 
 from cmm_uq.conformity.accuracy import UNITS as OF_FIGURES
 from cmm_uq.errors import CmmUqError
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.physics.effect import Parameter
-from cmm_uq.units import ARCSECOND, MICROMETRE, PPM, PRINTED, UNITS, Unit, printed_unit, unit, unit_as_written
+from cmm_uq.units import (
+    ARCSECOND,
+    MICROMETRE,
+    PPM,
+    PRINTED,
+    UNITS,
+    Unit,
+    pint_units,
+    printed_unit,
+    unit,
+    unit_as_written,
+)
 from tests.conftest import ROOT
 
-PINT = pint.UnitRegistry(cache_folder=None)
 SPELLED = {
     "1": "dimensionless", "10⁻⁶/K": "ppm/delta_degC", "1/K": "1/delta_degC", "°": "degree", "″": "arcsecond",
     "″/m": "arcsecond/m", "″/K": "arcsecond/delta_degC", "″/(m·K)": "arcsecond/m/delta_degC",
@@ -27,7 +36,7 @@ SPELLED = {
 
 @pytest.mark.parametrize("symbol", UNITS)
 def test_its_size_is_what_pint_says(symbol: str) -> None:
-    found = PINT.Quantity(1.0, SPELLED.get(symbol, symbol.replace("%", "percent"))).to_base_units().magnitude
+    found = pint_units().Quantity(1.0, SPELLED.get(symbol, symbol.replace("%", "percent"))).to_base_units().magnitude
     assert math.isclose(UNITS[symbol].si, found, rel_tol=1e-12)
 
 

@@ -11,6 +11,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.instruments.profile import Quantity
 from cmm_uq.jobs.sentences import unit_of
 from cmm_uq.messages import Text, Verbatim, number, say
+from cmm_uq.units import pint_units
 
 _PINT: Mapping[str, str] = MappingProxyType({
     "K/h": "kelvin/hour", "1/K": "1/kelvin", "µm/m": "micrometer/meter", "mm/s": "millimeter/second", "″": "arcsecond",
@@ -90,7 +91,7 @@ def conversion(given: str, wanted: str) -> Callable[[float], float]:
         return float
     import pint
 
-    registry: pint.UnitRegistry[float] = pint.UnitRegistry()
+    registry = pint_units()
     try:
         registry.Quantity(1.0, given).to(target)
     except (pint.PintError, ValueError, TypeError, AttributeError, SyntaxError) as error:

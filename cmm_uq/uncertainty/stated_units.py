@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 import tokenize
 from collections.abc import Callable, Mapping
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.uncertainty.expression import Expression, Step
+from cmm_uq.units import pint_units
 
 if TYPE_CHECKING:
     import pint
@@ -25,13 +25,6 @@ _NOT_PLAIN = re.compile(r"\*\*|\^|(?<!\w)(?!1\b)\d|[⁰¹²³⁴⁵⁶⁷⁸⁹�
 """What is left of a unit without its powers must hold no further power, and no number but 1: pint would compute it."""
 _QUANTITY = re.compile(r"\s*([-+−]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)\s*(.*)", re.DOTALL)
 _CELSIUS = re.compile(r"\b(?:degC|celsius|degree_Celsius)\b|°C")
-
-
-@cache
-def _registry() -> pint.UnitRegistry[Any]:
-    import pint
-
-    return pint.UnitRegistry(cache_folder=None)
 
 
 def unit_of(text: str, where: str | None = None) -> pint.Unit:
@@ -48,7 +41,7 @@ def unit_of(text: str, where: str | None = None) -> pint.Unit:
     if len(text) > _LONGEST or not _SPELLED.fullmatch(text) or _NOT_PLAIN.search(_POWER.sub("", text)):
         raise CmmUqError(problem, where=where, fix=fix)
     try:
-        return _registry().Unit(text.strip().replace("−", "-"))
+        return pint_units().Unit(text.strip().replace("−", "-"))
     except (
         pint.PintError,
         tokenize.TokenError,
@@ -90,7 +83,7 @@ def number_in(text: str, unit: str, *, difference: bool, where: str | None = Non
         written, wanted = (_CELSIUS.sub("kelvin", spelled) for spelled in (written, wanted))
     number = float(found[1].replace("−", "-"))
     try:
-        converted = _registry().Quantity(number, unit_of(written, where)).to(unit_of(wanted, where))
+        converted = pint_units().Quantity(number, unit_of(written, where)).to(unit_of(wanted, where))
     except pint.PintError as error:
         raise CmmUqError(f"{text!r} cannot be expressed in {unit}", where=where, fix="Mend one of the units") from error
     return float(converted.magnitude)
@@ -134,7 +127,7 @@ def _unit_of_step(step: Step, operands: list[Any], units: Mapping[str, str]) -> 
 
 def _dimensionless(*operands: Any) -> Any:
     """Exponentials, logarithms and circular functions: of numbers and angles in radians only."""
-    one, radian = _registry().Unit(""), _registry().Unit("rad")
+    one, radian = pint_units().Unit(""), pint_units().Unit("rad")
     if not all(isinstance(operand, _Number) or operand in (one, radian) for operand in operands):
         raise _UndeterminedError
     return one
@@ -149,7 +142,7 @@ def _sum(a: Any, b: Any) -> Any:
 
 
 def _plain(unit: Any) -> Any:
-    return _registry().Unit("") if isinstance(unit, _Number) else unit
+    return pint_units().Unit("") if isinstance(unit, _Number) else unit
 
 
 def _power(base: Any, exponent: Any) -> Any:
@@ -162,7 +155,7 @@ def _power(base: Any, exponent: Any) -> Any:
 
 def _angle(a: Any, b: Any) -> Any:
     _sum(a, b)
-    return _registry().Unit("rad")
+    return pint_units().Unit("rad")
 
 
 _RULES: Mapping[str, Callable[..., Any]] = {

@@ -24,12 +24,27 @@ from cmm_uq.commands.verify_part import _asked_again
 from cmm_uq.documents.part.found import PartFound
 from cmm_uq.documents.part.results import standing_data
 from cmm_uq.errors import CmmUqError
+from cmm_uq.verification.pdf_file import PdfFile
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_results, plate_files, plate_of
-from tests.part_reports import TRIALS, found_again_once, plate_found, plate_report, put, with_inputs
+from tests.part_reports import (
+    TRIALS,
+    found_again_once,
+    pages_once,
+    plate_found,
+    plate_report,
+    put,
+    unchanged,
+    with_inputs,
+)
 
 PDF, PAGE = "part-simulated.pdf", "part-simulated.html"
 OTHER = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"
+
+
+@pytest.fixture(autouse=True)
+def pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PdfFile, "pages", property(pages_once))
 
 
 @pytest.fixture
@@ -156,8 +171,9 @@ def test_the_certificate_inside_is_verified_as_by_itself(tmp_path: Path) -> None
     assert any(one.file.startswith(name) for one in found.inquiry.findings), told(found)
 
 
-def test_the_machines_own_job_goes_with_the_report(tmp_path: Path) -> None:
+def test_the_machines_own_job_goes_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no certificate states the machine, its job is inside, and all is computed again from the file."""
+    monkeypatch.setattr("cmm_uq.commands.part.ways", unchanged)
     (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
     files = plate_files({}, np.zeros((60, 3)), machine_state={"job": "../machine"})
     put(tmp_path / "plate", files)

@@ -21,15 +21,18 @@ from tests.cli.test_due import recorded
 from tests.cli.test_history import scale
 from tests.part_machines import PDF as MACHINE_PDF
 from tests.part_machines import by_certificate, plate_of
-from tests.part_reports import TRIALS, put, sampled_once
+from tests.part_reports import put, sampled_once, unchanged
 
 PDF = "part-simulated.pdf"
+TRIALS = 4000
+"""With fewer, what a forged history changes would be within what computing again allows for the draws."""
 BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", "model": "", "place": ""}
 
 
 @pytest.fixture(autouse=True)
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cmm_uq.parts.conditional.sample_with_noise", sampled_once)
+    monkeypatch.setattr("cmm_uq.commands.part.ways", unchanged)
 
 
 def records(folder: Path) -> Path:

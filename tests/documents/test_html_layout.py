@@ -31,13 +31,15 @@ OVERLAPS = """() => {
   };
   const leaves = [...document.querySelectorAll('h1,h2,h3,p,dt,dd,th,td,li,figcaption,address,figure svg')]
     .map(element => ({element, ...shown(element)})).filter(b => b.right > b.left && b.bottom > b.top);
+  leaves.sort((a, b) => a.top - b.top);
   const pairs = [];
   for (let i = 0; i < leaves.length; i++) for (let j = i + 1; j < leaves.length; j++) {
     const a = leaves[i], b = leaves[j];
-    if (a.element.contains(b.element) || b.element.contains(a.element)) continue;
+    if (b.top >= a.bottom - 1) break;  // nor is any that follows as high
     const wide = Math.min(a.right, b.right) - Math.max(a.left, b.left);
-    const high = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
-    if (wide > 1 && high > 1) pairs.push([a.element.textContent.slice(0, 40), b.element.textContent.slice(0, 40)]);
+    const high = Math.min(a.bottom, b.bottom) - b.top;
+    if (wide <= 1 || high <= 1 || a.element.contains(b.element) || b.element.contains(a.element)) continue;
+    pairs.push([a.element.textContent.slice(0, 40), b.element.textContent.slice(0, 40)]);
   }
   return pairs;
 }"""
@@ -54,12 +56,14 @@ CONTRASTS = """() => {
   const linear = v => v <= .04045 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4;
   const light = c => { const [r, g, b] = c.map(v => linear(v / 255)); return .2126 * r + .7152 * g + .0722 * b; };
   const rgb = text => text.match(/[\\d.]+/g).map(Number);
+  const known = new Map();
   const ground = e => {
-    for (; e; e = e.parentElement) {
+    if (!e) return [255, 255, 255];
+    if (!known.has(e)) {
       const c = rgb(getComputedStyle(e).backgroundColor);
-      if (c.length < 4 || c[3] > 0) return c.slice(0, 3);
+      known.set(e, c.length < 4 || c[3] > 0 ? c.slice(0, 3) : ground(e.parentElement));
     }
-    return [255, 255, 255];
+    return known.get(e);
   };
   const speaks = e => [...e.childNodes].some(node => node.nodeType === 3 && node.data.trim());
   return [...document.querySelectorAll('body *')].filter(speaks).map(e => {

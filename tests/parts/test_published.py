@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 from benchmarks.parts.published import Figure, arcs, circles, polar
 
 
-@pytest.mark.parametrize("one", [*circles(), *polar(), *arcs()], ids=lambda one: one.what)
-def test_a_printed_figure_comes_out_again(one: Figure) -> None:
-    assert abs(one.found - one.expected) <= one.within, one.where
+@pytest.mark.parametrize("figures", [circles, polar, arcs])
+def test_printed_figures_come_out_again(figures: Callable[[], list[Figure]]) -> None:
+    assert [one for one in figures() if not one.holds] == []
