@@ -91,8 +91,14 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
         diagnosis.joint_posterior = sampled if whole else stopped
         said = cmm_uq.diagnose(job).results["diagnosis"]
     except ConsistentError as found:
-        return {"verdict": "consistent", "p": float(found.args[0]), "groups": [], "effects": {}, "withheld": [],
-                "remaining": []}
+        return {
+            "verdict": "consistent",
+            "p": float(found.args[0]),
+            "groups": [],
+            "effects": {},
+            "withheld": [],
+            "remaining": [],
+        }
     finally:
         diagnosis.joint_posterior = sampled
     return {

@@ -169,7 +169,8 @@ def _asserted(
 ) -> tuple[Found, Joint, tuple[Withheld, ...]]:
     """What of a search may be asserted, estimated from all observations, and what is withheld.
 
-    Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place.
+    Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place. Where there
+    is none, the least probable of those whose size is open goes first: without it that of the others may be known.
     """
     found, gone = with_periods(found)
     places: dict[int, Withheld] = {}  # of each effect that was tried in the place of others, the first of these
@@ -181,13 +182,16 @@ def _asserted(
         if not more:
             return found, joint, gone
         tried |= frozenset(more)
+        alone = []
         for i, withheld in more.items():
-            first = places.get(i, withheld)
             if (instead := in_place_of(found, i, tried)) is not None:
                 found, other = instead
-                places[other] = first
+                places[other] = places.get(i, withheld)
             else:
-                found, gone = without(found, frozenset({i})), (*gone, first)
+                alone.append(i)
+        if len(alone) == len(more):
+            least = min(alone, key=lambda i: more[i].probability)
+            found, gone = without(found, frozenset({least})), (*gone, places.get(least, more[least]))
 
 
 def _of_all(found: Found, model: MeasurementModel) -> Found:

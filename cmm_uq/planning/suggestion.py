@@ -234,7 +234,10 @@ def _size(after: MeasurementModel, name: str, group: Sequence[str]) -> Floats:
     model = _with_all(replace(after, effects=others), [name])
     try:
         value = model.estimate().least_squares.value / scales(model.unknowns)
-    except (CmmUqError, np.linalg.LinAlgError):  # alone it would have to be larger than any machine's: the largest, then
+    except (
+        CmmUqError,
+        np.linalg.LinAlgError,
+    ):  # alone it would have to be larger than any machine's: the largest, then
         value = np.ones(len(model.unknowns))
     return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
 

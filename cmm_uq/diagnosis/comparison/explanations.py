@@ -38,6 +38,9 @@ _ROUGH = 0.25
 _SHORTEST_OVER = 0.1
 """Of the largest extent of a recording, over which such a form differs; a plate that lies level has next to none along Z."""
 
+_ADJUSTED = 100.0
+"""mm that an artefact must reach to show that a machine is out of adjustment: 20 ppm are 2 µm then, and 0.5 µm over a ball."""
+
 _BEYOND = 0.5
 """How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
 
@@ -80,6 +83,7 @@ class Explanation:
     imitated_by : of an effect.
     weight : how readily it is thought of, beside others of its kind.
     effect : that it is, if it is one.
+    together : whether it is one of what a machine out of adjustment has, and long enough an artefact shows it.
     """
 
     name: Text
@@ -91,6 +95,7 @@ class Explanation:
     imitated_by: tuple[Nonparametric, ...] = ()
     weight: float = 1.0
     effect: Effect | None = None
+    together: bool = False
 
     @property
     def shaped(self) -> bool:
@@ -139,10 +144,15 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
             found.append(
                 Explanation(
                     Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=effect.prior_weight,
-                    effect=effect,
+                    effect=effect, together=effect.everywhere and _reach(points) >= _ADJUSTED,
                 )
             )  # fmt: skip
     return found
+
+
+def _reach(points: Points) -> float:
+    """mm, the longest extent of an artefact along an axis in any of its set-ups: with it placed freely it shows no more."""
+    return max(float(np.ptp(points.xyz[points.measurement == m], axis=0).max()) for m in np.unique(points.measurement))
 
 
 def considered(artefact: Artefact) -> Iterator[Effect]:

@@ -127,7 +127,7 @@ def _everywhere(explanations: Sequence[Explanation], shown: Iterable[int], *, of
     """Explanations that every machine, or every artefact, has to some degree."""
     return frozenset(
         i for i in shown
-        if (effect := explanations[i].effect) is not None and effect.everywhere and effect.of_artefact == of_artefact
+        if (effect := explanations[i].effect) is not None and explanations[i].together and effect.of_artefact == of_artefact
     )  # fmt: skip
 
 

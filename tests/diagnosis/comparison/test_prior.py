@@ -22,7 +22,8 @@ MANY = (0.4, 0.2, 0.1, 0.08, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01, 0.01)
 
 
 def explanations(*names: str, weight: float = 1.0) -> list[Explanation]:
-    known = [Explanation(name, EFFECT, MEMBER, weight=weight, effect=every()[name]) for name in names]
+    known = [Explanation(name, EFFECT, MEMBER, weight=weight, effect=every()[name], together=every()[name].everywhere)
+             for name in names]  # fmt: skip
     return [*known, Explanation("function", UNKNOWN, MEMBER)]
 
 
