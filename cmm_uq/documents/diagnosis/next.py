@@ -17,6 +17,9 @@ from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Effect
 from cmm_uq.planning.advice import ODDS, NextPlan, Shown, odds_words, rounded
 
+_PARTED = 3.0
+"""Odds from which on two are parted at all."""
+
 TO_FILL_IN = "next_plan.csv"
 """File that a diagnosis writes the set-ups to."""
 
@@ -45,7 +48,21 @@ def next_sentence(found: Diagnosed) -> Text:
     )
     if not plan.partings:
         return told
-    least = min(parting.after for parting in plan.partings)
+    odds = [parting.after for parting in plan.partings]
+    if max(odds) < _PARTED and not plan.shown:
+        return say(
+            "No set-up that was tried is expected to part what this recording cannot: odds of {odds} : 1 at best for the "
+            "true one. Another artefact is needed for that.", odds=rounded(max(odds)),
+        )  # fmt: skip
+    least = min((each for each in odds if each >= _PARTED), default=None)
+    if least is None:
+        return told
+    if min(odds) < _PARTED:
+        return say(
+            "{told} Odds of {odds} : 1 or more for the true one are then expected, but for {count} of {all} pairs, which "
+            "they do not part: see below.", told=told, odds=rounded(least), count=sum(each < _PARTED for each in odds),
+            all=len(odds),
+        )  # fmt: skip
     return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
 
 

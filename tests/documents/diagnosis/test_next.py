@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
-from cmm_uq.documents.diagnosis.next import next_data
+from cmm_uq.documents.diagnosis.next import next_data, next_sentence
+from cmm_uq.documents.result import Diagnosed
 from cmm_uq.kinds import artefact_facts, artefact_of
 from cmm_uq.physics.catalogue import every
-from cmm_uq.planning.advice import NextPlan, Shown
+from cmm_uq.planning.advice import NextPlan, Parting, Shown
 from tests.kinds.constructions import plate
 
 
@@ -26,3 +30,24 @@ def test_a_fault_of_the_artefact_is_as_large_as_that_artefact_allows() -> None:
         assert shown["detected_after"] == pytest.approx(0.5 * sd)
         differs += sd < unbound[name].coefficients[0].prior_sd / 2
     assert differs
+
+
+@pytest.mark.parametrize(
+    ("odds", "expected"),
+    [
+        ((40.0, 25.0), "Odds of 25 : 1 or more for the true one are then expected."),
+        ((40.0, 0.6), "Odds of 40 : 1 or more for the true one are then expected, but for 1 of 2 pairs, which"),
+        (
+            (0.095, 0.6),
+            "No set-up that was tried is expected to part what this recording cannot: odds of 0.6 : 1 at best",
+        ),
+    ],
+)
+def test_set_ups_that_would_part_nothing_are_no_advice(odds: tuple[float, ...], expected: str) -> None:
+    pairs = tuple(Parting(("scale_x", "scale_y"), 1.0, each) for each in odds)
+    plan = NextPlan((), 3, 5, pairs, (), reached=False, box=np.zeros((3, 2)))
+    artefact = artefact_of(artefact_facts(kind="plate"), plate())
+    before = SimpleNamespace(artefact=artefact)
+    told = next_sentence(cast("Diagnosed", SimpleNamespace(next_plan=plan, diagnosis=SimpleNamespace(before=before))))
+    assert expected in told
+    assert told.startswith("Measure next: ") == (max(odds) > 3)
