@@ -138,6 +138,27 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset(), ["0"])
 
 
+def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three that nearly are one: without the least probable the sizes of the two others are known."""
+    start = found_with(((0, 1, 2), 0.9), ((3,), 0.1), chosen=frozenset({0, 1, 2}))
+    probability = {0: 0.97, 1: 0.96, 2: 0.78}
+
+    def open_size(found: Found, _joint: object) -> dict[int, Withheld]:
+        listed = found.chosen if len(found.chosen) > 2 else ()
+        return {i: Withheld(str(i), say("one"), probability[i], HOLDS_ZERO) for i in listed}
+
+    for name, stub in {
+        "with_periods": lambda found: (found, ()), "_of_all": lambda found, _model: found, "without_size": open_size,
+        "joint_posterior": lambda *_: None, "without": lambda found, gone: replace(found, chosen=found.chosen - gone),
+        "in_place_of": lambda *_: None,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(diagnosis, name, stub)
+    found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
+    assert (found.chosen, [each.effect for each in withheld]) == (frozenset({0, 1}), ["2"])
+
+
 def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
     """By a comparison that finds no gain; what remains is unexplained."""
     monkeypatch.setattr(diagnosis, "improvement", lambda *_: Improvement(4.0, 1.0, 4.0, 4.0, 0.5, 1.0))

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from cmm_uq.diagnosis.comparison.explanations import Explanation, known
+from cmm_uq.kinds import artefact_facts, artefact_of
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.model import MeasurementModel
 from cmm_uq.physics.catalogue import EVERY
 from cmm_uq.physics.effect import FURTHER
 from cmm_uq.plugins import BrokenPluginError
 from cmm_uq.points import Machine, Points
+from tests.kinds.constructions import spheres
 from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
 from tests.recordings import TRAVEL, bar_facts, bars
 
@@ -60,6 +62,17 @@ def test_a_fourth_of_an_idealised_effect_is_of_other_forms(ballbar_points: Point
             assert rough / (rough + own) == pytest.approx(0.25)
         else:
             assert rough == 0
+
+
+def test_scales_and_squarenesses_belong_together_where_the_artefact_is_longer_than_a_ball(
+    ballbar_points: Points,
+) -> None:
+    six = {name for name, effect in EVERY.items() if effect.everywhere and not effect.of_artefact}
+    assert {name for name, each in candidates(ballbar_points).items() if each.together} == six
+    model = MeasurementModel(artefact_of(artefact_facts(kind="sphere"), spheres()), ())
+    found = known(model, np.array([size.nominal for size in model.artefact.sizes]), ())
+    assert six <= {each.name for each in found}
+    assert not [each.name for each in found if each.together]
 
 
 def test_a_guideway_has_no_other_form_along_an_axis_that_the_recording_hardly_moves() -> None:
