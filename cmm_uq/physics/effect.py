@@ -117,7 +117,8 @@ class Effect(ABC):
     shape : what shapes the basis, if anything.
     columns : columns that the recording must have.
     tier : ``contract`` or ``further``: how readily it is to be thought of.
-    everywhere : whether every machine has it to some degree, so that a diagnosis tries it together with all such.
+    everywhere : whether every machine has it to some degree, or every artefact made on one, so that a diagnosis takes it
+        together with all such.
     idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
     imitated_by : nonparametric terms that could pass for it.
     stands_for : nonparametric terms that are nothing else than it.

@@ -25,7 +25,8 @@ CLOCKS = {
     "process_time",
 }
 READ = {
-    "cmm_uq/writing/staging.py": {"monotonic"}, "cmm_uq/commands/new.py": {"now"},
+    "cmm_uq/writing/staging.py": {"monotonic"}, "cmm_uq/writing/interruption.py": {"monotonic"},
+    "cmm_uq/commands/new.py": {"now"},
     "cmm_uq/commands/new_part.py": {"now"},
     "cmm_uq/instruments/source.py": {"time_ns"}, "cmm_uq/instruments/simulated/line.py": {"monotonic"},
     "cmm_uq/records/entries.py": {"now"}, "cmm_uq/cli/records.py": {"now"},
@@ -36,7 +37,7 @@ READ = {
     "cmm_uq/scheduling/cluster.py": {"monotonic"},
     "cmm_uq/signing/clock.py": {"now"}, "cmm_uq/serving/checking.py": {"now"}, "cmm_uq/serving/server.py": {"monotonic"},
 }  # fmt: skip
-"""How long a command waits for another one's lock; the date that a new job begins with, for its reader to change; when a
+"""How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job begins with, for its reader to change; when a
 reading came, and when a simulated instrument sends one; when something was recorded or sent, on which day something is due,
 when something was signed, and how long a job, a lock, a cluster or a browser is waited for. No certificate and no
 results.json has any of these."""

@@ -83,9 +83,12 @@ def test_rarer_effects_are_thought_of_a_tenth_as_readily() -> None:
     assert weights == {CONTRACT: {1.0}, FURTHER: {0.1}}
 
 
-def test_scales_and_squarenesses_are_what_every_machine_has() -> None:
+def test_scales_and_squarenesses_are_what_every_machine_has_and_every_artefact_made_on_one() -> None:
     everywhere = {f"scale_{a}" for a in "xyz"} | {f"squareness_{plane}" for plane in ("xy", "yz", "zx")}
-    assert {name for name, effect in EVERY.items() if effect.everywhere} == everywhere
+    assert {name for name, e in EVERY.items() if e.everywhere and not e.of_artefact} == everywhere
+    assert {name for name, e in EVERY.items() if e.everywhere and e.of_artefact} == {
+        f"artefact_{n}" for n in everywhere
+    }
 
 
 def test_only_straightness_rotation_hysteresis_and_drift_are_the_simplest_of_many_forms() -> None:
