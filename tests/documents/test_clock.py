@@ -37,10 +37,10 @@ READ = {
     "cmm_uq/scheduling/cluster.py": {"monotonic"},
     "cmm_uq/signing/clock.py": {"now"}, "cmm_uq/serving/checking.py": {"now"}, "cmm_uq/serving/server.py": {"monotonic"},
 }  # fmt: skip
-"""How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job begins with, for its reader to change; when a
-reading came, and when a simulated instrument sends one; when something was recorded or sent, on which day something is due,
-when something was signed, and how long a job, a lock, a cluster or a browser is waited for. No certificate and no
-results.json has any of these."""
+"""How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job
+begins with, for its reader to change; when a reading came, and when a simulated instrument sends one; when something was
+recorded or sent, on which day something is due, when something was signed, and how long a job, a lock, a cluster or a browser
+is waited for. No certificate and no results.json has any of these."""
 
 
 def clocks(source: str) -> set[str]:
