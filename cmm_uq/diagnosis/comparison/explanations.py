@@ -178,8 +178,8 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
     u = (2 * (along - along.min()) / over - span / over)[:, None, None]
     forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
     basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
-    for s, t in forms:
-        columns = model.seen(basis * (1 + s * u + t * (1.5 * u**2 - 0.5)), values)
+    every = np.concatenate([basis * (1 + s * u + t * (1.5 * u**2 - 0.5)) for s, t in forms], axis=2)
+    for columns in np.split(model.seen(every, values), len(forms), axis=1):
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
 
 

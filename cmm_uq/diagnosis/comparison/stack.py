@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import linalg
 
 from cmm_uq.diagnosis.comparison.explanations import Explanation
 from cmm_uq.points import Floats, Ints
@@ -110,19 +109,23 @@ def stacked(
     """
     found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
     whole = [
-        (owner, j, np.log(member.weight / total), member.columns / noise_scale[:, None])
+        (owner, j, np.log(member.weight / total), member.columns)
         for owner, explanation in enumerate(explanations)
         for total in [sum(member.weight for member in explanation.members)]
         for j, member in enumerate(explanation.members)
     ]
-    lefts = np.split(
-        rest(np.hstack([columns for *_, columns in whole])),
-        np.cumsum([columns.shape[1] for *_, columns in whole])[:-1], axis=1,
-    ) if whole else []  # fmt: skip
-    for (owner, j, log, columns), left in zip(whole, lefts, strict=True):
-        length = float(linalg.norm(left))
-        if length > _ABSORBED * linalg.norm(columns):
-            found.setdefault(columns.shape[1], []).append((owner, j, log, left, length))
+    if not whole:
+        return np.zeros((len(noise_scale), 0)), ()
+    every = np.hstack([columns for *_, columns in whole]) / noise_scale[:, None]
+    left = rest(every)
+    ends = np.cumsum([columns.shape[1] for *_, columns in whole])
+    starts_of = np.append(0, ends[:-1])
+    lengths, of_whole = (np.sqrt(np.add.reduceat(np.sum(each**2, axis=0), starts_of)) for each in (left, every))
+    seen = lengths > _ABSORBED * of_whole
+    for k in np.flatnonzero(seen).tolist():
+        owner, j, log, columns = whole[k]
+        own = left[:, starts_of[k] : ends[k]]
+        found.setdefault(columns.shape[1], []).append((owner, j, log, own, float(lengths[k])))
     groups, stack, start = [], [np.zeros((len(noise_scale), 0))], 0
     for r in sorted(found):
         chosen = found[r]
