@@ -54,7 +54,8 @@ def prepare(extra: str) -> None:
         venv.create(ENVIRONMENT, with_pip=True)
     target = f"{ROOT}[{extra}]" if extra else str(ROOT)
     pip = [str(SCRIPTS / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--editable", target], check=True, stdout=sys.stderr)
+    # what is imported is compiled then; most of what is installed never is
+    subprocess.run([*pip, "--no-compile", "--editable", target], check=True, stdout=sys.stderr)
     (ENVIRONMENT / f"installed-{extra}").write_text(wanted)
 
 
