@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
-from cmm_uq.commands.estimation import accuracy, named_draws, noise, parameters, sizes, with_noise
+from cmm_uq.commands.estimation import accuracy, named_draws, noise, parameters, sizes, with_doubt, with_noise
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.refusals import OVERFLOW_FIX
@@ -21,6 +21,7 @@ from cmm_uq.inference.sampling import sample_with_noise
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_of
 from cmm_uq.model.bending import with_curvature
+from cmm_uq.model.doubt import causes_of
 from cmm_uq.model.kind import Kind
 from cmm_uq.model.noise import noise_of
 from cmm_uq.overflow import must_be_finite, refusing_overflow
@@ -68,19 +69,21 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     components = noise_of(model)
     drawn = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
     posterior = with_curvature(model, components, drawn)
-    figures = accuracy(model, estimate, posterior, seed)
+    causes = causes_of(model.artefact, job.circumstances)
+    figures = accuracy(model, estimate, posterior, causes, seed)
     statements = [
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     found = diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None)
     averaged = found.diagnosis.remaining.draws
-    values = posterior.draws if averaged is None else averaged
+    values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
     result = Result(
-        job, model, findings, estimate, posterior, values, named_draws(model, components, posterior, values),
+        job, model, findings, estimate, posterior, values,
+        named_draws(model, components, posterior, values, mixture=averaged is not None),
         parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
-        found,
+        found, causes=causes, doubt=doubt,
     )  # fmt: skip
     for name, quantity in result.quantities():
         must_be_finite(

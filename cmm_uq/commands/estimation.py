@@ -10,6 +10,7 @@ from scipy import special
 
 from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.documents.result import LACK_OF_FIT, Component, Noise
+from cmm_uq.inference.doubt import Cause, Doubt, gain
 from cmm_uq.inference.draws import Draws, by_chain, by_ensemble, evenly
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
@@ -97,14 +98,15 @@ def parameters(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Q
 
 
 def named_draws(
-    model: MeasurementModel, components: Components, posterior: NoisyPosterior, values: Floats
+    model: MeasurementModel, components: Components, posterior: NoisyPosterior, values: Floats, *, mixture: bool
 ) -> Draws:  # fmt: skip
     """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
 
     Parameters
     ----------
-    values : (N, k) of the model's unknowns: those of the posterior; or of a mixture, row after row independent, which go with
-        no size of the noise: those are then taken evenly from the posterior, and an ensemble is a chain.
+    values : (N, k) of the model's unknowns.
+    mixture : whether they are of a mixture, row after row independent, and not of the posterior, row by row. They go with no
+        size of the noise then: those are taken evenly from the posterior, and an ensemble is a chain.
     """
     units, columns, steps = {}, [], posterior.steps // posterior.every
     for (owner, name), (draws, own) in model.reported(values).items():
@@ -112,12 +114,12 @@ def named_draws(
         columns.append(draws)
     noise = {name: each / MICROMETRE for name, each in sizes_of_noise(components, posterior).items()}
     units |= {f"noise.{name}_um": unit("µm") for name in noise}
-    if values is posterior.draws:
+    if not mixture:
         return Draws(units, by_chain(np.column_stack([*columns, *noise.values()]), steps), posterior.every)
     kept = evenly(len(posterior.draws), len(values))
     chains = by_ensemble(np.column_stack([each[kept] for each in noise.values()]), steps, len(posterior.draws))
-    mixture = [each.reshape(*chains.shape[:2], 1) for each in columns]
-    return Draws(units, np.concatenate([*mixture, chains], axis=2))
+    mixed = [each.reshape(*chains.shape[:2], 1) for each in columns]
+    return Draws(units, np.concatenate([*mixed, chains], axis=2))
 
 
 def sizes(model: MeasurementModel, values: Floats) -> dict[str, Quantity]:
@@ -171,10 +173,24 @@ def _wider(estimate: Estimate, posterior: Posterior) -> float:
     return float(np.max(posterior.draws.std(axis=0)[free] / white, initial=1.0, where=white > 0))
 
 
+def with_doubt(
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, draws: Floats, causes: Sequence[Cause]
+) -> tuple[Floats, Doubt]:  # fmt: skip
+    """Draws (N, k) of the model's unknowns with what is in doubt about all observations together; as they are without."""
+    if not causes:
+        return draws, Doubt(())
+    weights = gain(estimate.linear, float(np.median(posterior.sigma)))
+    doubt = Doubt.of([cause.at(model.used) for cause in causes], weights)
+    return doubt.widened(draws, posterior.seed), doubt
+
+
 def accuracy(
-    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, seed: int
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, causes: Sequence[Cause], seed: int
 ) -> Mapping[str, Quantity]:
-    """Figures of performance of all recorded lengths, the noise drawn anew; empty for an artefact that has none."""
+    """Figures of performance of all recorded lengths, the noise drawn anew; empty for an artefact that has none.
+
+    What is in doubt is drawn anew with the noise, the same for all set-ups and for each by itself; the larger U stands.
+    """
     artefact = model.artefact
     lengths = artefact.lengths()
     if lengths is None:
@@ -183,7 +199,17 @@ def accuracy(
     linear, components, sizes = every.linearised(estimate.about), noise_of(every), posterior.sizes
     chosen = repeated_draws(len(posterior.draws), len(lengths))
     predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)
-    return with_uncertainty(
-        lengths, predicted, lambda some, times, random: components.repeated(sizes.at(some), times, random), seed,
-        counted_with(artefact.points)[artefact.rows[:, 0]],
-    )  # fmt: skip
+    copies = counted_with(artefact.points)[artefact.rows[:, 0]]
+
+    def figures(apart: bool) -> dict[str, Quantity]:
+        def again(some: Ints, times: int, random: np.random.Generator) -> Floats:
+            readings = components.repeated(sizes.at(some), times, random)
+            for cause in causes:
+                readings += cause.drawn((len(some), times), random, apart=apart)
+            return readings
+
+        return with_uncertainty(lengths, predicted, again, seed, copies)
+
+    found = figures(apart=False)
+    other = figures(apart=True) if causes else found
+    return {name: max(one, other[name], key=lambda quantity: quantity.expanded) for name, one in found.items()}

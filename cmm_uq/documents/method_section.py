@@ -74,6 +74,7 @@ def method(result: Result) -> Section:
         (say("Sampler"), sampler),
         (say("Convergence"), _convergence(posterior)),
         (say("Averaged"), _averaged(result)),
+        (say("Stated of the artefact"), _stated(result)),
     )
     text = Paragraph(
         say(
@@ -97,6 +98,20 @@ def _averaged(result: Result) -> Text:
         "it leaves out counts as noise",
         rivals=result.averaged, count=len(result.values),
     )  # fmt: skip
+
+
+def _stated(result: Result) -> Text:
+    """What is stated of the artefact's temperature, expansion, alignment and fixturing, and which figures it reaches."""
+    if result.causes:
+        return say(
+            "the uncertainty stated of {causes} is in U of all estimates, of figures of lengths and of the slopes of lines, "
+            "as of an error that all set-ups share and as of one that each has by itself, whichever is larger; it is not in "
+            "residuals, noise, least squares and the diagnosis",
+            causes=listed([cause.name for cause in result.causes]),
+        )  # fmt: skip
+    if not result.job.circumstances.uncertainty.of_artefact:
+        return NOTHING
+    return say("what is stated of temperature, expansion, alignment and fixturing changes none of the estimates here")
 
 
 def _convergence(posterior: Posterior) -> Text:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.diagnosis.unseen import Smallest
 from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.stating import Stating
+from cmm_uq.inference.doubt import Cause, Doubt
 from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import NoisyPosterior
@@ -137,6 +138,8 @@ class Result:
     statements : of conformity, in the job's order.
     diagnosed : what the job's model leaves out, if anything.
     stating : how a certificate states it; ``None`` of a result as evaluated.
+    causes : of what is stated to be in doubt about all observations together.
+    doubt : what they make of the model's unknowns; it is in ``values``.
     """
 
     job: Job
@@ -153,6 +156,8 @@ class Result:
     statements: tuple[Statement, ...]
     diagnosed: Diagnosed
     stating: Stating | None = None
+    causes: tuple[Cause, ...] = ()
+    doubt: Doubt = field(default_factory=lambda: Doubt(()))
 
     def at_least(
         self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
@@ -215,6 +220,9 @@ class Result:
         stating, found = Stating.of(self.job), []
         for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
             quantity = Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
+            if self.causes:
+                each = np.eye(len(columns))
+                quantity = self.doubt.larger(quantity, each[columns[second]] - each[columns[first]])
             found.append(Difference(second, first, stating.stated("differences", quantity)))
         return tuple(found)
 

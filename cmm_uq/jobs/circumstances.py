@@ -40,6 +40,11 @@ class TestUncertainty(Table):
     """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between
     them."""
 
+    @property
+    def of_artefact(self) -> bool:
+        """Whether anything is stated of the artefact's temperature, expansion, alignment or fixturing."""
+        return any((self.u_cte_per_k, self.u_temperature_k, self.u_alignment_um, self.u_fixturing_um))
+
 
 TEST_KEYS = tuple(TestUncertainty.model_fields)
 

@@ -12,6 +12,7 @@ from cmm_uq.conformity.plans import ISO_10360_2
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.stating import AtLeast
 from cmm_uq.inference.combinations import uncertainty_of_sum
+from cmm_uq.inference.doubt import Doubt
 from cmm_uq.inference.draws import evenly
 from cmm_uq.kinds.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
@@ -114,8 +115,13 @@ def figures(result: Result) -> GaugeFigures:
     relative = size.sd / size.nominal if size.certified else 0.0
     lines = []
     for line in lines_of(gauge):
-        scale_u, scale_expanded = uncertainty_of_sum(components, sizes, line.scale_weights, relative / PPM)
-        gap_u, gap_expanded = uncertainty_of_sum(components, sizes, line.gap_weights / MICROMETRE)
+        weights = np.stack([line.scale_weights, line.gap_weights / MICROMETRE])
+        doubt = Doubt.of(result.causes, weights)
+        beside = float(np.hypot(relative / PPM, np.sqrt(doubt.variance(np.array([1.0, 0.0])))))
+        scale_u, scale_expanded = uncertainty_of_sum(components, sizes, line.scale_weights, beside)
+        gap_u, gap_expanded = uncertainty_of_sum(
+            components, sizes, weights[1], float(np.sqrt(doubt.variance(np.array([0.0, 1.0]))))
+        )
         lines.append(LineFigures(
             line, position_on(machine, line.middle, line.direction),
             share_of_travel(machine, line.middle, line.direction, line.length),
