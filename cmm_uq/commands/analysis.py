@@ -5,6 +5,7 @@ The command line, the Python interface and batches all call :func:`analyse`.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
@@ -12,6 +13,7 @@ from cmm_uq.commands.estimation import accuracy, named_draws, noise, parameters,
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.refusals import OVERFLOW_FIX
+from cmm_uq.conformity.as_recorded import LeftOut
 from cmm_uq.conformity.standards import statement
 from cmm_uq.documents.compose import certified
 from cmm_uq.documents.outcome import Found, Outcome, Page, Recipe
@@ -71,8 +73,10 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     posterior = with_curvature(model, components, drawn)
     causes = causes_of(model.artefact, job.circumstances)
     figures = accuracy(model, estimate, posterior, causes, seed)
+    made = partial(kind.observing("reported"), job.facts.artefact, where=job.recording_path)
+    left_out = LeftOut.of(job.points, findings, made)
     statements = [
-        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances)
+        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, left_out)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
     found = diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None)

@@ -13,6 +13,7 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.recorded import recorded_model
 from cmm_uq.commands.refusals import OVERFLOW_FIX, refuse_planned
+from cmm_uq.conformity.as_recorded import LeftOut
 from cmm_uq.conformity.consequences import consequences, costs
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.diagnosis.power import ALLOWED
@@ -136,11 +137,12 @@ def diagnosed(
     diagnosis = diagnose(
         model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made
     )  # fmt: skip
-    changes = consequences(job, diagnosis, made, kind.tested, seed)
+    left_out = LeftOut.of(job.points, findings, made)
+    changes = consequences(job, diagnosis, made, kind.tested, seed, left_out)
     unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
     plan = _next(job, diagnosis, observe, _wanted(job, diagnosis, unseen) if show else ())
     next_ones = suggestions(plan, model.artefact.title)
-    cost = costs(job, diagnosis, made, kind.tested, seed)
+    cost = costs(job, diagnosis, made, kind.tested, seed, left_out)
     return Diagnosed(job, findings, diagnosis, next_ones, changes, unseen=unseen, next_plan=plan, costs=cost)
 
 

@@ -36,7 +36,11 @@ def volumetric_performance(test: Test) -> Statement:
     budget, told = _budget(test)
     u = test.at_least(budget.u if budget.u > 0 else measured.u, bar)
     limit = float(test.limits_um(np.array([bar]))[0])
-    item = Decided(measured.value, u, limit, test.decide(measured.value, u, limit, signed=False), length_mm=bar)
+    lengths, aside = artefact.lengths(), bool(test.set_aside(artefact.rows).any())
+    value = measured.value if lengths is None or not aside else float(np.ptp(lengths)) / MICROMETRE
+    item = Decided(
+        value, u, limit, test.decide(value, u, limit, signed=False), length_mm=bar, set_aside=aside
+    )  # fmt: skip
     return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), [told], signed=False,
                        budget=test.budget_at_least(budget, bar) if budget.u > 0 else None)  # fmt: skip
 
@@ -86,9 +90,20 @@ def offset_probe(test: Test) -> Statement:
         bool(found), "a bar measured with the stylus tip to both sides (tip_x_mm, tip_y_mm, tip_z_mm)"
     )
     bar = test.artefact.sizes[0].nominal
+    aside = _set_aside(test)
     limit, known = float(test.limits_um(np.array([bar]))[0]), test.at_least(u, bar)
     items = tuple(
-        Decided(value, known, limit, test.decide(value, known, limit, signed=True), number, None, bar, position)
+        Decided(
+            value,
+            known,
+            limit,
+            test.decide(value, known, limit, signed=True),
+            number,
+            None,
+            bar,
+            position,
+            set_aside=position in aside,
+        )
         for position, number, value in found
     )
     told = (
@@ -109,6 +124,12 @@ def offset_positions(plan: OffsetPlan, artefact: Artefact, *, recorded: bool) ->
         if position not in measured
     )
     return (Condition(say("four diagonals in vertical planes, each with two offsets"), missing),)
+
+
+def _set_aside(test: Test) -> set[Text]:
+    """Positions of bars that the screening left out."""
+    _, along = test.artefact.lines_of(test.artefact.rows)
+    return {position_of(along[i]) for i in np.flatnonzero(test.set_aside(test.artefact.rows))}
 
 
 def _differences(artefact: Artefact) -> list[tuple[Text, int, float]]:

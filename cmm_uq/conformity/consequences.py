@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
+from cmm_uq.conformity.as_recorded import LeftOut
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.diagnosis.diagnosis import Diagnosis
@@ -76,7 +77,12 @@ class Costs:
 
 
 def consequences(
-    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int
+    job: Job,
+    diagnosis: Diagnosis,
+    observe: Observed,
+    tested: Collection[str],
+    seed: int,
+    left_out: LeftOut | None = None,
 ) -> Consequences | None:
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
@@ -87,6 +93,7 @@ def consequences(
     observe : makes the artefact of points.
     tested : what of its kind a standard may be decided on.
     seed : of the figures' repetitions.
+    left_out : what the screening left out.
     """
     found = {item.effect for item in diagnosis.effects}
     if not found or not _depends(job, diagnosis):
@@ -94,14 +101,16 @@ def consequences(
     drawn = _Drawn(diagnosis.posterior.draws, diagnosis.posterior.sizes, _noise(diagnosis))
     correction = _Correction.of(diagnosis.after, found, diagnosis.after.estimate().about, drawn, observe)
     before, after = correction.before(seed), correction.after(seed)
-    recorded = correction.statements(job, tested, correction.model.artefact, before)
-    corrected = correction.statements(job, tested, correction.corrected, after)
+    recorded = correction.statements(job, tested, correction.model.artefact, before, left_out)
+    corrected = correction.statements(job, tested, correction.corrected, after, left_out)
     return Consequences(
         {name: (before[name], after[name]) for name in before}, tuple(zip(recorded, corrected, strict=True))
     )
 
 
-def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int) -> Costs | None:
+def costs(
+    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int, left_out: LeftOut | None = None
+) -> Costs | None:  # fmt: skip
     """Of the explanations that remain; ``None`` where none do, and for artefacts without lengths and statements.
 
     What is unknown, or nothing, is not corrected for. Parameters as those of :func:`consequences`.
@@ -115,7 +124,8 @@ def costs(job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[
         posterior = _Drawn(rival.draws[:_FEW], diagnosis.posterior.sizes.at(some), components)
         correction = _Correction.of(rival.model, set(rival.effects), rival.draws.mean(axis=0), posterior, observe)
         figures = correction.after(seed)
-        each.append(Cost(rival.probability, figures, correction.statements(job, tested, correction.corrected, figures)))
+        statements = correction.statements(job, tested, correction.corrected, figures, left_out)
+        each.append(Cost(rival.probability, figures, statements))
     weights = diagnosis.remaining.weights
     decisions: tuple[dict[str, float], ...] = tuple({} for _ in each[0].statements)
     for cost, weight in zip(each, weights, strict=True):
@@ -188,12 +198,13 @@ class _Correction:
         return self._figures(late, self._predicted(lengths) + (late - lengths) - own, seed)
 
     def statements(
-        self, job: Job, tested: Collection[str], artefact: Artefact, figures: Mapping[str, Quantity]
-    ) -> tuple[Statement, ...]:
+        self, job: Job, tested: Collection[str], artefact: Artefact, figures: Mapping[str, Quantity],
+        left_out: LeftOut | None,
+    ) -> tuple[Statement, ...]:  # fmt: skip
         """What the job asks for, of figures of this recording, or of it corrected."""
         recorded = None if artefact is self.model.artefact else self.model.artefact
         return tuple(
-            statement(wish, artefact, figures, f"[[conformity]] {i}", tested, recorded, job.circumstances)
+            statement(wish, artefact, figures, f"[[conformity]] {i}", tested, recorded, job.circumstances, left_out)
             for i, wish in enumerate(job.facts.conformity, 1)
         )
 

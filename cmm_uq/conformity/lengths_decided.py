@@ -79,12 +79,13 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     errors, limits = found.errors / MICROMETRE, test.limits_um(found.lengths)
     causes = causes_of_lengths(found, artefact, test.circumstances).at_least(test.least_u(found.lengths))
     test.refuse_without_uncertainty(float(causes.u[rows].min()), "u_um")
-    position = lines(artefact, found)
+    position, aside = lines(artefact, found), test.set_aside(found.rows)
     items = tuple(
         Decided(
             float(errors[i]), float(causes.u[i]), float(limits[i]),
             test.decide(float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True),
             int(points.measurement[first[i]]), int(points.repeat[first[i]]), float(found.lengths[i]), position[i],
+            set_aside=bool(aside[i]),
         )
         for i in rows
     )  # fmt: skip
@@ -103,6 +104,7 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     return test.stated(
         say("error of indication of length, worst against its limit"), say("lengths"), items, remarks,
         causes=causes.of(rows), budget=test.budget_at_least(budget, worst.length_mm or 0.0) if worst.u_um > 0 else None,
+        repeats=None if again is None else again.repeats,
     )  # fmt: skip
 
 
@@ -119,6 +121,7 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
     points, first = test.artefact.points, found.rows[:, 0]
     position, both = lines(test.artefact, found), test.artefact.bidirectional(found.rows)
     kind = np.zeros(len(found.rows), dtype=np.int64) if both is None else both.astype(np.int64)
+    aside = test.set_aside(found.rows)
     keys = np.column_stack([points.measurement[first], nominals(found.lengths), kind])
     items = []
     for key in dict.fromkeys(map(tuple, keys[rows])):
@@ -131,7 +134,7 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
         known = test.at_least(u, length)
         items.append(Decided(
             value, known, limit, test.decide(value, known, limit, signed=False), int(key[0]), None, length,
-            position[own[0]],
+            position[own[0]], set_aside=bool(aside[own].any()),
         ))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of lengths")
     remarks = [
@@ -148,7 +151,7 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
         else say("u_repeat_um is not stated: no uncertainty is considered, and no probability can be given."),
     ]
     quantity = say("range of repeated lengths, worst against its limit")
-    return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False,
+    return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats,
                        causes=_each_its_own([item.u_um for item in items]))  # fmt: skip
 
 

@@ -47,12 +47,12 @@ def with_standing(items: Sequence[Decided], nominal: Ints, again: Again) -> tupl
     for i, item in enumerate(items):
         sets.setdefault((item.measurement, int(nominal[i])), []).append(i)
     eligible = {key: found for key, rows in sets.items() if (found := _one_outside(items, rows, again)) is not None}
-    failed = {key for key, rows in sets.items() if any(items[i].decision.outcome == "fail" for i in rows)}
+    failed = {key for key, rows in sets.items() if any(items[i].outcome == "fail" for i in rows)}
     if len(eligible) > again.lengths or failed - set(eligible):
         return tuple(items)  # the test fails, whatever more is measured
     standing: dict[int, Standing] = {}
     for outside, further in eligible.values():
-        if further and any(items[i].decision.outcome == "fail" for i in further):
+        if further and any(items[i].outcome == "fail" for i in further):
             continue
         enough = len({items[i].repeat for i in further}) >= again.readings
         standing |= dict.fromkeys(outside, "replaced" if enough else "again")
@@ -65,7 +65,7 @@ def _one_outside(items: Sequence[Decided], rows: Sequence[int], again: Again) ->
     if len(repeats) < again.repeats:
         return None
     test = [i for i in rows if (items[i].repeat or 0) in repeats[: again.repeats]]
-    outside = [i for i in test if items[i].decision.outcome == "fail"]
+    outside = [i for i in test if items[i].outcome == "fail"]
     if not 1 <= len({items[i].repeat for i in outside}) <= again.outside:
         return None
     return outside, [i for i in rows if i not in test]

@@ -94,7 +94,8 @@ def range_of_centres(test: Test) -> Statement:
         own = _originals(test, probed) & (probed.measurement == number)
         if own.sum() > 1:
             value = float(np.ptp(probed.centres[own], axis=0).max()) / MICROMETRE
-            items.append(Decided(value, known, limit, test.decide(value, known, limit, signed=False), int(number)))
+            items.append(Decided(value, known, limit, test.decide(value, known, limit, signed=False), int(number),
+                                 set_aside=test.set_aside_in(int(number))))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of one sphere in its place")
     told = (
         say("u is what of the sphere changed between the repeats ([test_uncertainty] u_repeat_um).")
@@ -164,7 +165,8 @@ def _items(test: Test, probed: Forms, values: np.ndarray, u: float, *, signed: b
     limit = float(test.limits_um(np.array([size]))[0])
     return tuple(
         Decided(float(values[i]), u, limit, test.decide(float(values[i]), u, limit, signed=signed),
-                int(probed.measurement[i]), int(probed.repeat[i]), size)
+                int(probed.measurement[i]), int(probed.repeat[i]), size,
+                set_aside=test.set_aside_in(int(probed.measurement[i]), int(probed.repeat[i])))
         for i in np.flatnonzero(_originals(test, probed))
     )  # fmt: skip
 

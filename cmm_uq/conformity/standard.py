@@ -11,7 +11,9 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cmm_uq.conformity.as_recorded import LeftOut, numbered
 from cmm_uq.conformity.copies import copies_in_words
 from cmm_uq.conformity.decision import Decision, decide, needs_uncertainty
 from cmm_uq.conformity.plans import Condition
@@ -26,7 +28,7 @@ from cmm_uq.jobs.conformity import ConformityFacts, needed
 from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact, Indications
-from cmm_uq.points import Floats
+from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, unit
@@ -145,6 +147,7 @@ class Test:
     accuracy : figures of performance with uncertainty, by name.
     key : of job.toml, for messages.
     circumstances : under which it was carried out.
+    left_out : what the screening left out of the estimates; it is in ``artefact`` and in ``recorded``.
     """
 
     __test__ = False  # no test of pytest's
@@ -157,6 +160,17 @@ class Test:
     accuracy: Mapping[str, Quantity]
     key: str
     circumstances: Circumstances = field(default_factory=Circumstances)
+    left_out: LeftOut | None = None
+
+    def set_aside(self, rows: Ints) -> NDArray[np.bool_]:
+        """Which values (m,), each of several points (m, j), rest on a reading that the screening left out."""
+        return np.zeros(len(rows), dtype=bool) if self.left_out is None else self.left_out.any_of(rows)
+
+    def set_aside_in(self, measurement: int, repeat: int | None = None) -> bool:
+        """Whether the screening left out a reading of a measurement, or of one repeat of it."""
+        points = self.artefact.points
+        own = (points.measurement == measurement) & (True if repeat is None else points.repeat == repeat)
+        return bool(self.set_aside(np.flatnonzero(own)[:, None]).any())
 
     def indications(self) -> Indications:
         """Errors of indication of the calibrated lengths.
@@ -246,7 +260,7 @@ class Test:
 
     def stated(
         self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text], *,
-        signed: bool = True, causes: Causes | None = None, budget: Budget | None = None,
+        signed: bool = True, causes: Causes | None = None, budget: Budget | None = None, repeats: int | None = None,
     ) -> Statement:  # fmt: skip
         """What was decided, with what the test lacks, and what the rule leaves out.
 
@@ -259,11 +273,13 @@ class Test:
         signed : whether limits hold on both sides of zero.
         causes : of the uncertainty of each item, from which follows the probability that all conform.
         budget : of the least favourable one.
+        repeats : up to which a repeat has every point of its measurement; all of them by default.
         """
         asked = (
             *self.characteristic.conditions(self.recorded, recorded=True),
             *self.characteristic.asks(self),
             *rated_conditions(self.circumstances, self.recorded.points),
+            *numbered(self.recorded.points if self.left_out is None else self.left_out.recording, repeats),
         )
         worst = least_favourable(items)
         more: list[Text] = []
@@ -277,9 +293,14 @@ class Test:
         if copies := copies_in_words(self.recorded.points):
             more.append(copies)
         missing = tuple(text for condition in asked for text in condition.missing)
+        aside = [item for item in items if item.set_aside]
+        outside = () if self.left_out is None else self.left_out.without_value
+        if self.left_out is not None and (aside or outside):
+            more = [*self.left_out.in_words([item.measurement for item in aside] if not outside else [None]), *more]
+        joint = None if causes is None or outside or counted(aside) else _joint(items, causes, signed)
         return Statement(
             self.facts, self.characteristic.name, quantity, measured, items, missing, (*remarks, *more), signed,
-            None if causes is None else _joint(items, causes, signed), budget, self._risks(worst, signed),
+            joint, budget, self._risks(worst, signed), outside,
         )  # fmt: skip
 
     def _raised(self, items: Sequence[Decided]) -> bool:

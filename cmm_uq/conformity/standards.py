@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping
 from functools import partial
 from types import MappingProxyType
 
+from cmm_uq.conformity.as_recorded import LeftOut
 from cmm_uq.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
 from cmm_uq.conformity.lengths_decided import (
     at_offset,
@@ -148,6 +149,7 @@ def statement(
     tested: Collection[str],
     recorded: Artefact | None = None,
     circumstances: Circumstances | None = None,
+    left_out: LeftOut | None = None,
 ) -> Statement:
     """Compare what the standard asks for with its limit, and decide.
 
@@ -160,6 +162,7 @@ def statement(
     recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
     tested : what of this kind of artefact a standard may be decided on.
     circumstances : under which the test was carried out, by the job.
+    left_out : what the screening left out of the artefact.
 
     Raises
     ------
@@ -169,9 +172,13 @@ def statement(
     under = circumstances or Circumstances()
     standard, characteristic = decidable(facts, artefact.kind, key, tested, under)
     whole, beside = recorded or artefact, characteristic.beside
+    if left_out is not None:
+        artefact, whole = left_out.whole(artefact), left_out.whole(whole)
     if beside is not None:
         artefact, whole = beside(artefact, under.short_gauge), beside(whole, under.short_gauge)
-    return characteristic.statement(Test(standard, characteristic, facts, artefact, whole, accuracy, key, under))
+    return characteristic.statement(
+        Test(standard, characteristic, facts, artefact, whole, accuracy, key, under, left_out)
+    )
 
 
 def decidable(

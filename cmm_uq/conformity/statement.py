@@ -33,6 +33,7 @@ class Decided:
     length_mm : calibrated length or size that it belongs to.
     position : where it was measured, in words.
     standing : ``again`` where the standard asks for more readings before it counts, ``replaced`` where these were made.
+    set_aside : whether it rests on a reading that the screening left out of the estimates, and is outside for that.
     """
 
     error_um: float
@@ -44,11 +45,14 @@ class Decided:
     length_mm: float | None = None
     position: Text = NOTHING
     standing: Standing = "counts"
+    set_aside: bool = False
 
     @property
     def outcome(self) -> StatementOutcome:
         """What follows from it for the test."""
-        return "remeasure" if self.standing == "again" else self.decision.outcome
+        if self.standing == "again":
+            return "remeasure"
+        return "fail" if self.set_aside else self.decision.outcome
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,7 @@ class Statement:
     joint : probability that all quantities conform, what they share being correlated; ``None`` where it is not known.
     budget : uncertainty of the named quantity, line by line; ``None`` where it has none.
     risks : of all machines alike, for the named quantity; ``None`` without a prior.
+    outside : readings that the screening left out of the estimates and that have no value, in words: each fails.
     """
 
     facts: ConformityFacts
@@ -81,6 +86,7 @@ class Statement:
     joint: float | None = None
     budget: Budget | None = None
     risks: Risks | None = None
+    outside: tuple[Text, ...] = ()
 
     @property
     def scope(self) -> Literal["complete", "partial"]:
@@ -95,7 +101,7 @@ class Statement:
     @property
     def outcome(self) -> StatementOutcome:
         """The gravest of all; where nothing stands against the machine, ``incomplete`` if anything is missing."""
-        gravest = self.named.outcome
+        gravest = "fail" if self.outside else self.named.outcome
         return "incomplete" if gravest in ("pass", "conditional pass") and self.missing else gravest
 
     @property

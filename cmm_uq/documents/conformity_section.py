@@ -115,7 +115,8 @@ def _chances(statement: Statement) -> list[Text]:
 def _evidence(statement: Statement) -> list[Block]:
     """Table of all errors, their picture where lengths differ, and the budget of the named one."""
     blocks: list[Block] = []
-    if statement.signed and len({item.length_mm for item in statement.errors} - {None}) > 1:
+    drawn = {item.length_mm for item in statement.errors if not item.set_aside}
+    if statement.signed and len(drawn - {None}) > 1:
         blocks.append(_picture(statement))
     blocks.append(_table(statement))
     if statement.budget is not None:
@@ -128,15 +129,20 @@ def _subject(statement: Statement) -> Text:
 
 
 def _picture(statement: Statement) -> Block:
-    items = statement.errors
+    items = [item for item in statement.errors if not item.set_aside]
+    far = len(statement.errors) - len(items)
+    beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)
     count, outside = len(items), sum(not _accepted(item) for item in items)
     return trumpet(
         [item.length_mm or 0.0 for item in items], [item.error_um for item in items],
         limit_um=[item.limit_um for item in items], acceptance_um=[_acceptance(item) for item in items],
         expanded_um=[2 * item.u_um for item in items], outside=[not _accepted(item) for item in items],
         quantity=say("Error / µm"),
-        caption=say("{standard}: every error against ±MPE, {formula}, with the guard band.",
-                    standard=Verbatim(statement.facts.standard), formula=formula(statement.facts)),
+        caption=sentences((
+            say("{standard}: every error against ±MPE, {formula}, with the guard band.",
+                standard=Verbatim(statement.facts.standard), formula=formula(statement.facts)),
+            *((beyond,) if far else ()),
+        )),
         alternative=say("{count} errors over length between the limits; {outside} of them are not accepted.",
                         count=count, outside=outside),
     )  # fmt: skip
@@ -148,7 +154,7 @@ def _acceptance(item: Decided) -> float | None:
 
 
 def _accepted(item: Decided) -> bool:
-    return item.decision.outcome in ("pass", "conditional pass")
+    return item.decision.outcome in ("pass", "conditional pass") and not item.set_aside
 
 
 _STANDING = {
@@ -190,9 +196,9 @@ def _table(statement: Statement) -> Table:
 
 
 def _together(errors: Sequence[Decided]) -> list[list[Decided]]:
-    found: dict[tuple[int | None, float | None, float, float, str], list[Decided]] = {}
+    found: dict[tuple[int | None, float | None, float, float, str, bool], list[Decided]] = {}
     for item in errors:
-        key = (item.measurement, item.length_mm, round(item.u_um, 9), item.limit_um, item.standing)
+        key = (item.measurement, item.length_mm, round(item.u_um, 9), item.limit_um, item.standing, item.set_aside)
         found.setdefault(key, []).append(item)
     return list(found.values())
 
@@ -200,8 +206,10 @@ def _together(errors: Sequence[Decided]) -> list[list[Decided]]:
 def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: bool) -> tuple[Text, ...]:
     worst = least_favourable([replace(item, standing="counts") for item in row])
     chance, standing = worst.decision.probability_conforming, _STANDING[row[0].standing]
+    if worst.set_aside and not standing:
+        standing = say("set aside by the screening")
     values = in_a_row(signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row)
-    decision = OUTCOME_WORDS[worst.decision.outcome]
+    decision = OUTCOME_WORDS[worst.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),
         *((DASH if worst.length_mm is None else number(worst.length_mm, ".6g"),) if lengths else ()),

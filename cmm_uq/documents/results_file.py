@@ -245,7 +245,7 @@ def _statement(statement: Statement) -> dict[str, Any]:
             "consumer": statement.risks.consumer, "producer": statement.risks.producer,
         },
         "test_uncertainty": None if statement.budget is None else budget_data(statement.budget),
-        "errors": [_decided(item) for item in statement.errors],
+        "outside": list(statement.outside), "errors": [_decided(item) for item in statement.errors],
     }  # fmt: skip
 
 
@@ -255,6 +255,7 @@ def _decided(item: Decided) -> dict[str, Any]:
         "u_um": item.u_um, "U_um": 2 * item.u_um, "limit_um": item.limit_um,
         "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
         "guard_band_um": item.decision.guard_band, "position": item.position or None, "standing": item.standing,
+        "set_aside": item.set_aside,
     }  # fmt: skip
 
 

@@ -125,6 +125,8 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "conformity[].errors[].guard_band_um": "Its guard band.",
         "conformity[].errors[].position": "Where it was measured, in words.",
         "conformity[].errors[].standing": "What it counts for in the test.",
+        "conformity[].errors[].set_aside": "Whether it rests on a reading that the screening left out, and is outside.",
+        "conformity[].outside": "Readings that the screening left out and that have no value: each is outside.",
         "diagnosis.verdict": "Whether recording and model agree: consistent, explained, partial or unexplained.",
         "diagnosis.false_alarms": "Rate of false alarms that was asked for, where it is not 0.01.",
         "diagnosis.p_value": "Of the lack-of-fit test.",

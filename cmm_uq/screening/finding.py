@@ -18,8 +18,8 @@ class Finding:
 
     Parameters
     ----------
-    kind : ``impossible``, ``duplicate``, ``repeated block``, ``swapped``, ``unit``, ``sign``, ``exchanged coordinates``,
-        ``shifted column``, ``stuck`` or ``outlier``.
+    kind : ``impossible``, ``duplicate``, ``repeated block``, ``swapped``, ``reversed``, ``unit``, ``sign``,
+        ``exchanged coordinates``, ``shifted column``, ``stuck`` or ``outlier``.
     measurements : that it concerns.
     lines : of the file.
     why : in words, and how to mend it.

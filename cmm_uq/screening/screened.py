@@ -33,6 +33,12 @@ __all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeat
 GROSS = 1e-3
 """Probability, over all observations together, that noise alone makes one look like an outlier."""
 
+COPIES = ("duplicate", "repeated block")
+"""Kinds of findings whose rows are no measurements."""
+
+REVERSED = "reversed"
+"""Kind of a finding whose rows are sound, but not what was recorded beside them."""
+
 _UNIT_LENGTH = 0.02
 _REFUSED_WHOLE = ("unit", "sign", "shifted column")
 
@@ -81,9 +87,13 @@ def screened(
     findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
     lost = sorted({row for found in findings for row in found.rows})
     kept = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
+    return Screened(with_sound_sensors(kept, findings), findings)
+
+
+def with_sound_sensors(points: Points, findings: Sequence[Finding]) -> Points:
+    """The same points without columns of sensors that cannot be trusted."""
     gone = {found.column for found in findings if found.set_aside and found.column in SENSORS}
-    kept = replace(kept, columns={name: values for name, values in kept.columns.items() if name not in gone})
-    return Screened(kept, findings)
+    return replace(points, columns={name: values for name, values in points.columns.items() if name not in gone})
 
 
 def screen(
@@ -250,7 +260,7 @@ def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Findin
         why=found.why,
         differing=Verbatim(differing[0]),
     )
-    return replace(found, set_aside=True, rows=tuple(rows.tolist()), why=why)
+    return replace(found, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
 
 
 def _left_out(found: Finding) -> Finding:

@@ -103,7 +103,7 @@ def _decided(error: Mapping[str, Any], rule: Rule, prior: Any, *, signed: bool) 
     value, u, limit = error["error_um"], error["u_um"], error["limit_um"]
     decision: Decision = decide(value, u, limit, rule, signed=signed, prior=_known(prior, limit))
     return Decided(value, u, limit, decision, error["measurement"], error["repeat"], error["length_mm"],
-                   standing=error["standing"])  # fmt: skip
+                   standing=error["standing"], set_aside=error.get("set_aside", False))  # fmt: skip
 
 
 def _known(prior: Any, limit: float) -> Known | None:
@@ -143,7 +143,8 @@ def _whole(entry: Mapping[str, Any], found: list[Decided], signed: bool, prior: 
     """What the statement as a whole says."""
     missing = tuple(Verbatim(text) for text in entry["missing"])
     facts = ConformityFacts.model_construct(standard=entry["standard"])
-    whole = Statement(facts, entry["characteristic"], NOTHING, NOTHING, tuple(found), missing, (), signed)
+    whole = Statement(facts, entry["characteristic"], NOTHING, NOTHING, tuple(found), missing, (), signed,
+                      outside=tuple(Verbatim(text) for text in entry.get("outside", ())))  # fmt: skip
     named = whole.named
     if not any(
         _same(abs(one.error_um), entry["value_um"]) and _same(one.u_um, entry["u_um"])

@@ -106,7 +106,7 @@ def test_every_length_is_in_the_table_of_errors_with_its_own_limit() -> None:
     for entry in found["errors"]:
         assert entry.keys() == {
             "measurement", "repeat", "length_mm", "position", "error_um", "u_um", "U_um", "limit_um", "guard_band_um",
-            "probability_conforming", "outcome", "standing",
+            "probability_conforming", "outcome", "standing", "set_aside",
         }  # fmt: skip
         assert entry["limit_um"] == pytest.approx(4 + entry["length_mm"] / 100)
         assert entry["u_um"] == pytest.approx(0.4 * entry["length_mm"] / 820)
