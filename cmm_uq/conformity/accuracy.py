@@ -20,7 +20,7 @@ from cmm_uq.units import MICROMETRE, PRINTED, Unit
 TITLES: Mapping[str, Text] = {
     "mean_length_mm": say("Mean length"),
     "rms_accuracy_error_um": say("rms accuracy error (standard deviation of the lengths)"),
-    "b89_range_um": say("Range of the lengths (ASME B89.4.1 volumetric performance)"),
+    "b89_range_um": say("Range of the lengths, on average over repeats"),
     "b89_max_deviation_um": say("Largest deviation from the mean length"),
 }
 UNITS: Mapping[str, Unit] = {name: PRINTED[name.rpartition("_")[2]] for name in TITLES}

@@ -20,6 +20,7 @@ from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
+from cmm_uq.uncertainty.rounding import nominal
 from cmm_uq.units import MICROMETRE, unit
 
 _OPPOSITE = -0.9
@@ -57,7 +58,7 @@ def _budget(test: Test) -> tuple[Budget, Text]:
         two(say("fixturing of the bar, twice"), stated.u_fixturing_um),
         Line(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
     ]  # fmt: skip
-    what = say("range of the lengths of a bar of {length:.5g} mm", length=size.nominal)
+    what = say("range of the lengths of a bar of {length} mm", length=nominal(size.nominal))
     budget = Budget(what, lines, unit=unit("µm"))
     if budget.u > 0:
         return budget, say(

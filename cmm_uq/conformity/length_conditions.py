@@ -13,6 +13,7 @@ from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
 from cmm_uq.messages import Text, commas, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.uncertainty.rounding import nominal
 
 SAME_LENGTH_MM = 1.0
 """Lengths no farther from each other than this are one nominal length."""
@@ -194,15 +195,15 @@ def _shortest(plan: LengthPlan, places: _Places) -> Condition:
     shortest = {line: min(m.length for m in found) for line, found in places.items()}
     missing = tuple(
         say(
-            "length of at most {shortest_mm:g} mm ({line}: {length:.4g} mm)",
+            "length of at most {shortest_mm:g} mm ({line}: {length} mm)",
             shortest_mm=plan.shortest_mm,
             line=line,
-            length=length,
+            length=nominal(length),
         )
         for line, length in shortest.items()
         if length > plan.shortest_mm
     )
-    longest = say("{shortest:.4g} mm", shortest=max(shortest.values())) if shortest else say("none")
+    longest = say("{shortest} mm", shortest=nominal(max(shortest.values()))) if shortest else say("none")
     return Condition(
         say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=plan.shortest_mm, longest=longest),
         missing,

@@ -24,6 +24,7 @@ from cmm_uq.jobs.circumstances import TestUncertainty
 from cmm_uq.messages import NOTHING, Text, plural, say, semicolons
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Ints
+from cmm_uq.uncertainty.rounding import nominal
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 NORMAL_EXPANSION = (8e-6, 13e-6)
@@ -210,8 +211,8 @@ def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
 
 def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:
     least = say(
-        "least favourable: measurement {measurement}, repeat {repeat}, {length:.5g} mm",
-        measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=worst.length_mm or 0.0,
+        "least favourable: measurement {measurement}, repeat {repeat}, {length} mm",
+        measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=nominal(worst.length_mm or 0.0),
     )  # fmt: skip
     return plural(
         len(items),
@@ -226,7 +227,7 @@ def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]
     told: list[Text] = []
     for standing in ("again", "replaced"):
         which = semicolons(
-            say("measurement {measurement}, {length:.5g} mm", measurement=measurement, length=length)
+            say("measurement {measurement}, {length} mm", measurement=measurement, length=nominal(length))
             for measurement, length in dict.fromkeys(
                 (item.measurement or 0, item.length_mm or 0.0) for item in items if item.standing == standing
             )

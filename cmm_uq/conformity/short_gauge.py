@@ -18,6 +18,7 @@ from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.model.artefact import Artefact, Forms, Indications
 from cmm_uq.points import Floats, Ints, Points
+from cmm_uq.uncertainty.rounding import nominal, significant
 
 NEAR_MM = 100.0
 """How far the middle of the short gauge may lie from the line of a length, anywhere along it; this project's figure."""
@@ -144,8 +145,8 @@ def repeats_of_gauge(
     ]  # fmt: skip
     if gauge.facts.length_mm > shortest_mm:
         missing.append(
-            say("a short gauge of at most {shortest:g} mm ({length:g} mm)",
-                shortest=shortest_mm, length=gauge.facts.length_mm)
+            say("a short gauge of at most {shortest:g} mm ({length} mm)",
+                shortest=shortest_mm, length=nominal(gauge.facts.length_mm))
         )  # fmt: skip
     return (Condition(say("a short gauge, {wanted} times in each place", wanted=wanted), tuple(missing)),)
 
@@ -156,9 +157,10 @@ def added_in_words(gauge: ShortGauge | None, found: Indications) -> Text:
         return NOTHING
     return say(
         "To {count} of {all} errors of lengths that are not bidirectional by themselves that of the short gauge, "
-        "{length:g} mm, u = {u:.3g} µm, in the same place and direction is added, repeat by repeat, by a procedure of this "
+        "{length} mm, U = {U} µm (k = 2), in the same place and direction is added, repeat by repeat, by a procedure of this "
         "program: the text of the standard was not at hand.",
-        count=int(np.count_nonzero(found.u_beside)), all=len(found.errors), length=gauge.facts.length_mm, u=gauge.facts.u_um,
+        count=int(np.count_nonzero(found.u_beside)), all=len(found.errors), length=nominal(gauge.facts.length_mm),
+        U=significant(2 * gauge.facts.u_um),
     )  # fmt: skip
 
 

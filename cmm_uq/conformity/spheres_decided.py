@@ -16,6 +16,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Forms
+from cmm_uq.uncertainty.rounding import nominal
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 
@@ -121,7 +122,7 @@ def diameter_allowed(test: Test, plan: SpherePlan) -> tuple[Condition, ...]:
     low, high = plan.diameter_mm
     diameter = test.artefact.sizes[0].nominal
     what = say("test sphere of {low:g} to {high:g} mm", low=low, high=high)
-    told = say("{what} ({diameter:.5g} mm)", what=what, diameter=diameter)
+    told = say("{what} ({diameter} mm)", what=what, diameter=nominal(diameter))
     return (Condition(what, () if low <= diameter <= high else (told,)),)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from cmm_uq.documents.document import Block, Column, Facts, Paragraph, Section, Table
 from cmm_uq.documents.effect_words import parameter_title, titles
 from cmm_uq.documents.simulated import Simulated
-from cmm_uq.documents.wording import expanded
+from cmm_uq.documents.wording import expanded, with_uncertainty
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, say
 from cmm_uq.model import MeasurementModel
@@ -68,9 +68,9 @@ def _corrections(refitted: Mapping[str, Mapping[str, Quantity]]) -> Table:
     rows = []
     for owner, quantities in refitted.items():
         for name, quantity in quantities.items():
-            value, U, k = expanded(quantity)
-            size = say("{value} ± {U}", value=value, U=U)
-            rows.append((parameter_title(owner, name), size, quantity.unit, k))
+            rows.append(
+                (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
+            )
     heads = (
         Column(say("Parameter"), numeric=False), Column(say("Machine minus simulation")),
         Column(say("Unit"), numeric=False), Column(say("k")),

@@ -14,7 +14,8 @@ from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say
+from cmm_uq.uncertainty.rounding import nominal
 
 Row = tuple[Text, str]
 """What a particular is, and what the job states of it; empty where it states nothing."""
@@ -157,7 +158,7 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
 
 def _travel(facts: JobFile) -> Text:
     travel = [
-        say("{axis} {low} … {high}", axis=Verbatim(axis.upper()), low=signed(given[0], "g"), high=signed(given[1], "g"))
+        say("{axis} {low} … {high}", axis=Verbatim(axis.upper()), low=nominal(given[0]), high=nominal(given[1]))
         for axis in "xyz"
         if (given := getattr(facts.machine.travel_mm, axis))
     ]

@@ -12,7 +12,7 @@ from cmm_uq.documents.document import Block, Column, Decision, Section, Table
 from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, in_a_row, number, plural, say, sentences, signed
-from cmm_uq.uncertainty.rounding import significant
+from cmm_uq.uncertainty.rounding import nominal, significant
 from cmm_uq.units import unit
 
 _LISTED = 250
@@ -33,12 +33,10 @@ def conformity_section(statements: Sequence[Statement]) -> Section:
 def decision_block(statement: Statement) -> Decision:
     """One statement: what was compared with what, by which rule, and what follows."""
     decision = statement.decision
-    value, u = measured(statement)
-    known = say(", u = {u} µm", u=u) if u else NOTHING
+    value, U = measured(statement)
+    known = say(", U = {U} µm (k = 2)", U=U) if U else NOTHING
     return Decision(
-        Verbatim(statement.facts.standard) if not statement.characteristic
-        else say("{standard}, {characteristic}", standard=Verbatim(statement.facts.standard),
-                 characteristic=Verbatim(statement.characteristic)),
+        named(statement),
         statement.quantity,
         say("{value} µm{known}", value=value, known=known),
         _limit(statement),
@@ -47,6 +45,14 @@ def decision_block(statement: Statement) -> Decision:
         sentences((*_what_follows(statement), *_chances(statement), *statement.remarks)),
         statement.missing,
     )  # fmt: skip
+
+
+def named(statement: Statement) -> Text:
+    """By what a statement is known: its standard and characteristic."""
+    standard = Verbatim(statement.facts.standard)
+    if not statement.characteristic:
+        return standard
+    return say("{standard}, {characteristic}", standard=standard, characteristic=Verbatim(statement.characteristic))
 
 
 def formula(facts: ConformityFacts) -> Text:
@@ -68,7 +74,7 @@ def _limit(statement: Statement) -> Text:
         return here
     length = statement.named.length_mm
     if length is not None:
-        here = say("{limit} at L = {length:.6g} mm", limit=here, length=length)
+        here = say("{limit} at L = {length} mm", limit=here, length=nominal(length))
     return say("{here}; MPE = {formula}", here=here, formula=formula(statement.facts))
 
 
@@ -125,7 +131,7 @@ def _evidence(statement: Statement) -> list[Block]:
 
 
 def _subject(statement: Statement) -> Text:
-    return say("the uncertainty of the test value named, {standard}", standard=Verbatim(statement.facts.standard))
+    return say("the uncertainty of the test value named, {standard}", standard=named(statement))
 
 
 def _picture(statement: Statement) -> Block:
@@ -140,7 +146,7 @@ def _picture(statement: Statement) -> Block:
         quantity=say("Error / µm"),
         caption=sentences((
             say("{standard}: every error against ±MPE, {formula}, with the guard band.",
-                standard=Verbatim(statement.facts.standard), formula=formula(statement.facts)),
+                standard=named(statement), formula=formula(statement.facts)),
             *((beyond,) if far else ()),
         )),
         alternative=say("{count} errors over length between the limits; {outside} of them are not accepted.",
@@ -190,7 +196,7 @@ def _table(statement: Statement) -> Table:
         notes.append(
             say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
         )
-    title = say("All values decided by {standard}", standard=Verbatim(statement.facts.standard))
+    title = say("All values decided by {standard}", standard=named(statement))
     cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
     return Table(title, tuple(columns), cells, tuple(notes))
 
@@ -212,7 +218,7 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
     decision = OUTCOME_WORDS[worst.outcome]
     return (
         DASH if worst.measurement is None else number(worst.measurement),
-        *((DASH if worst.length_mm is None else number(worst.length_mm, ".6g"),) if lengths else ()),
+        *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()),
         values,
         *((significant(2 * worst.u_um), DASH if chance is None else probability(chance)) if known else ()),
         number(worst.limit_um, ".4g"),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from cmm_uq.documents.wording import NO_FACTOR, expanded
+from cmm_uq.documents.wording import NO_FACTOR, expanded, with_uncertainty
 from cmm_uq.messages import Text, Verbatim, commas, say
 from cmm_uq.physics.catalogue import every
 from cmm_uq.physics.effect import Amount, Effect
 from cmm_uq.uncertainty.quantity import Quantity
+from cmm_uq.uncertainty.rounding import figure
 from cmm_uq.units import unit
 
 
@@ -79,8 +80,8 @@ def _amount(quantity: Quantity, factors: bool) -> Amount:
 def _figures(quantity: Quantity, factors: bool) -> Text:
     """Value, expanded uncertainty, unit, and its factor."""
     if not quantity.u > 0:
-        return say("{value:.4g}\u00a0{unit}", value=quantity.value, unit=quantity.unit)
-    value, U, k = expanded(quantity)
+        return say("{value}\u00a0{unit}", value=figure(quantity.value), unit=quantity.unit)
+    stated, k = with_uncertainty(quantity), expanded(quantity)[2]
     if not factors or k == NO_FACTOR:
-        return say("{value} ± {U}\u00a0{unit}", value=value, U=U, unit=quantity.unit)
-    return say("{value} ± {U}\u00a0{unit} (k\u00a0=\u00a0{k})", value=value, U=U, unit=quantity.unit, k=k)
+        return say("{stated}\u00a0{unit}", stated=stated, unit=quantity.unit)
+    return say("{stated}\u00a0{unit} (k\u00a0=\u00a0{k})", stated=stated, unit=quantity.unit, k=k)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cmm_uq.documents.document import Standing
-from cmm_uq.documents.wording import expanded
+from cmm_uq.documents.wording import NO_FACTOR, expanded, with_uncertainty
 from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.uncertainty.quantity import Quantity
 
@@ -67,5 +67,7 @@ def figure_row(name: Text, quantity: Quantity, *, known: bool = True) -> Figure:
     """A quantity with its expanded uncertainty; ``known`` is false where a recording says nothing of it."""
     if not known:
         return name, say("not determined"), NOTHING
-    value, U, k = expanded(quantity)
-    return name, say("{value} ± {u} {unit}", value=value, u=U, unit=quantity.unit), say("k = {k}", k=k)
+    figure, k = say("{figure} {unit}", figure=with_uncertainty(quantity), unit=quantity.unit), expanded(quantity)[2]
+    if quantity.one_sided:
+        return name, figure, say("95 % interval")
+    return name, figure, NOTHING if k == NO_FACTOR else say("k = {k}", k=k)

@@ -20,7 +20,8 @@ def performance(result: Result) -> Section:
         UNCERTAINTY,
         say(
             "Each figure estimates what the machine would show on average if the recording were "
-            "repeated; all recorded lengths count."
+            "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
+            "this recording alone, and its U is the test uncertainty."
         ),
     )
     named = [(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
@@ -40,7 +41,7 @@ def error_factors(result: Result) -> Section:
             if key in free:
                 rows.append((title_of(key, result), say("not determined"), NOTHING, NOTHING, NOTHING, quantity.unit))
                 continue
-            least = rounded(float(fitted[key]), quantity.u)[0] if key in fitted else NOTHING
+            least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
             rows.append((title_of(key, result), value, U, k, least, quantity.unit))
     columns = (
         Column(say("Error factor"), numeric=False),

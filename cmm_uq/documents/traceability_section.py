@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
-from cmm_uq.documents.wording import expanded
+from cmm_uq.documents.wording import NO_FACTOR, expanded
 from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.chain import certified_on_this_machine
 from cmm_uq.jobs.job import Job, JobFile
@@ -14,7 +14,8 @@ from cmm_uq.jobs.short_gauge import ShortGaugeFacts
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
 from cmm_uq.model.artefact import Size
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE
+from cmm_uq.uncertainty.rounding import figure, nominal, significant
+from cmm_uq.units import MICROMETRE, Unit, unit
 
 if TYPE_CHECKING:
     from cmm_uq.documents.result import Result
@@ -126,7 +127,7 @@ def traceability(result: Result) -> Section:
     elif dimensions and not certified:
         rows.append((say("Certified length"), say("none: uncalibrated artefact (auto-calibration)")))
     if artefact.cte_per_k:
-        cte = say("{cte:g} × 10⁻⁶ /K", cte=artefact.cte_per_k * 1e6)
+        cte = say("{cte} × 10⁻⁶ /K", cte=figure(artefact.cte_per_k * 1e6, 10))
         rows.append((say("Coefficient of thermal expansion"), cte))
     rows += certificate_rows(artefact.certificate)
     rows += _short_gauge(result.job.facts.short_gauge)
@@ -138,19 +139,26 @@ def _short_gauge(gauge: ShortGaugeFacts | None) -> list[tuple[Text, Text]]:
     """The short gauge beside the artefact, with its own certificate."""
     if gauge is None:
         return []
-    figure = say("{length:.10g} mm at 20 °C, u = {u:g} µm", length=gauge.length_mm, u=gauge.u_um)
-    what = commas((*names(filter(None, (gauge.name, gauge.serial))), figure))
+    shown = say("{length} at 20 °C", length=_with_u(nominal(gauge.length_mm), unit("mm"), gauge.u_um))
+    what = commas((*names(filter(None, (gauge.name, gauge.serial))), shown))
     chain = [text for _, text in certificate_rows(gauge.certificate) if text]
     return [(say("Short gauge"), what), (say("Certificate of the short gauge"), sentences(chain) if chain else NOTHING)]
 
 
 def _certified(size: Size) -> tuple[Text, Text]:
-    u = size.sd / MICROMETRE
-    figure = say("{nominal:.10g} {unit}, u = {u:g} µm", nominal=size.nominal, unit=size.unit, u=u)
-    return say("Certified {what} at 20 °C", what=size.what or say("{title:small}", title=size.title)), figure
+    shown = _with_u(nominal(size.nominal), size.unit, size.sd / MICROMETRE)
+    return say("Certified {what} at 20 °C", what=size.what or say("{title:small}", title=size.title)), shown
+
+
+def _with_u(value: Text, of: Unit, u_um: float) -> Text:
+    """What a certificate gives, in full, with its U."""
+    if not u_um:
+        return say("{value} {unit}, no uncertainty stated", value=value, unit=of)
+    return say("{value} {unit}, U = {U} µm (k = 2)", value=value, unit=of, U=significant(2 * u_um))
 
 
 def _fitted(size: Size, quantity: Quantity) -> tuple[Text, Text]:
     value, U, k = expanded(quantity)
-    figure = say("{value} {unit}, U = {U} {unit} (k = {k})", value=value, unit=size.unit, U=U, k=k)
-    return say("{size} after the fit", size=size.title), figure
+    shown = say("{value} {unit}, U = {U} {unit}", value=value, unit=size.unit, U=U)
+    shown = shown if k == NO_FACTOR else say("{figure} (k = {k})", figure=shown, k=k)
+    return say("{size} after the fit", size=size.title), shown

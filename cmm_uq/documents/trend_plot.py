@@ -14,6 +14,8 @@ from cmm_uq.messages import NOTHING, Text, Verbatim, number, say, semicolons
 from cmm_uq.points import Floats, Ints
 from cmm_uq.recertification.history import MachineHistory, ValueHistory
 from cmm_uq.recertification.trend import epochs
+from cmm_uq.records.facts import Series
+from cmm_uq.uncertainty.rounding import rounded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -121,12 +123,17 @@ def _legend(one: ValueHistory, *, adjusted: bool, checked: bool) -> Text:
     return semicolons([part for part in parts if part])
 
 
+def _stated(series: Series, place: int) -> Text:
+    """A value, to the digits of its U."""
+    return rounded(float(series.value[place]), COVERAGE * float(series.u[place]))[0]
+
+
 def _told(history: MachineHistory, one: ValueHistory) -> Text:
     """The picture in a sentence."""
     series = one.series
     what = say(
         "{name}: {count} recordings, from {first} to {last} {unit}", name=Verbatim(series.quantity), count=len(series.day),
-        first=number(float(series.value[0]), ".4g"), last=number(float(series.value[-1]), ".4g"), unit=Verbatim(series.unit),
+        first=_stated(series, 0), last=_stated(series, -1), unit=Verbatim(series.unit),
     )  # fmt: skip
     if series.limit is None:
         return say("{what}.", what=what)

@@ -9,7 +9,7 @@ from cmm_uq.documents.diagnosis.words import VERDICTS
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import title_of
 from cmm_uq.messages import Text, listed, say, sentences
-from cmm_uq.uncertainty.rounding import significant
+from cmm_uq.uncertainty.rounding import figure, nominal, significant
 
 ASSUMED = 0.25
 """Share of the prior in a parameter's variance from which on the reader is told."""
@@ -108,7 +108,7 @@ def _noise(result: Result) -> list[Text]:
             )
         )
     return texts + [
-        say("{title} is given without an uncertainty (u_um) and is taken as exact.", title=size.title)
+        say("{title} is given without an uncertainty and is taken as exact.", title=size.title)
         for size in result.artefact.sizes
         if size.certified and size.sd == 0
     ]
@@ -128,12 +128,16 @@ def _implausible(result: Result) -> list[Text]:
     for unknown, mean in zip(result.posterior.unknowns, means, strict=True):
         off = mean - unknown.prior_mean
         if 0 < unknown.prior_sd < abs(off) / IMPLAUSIBLE:
+            parameter = title_of(unknown.key, result)
+            if unknown.prior_mean:
+                parameter = say("Correction of the {what:small}, {nominal} {unit}", what=parameter,
+                                nominal=nominal(unknown.prior_mean), unit=unknown.unit)  # fmt: skip
             texts.append(
                 say(
-                    "{parameter}: {off:.4g} {unit} is {times:.0f} times the standard uncertainty with which it was known "
-                    "beforehand ({sd:.3g} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
-                    parameter=title_of(unknown.key, result), off=off, unit=unknown.unit, times=abs(off) / unknown.prior_sd,
-                    sd=unknown.prior_sd,
+                    "{parameter}: {off} {unit} is {times:.0f} times the standard uncertainty with which it was known "
+                    "beforehand ({sd} {unit}). Before it is used, rule out a wrong certified length, unit or expansion.",
+                    parameter=parameter, off=figure(off), unit=unknown.unit, times=abs(off) / unknown.prior_sd,
+                    sd=figure(unknown.prior_sd, 3),
                 )
             )  # fmt: skip
     return texts

@@ -34,11 +34,26 @@ _ONE_HILL = 1.6
 def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
     """Value, expanded uncertainty and coverage factor, as text.
 
-    The expanded uncertainty is given to two significant digits; the factor where U/u is one.
+    The expanded uncertainty is given to two significant digits; the factor where U/u is one. What has one side, as a range
+    near zero, is its interval, without the other two.
     """
+    if quantity.one_sided:
+        return (interval_of(quantity), NO_FACTOR, NO_FACTOR)
     value, uncertainty = rounded(quantity.value, quantity.expanded)
     k = quantity.coverage_factor
     return (value, uncertainty, (NO_FACTOR if k is None or k < _ONE_HILL else number(k, ".2f")))
+
+
+def interval_of(quantity: Quantity) -> Text:
+    """Its 95 % interval, to the digits of U."""
+    low, high = (rounded(end, quantity.expanded)[0] for end in quantity.interval95)
+    return say("{low} to {high}", low=low, high=high)
+
+
+def with_uncertainty(quantity: Quantity) -> Text:
+    """Value ± U, or the interval of what has one side; its unit follows."""
+    value, U, _ = expanded(quantity)
+    return value if quantity.one_sided else say("{value} ± {U}", value=value, U=U)
 
 
 CERTAIN = 1e-4
@@ -56,9 +71,9 @@ def probability(p: float) -> Text:
 
 
 def measured(statement: Statement) -> tuple[Text, Text]:
-    """Value that a statement names and its standard uncertainty, as text; the latter empty where none is known."""
+    """Value that a statement names and its expanded uncertainty (k = 2), as text; the latter empty where none is known."""
     if statement.u_um > 0:
-        return rounded(statement.value_um, statement.u_um)
+        return rounded(statement.value_um, 2 * statement.u_um)
     return (number(statement.value_um, ".4g"), NOTHING)
 
 

@@ -51,6 +51,12 @@ class Quantity:
         return self.expanded / self.u if self.u > 0 else None
 
     @property
+    def one_sided(self) -> bool:
+        """Whether ± U would reach beyond zero where the interval does not: such a quantity is stated by its interval."""
+        low, high = self.interval95
+        return (low >= 0 > self.value - self.expanded) or (high <= 0 < self.value + self.expanded)
+
+    @property
     def degrees_of_freedom(self) -> float:
         """Of a standard deviation that is known this well: ½·(value/u)² (JCGM 100:2008, E.4.3), at least one."""
         return max(0.5 * (self.value / self.u) ** 2, 1.0) if self.u > 0 else float("inf")

@@ -91,6 +91,18 @@ def alike(*values: float, decimals: int = 1) -> tuple[Number, ...]:
     return tuple(Number(f"{value:.{max(decimals, more)}f}") for value in values)
 
 
+def nominal(length: float) -> Number:
+    """A length that is given, not measured, in full: no digit of it is left out, and none is made up.
+
+    Examples
+    --------
+    >>> nominal(1080.0012)
+    '1080.0012'
+    """
+    _check(length, 0.0, 1)
+    return _plain(Decimal(f"{length:.6f}").normalize())
+
+
 def figure(number: float, digits: int = 4) -> Number:
     """A number that has no uncertainty of its own, such as a sensitivity, to some significant digits.
 

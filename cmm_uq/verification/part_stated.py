@@ -37,6 +37,10 @@ class _One(Printed):
     def expanded(self) -> float:
         return self.inside("U")
 
+    @property
+    def one_sided(self) -> bool:
+        return self.data.get("stated_by") == "interval"
+
     def inside(self, key: str) -> float:
         """A value in mm or rad."""
         return float(self.data[key]) * self.scale.per_value
@@ -51,8 +55,9 @@ class _One(Printed):
         low, high = (end * self.scale.per_value for end in self.data["interval95"])
         value = [self.at(self.inside("value"))] if measured else []
         error = [] if measured else [self.error(self.inside("mean_error"))]
-        k = self.factor_of(nan if self.data["k"] is None else self.data["k"])
-        return [*value, self.small(self.inside("u")), self.small(self.expanded), k,
+        k = nan if self.data["k"] is None else self.data["k"]
+        before = () if "stated_by" in self.data else (self.small(self.inside("u")),)  # before 0.15.0 a page had u, too
+        return [*value, *before, *self.with_factor(k),
                 self.interval_of((low, high), measured=measured), *error]  # fmt: skip
 
     def decision(self) -> list[Text]:

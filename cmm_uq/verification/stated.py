@@ -6,11 +6,14 @@ follow each other as the quantities do in the file. Names of rows are words, whi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from cmm_uq.records.content import unit_of
+from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.units import UNITS
 from cmm_uq.verification.consistent import quantities
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.html_page import HtmlPage, HtmlTable
@@ -40,10 +43,15 @@ def check_stated(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, *, f
             asked = [
                 (path, as_stated(one), unit_of(path.rpartition(".")[2]))
                 for path, one in quantities(data.get(group) or {}, group)
-                if path.removeprefix(f"{group}.") not in free and one["value"] is not None
+                if path.removeprefix(f"{group}.") not in free and one["value"] is not None and not _one_sided(one)
             ]
             _check_group(inquiry, asked, page.tables, name, source)
     _check_decisions(inquiry, data, page, name, source)
+
+
+def _one_sided(quantity: Mapping[str, Any]) -> bool:
+    """Whether it is stated by its interval, in words of the page's language."""
+    return Quantity(quantity["value"], quantity["u"], (*quantity["interval95"],), UNITS["1"]).one_sided
 
 
 def as_stated(quantity: Mapping[str, Any]) -> Stated:
@@ -134,15 +142,19 @@ def _check_decisions(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, 
         if shown.outcome != entry["decision"]:
             inquiry.wrong("figures", name, f"statement of conformity {i + 1}", f"is another decision than in {source}",
                           shown.outcome, entry["decision"])  # fmt: skip
-        value, limit = _measured(entry), f"{entry['limit_um']:.4g}"
         text = shown.text.replace(",", ".")
-        for what, figure in (("value", value), ("limit", limit), ("standard", entry["standard"].replace(",", "."))):
-            if figure not in text:
+        # before 0.15.0 a decision had u instead of U, and a value to the digits of it
+        for what, figures in (
+            ("value", [_measured(entry, 2), _measured(entry, 1)]), ("limit", [f"{entry['limit_um']:.4g}"]),
+            ("standard", [entry["standard"].replace(",", ".")]),
+        ):  # fmt: skip
+            if not any(re.search(".{1,14}".join(map(re.escape, figure.split(" ± "))), text) for figure in figures):
                 inquiry.wrong("figures", name, f"statement of conformity {i + 1}", f"does not state the {what} of {source}",
-                              " ".join(shown.text.split()), figure)  # fmt: skip
+                              " ".join(shown.text.split()), figures[0])  # fmt: skip
 
 
-def _measured(entry: Mapping[str, Any]) -> str:
+def _measured(entry: Mapping[str, Any], k: int) -> str:
+    """Value ± U, or u with k = 1; the value alone where neither is known."""
     if entry["u_um"] > 0:
-        return rounded(entry["value_um"], entry["u_um"])[0]
+        return " ± ".join(rounded(entry["value_um"], k * entry["u_um"]))
     return f"{entry['value_um']:.4g}"

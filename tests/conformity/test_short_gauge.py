@@ -67,7 +67,7 @@ def test_lengths_met_from_one_side_pass_with_a_short_gauge_in_every_position_and
     assert judged(one_sided(), None).outcome == "incomplete"
     found = judged(one_sided(), short())
     assert (found.outcome, found.missing, len(found.errors)) == ("pass", (), 105)
-    assert any("To 105 of 105 errors" in text and "20 mm, u = 0.3 µm" in text for text in found.remarks)
+    assert any("To 105 of 105 errors" in text and "20 mm, U = 0.60 µm (k = 2)" in text for text in found.remarks)
 
 
 @pytest.mark.parametrize("absent", [1, 4, 7])

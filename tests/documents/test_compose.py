@@ -55,7 +55,7 @@ def test_figures_are_stated_with_expanded_uncertainty_to_two_digits(document: Do
 def test_the_error_factors_stand_beside_their_least_squares_estimate(document: Document) -> None:
     rows = {row[0]: row for row in table(document, "Error factors of the machine").rows}
     assert rows["Squareness X–Y"][1] == "−174"
-    assert rows["Squareness X–Y"][4] == "−174.7"
+    assert rows["Squareness X–Y"][4] == "−175"
     assert rows["Squareness X–Y"][5] == "″"
 
 
@@ -80,7 +80,7 @@ def test_the_decision_names_rule_limit_and_probability(document: Document) -> No
 
 def test_the_traceability_chain_of_the_artefact_is_printed(document: Document) -> None:
     said = facts(document)
-    assert said["Certified length at 20 °C"] == "404.2357 mm, u = 5 µm"
+    assert said["Certified length at 20 °C"] == "404.2357 mm, U = 10 µm (k = 2)"
     assert said["Its certificate"] == "Harris 2004, Table 21"
 
 

@@ -37,7 +37,7 @@ def test_a_failed_test_says_what_it_lacks_after_its_figures() -> None:
     assert (verdict.word, verdict.standing) == ("FAIL", "bad")
     assert verdict.subject == "ASME B89.4.1-1997, volumetric performance"
     value, u, chance, missing = verdict.remarks
-    assert value == "339.9 µm against 60 µm"
+    assert value == "340 µm against 60 µm"
     assert u == "test uncertainty U = 14 µm (k = 2)"
     assert chance == "conforming with less than\u00a00.01\u00a0%"
     assert missing.startswith("missing: 1 of 20 positions")

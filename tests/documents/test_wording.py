@@ -44,7 +44,7 @@ def test_a_probability_never_claims_certainty(p: float, text: str) -> None:
 
 @pytest.mark.parametrize(
     ("value", "u", "text"),
-    [(4.98765, 0.40123, ("4.99", "0.40")), (4.98765, 0.0, ("4.988", "")), (1.5, 2.3, ("1.5", "2.3"))],
+    [(4.98765, 0.40123, ("4.99", "0.80")), (4.98765, 0.0, ("4.988", "")), (1.5, 2.3, ("1.5", "4.6"))],
 )
 def test_the_named_error_has_the_digits_that_its_uncertainty_supports(
     value: float, u: float, text: tuple[str, str]

@@ -90,7 +90,7 @@ def test_a_certificate_names_it_its_file_and_how_often_it_was_taken(folder: Path
     assert outcome.results["job"]["inputs_sha256"]["short.csv"] == digest
     assert "short.csv" in outcome.document.attachments
     told = repr(outcome.document)
-    assert "Gauge block, 20 mm at 20 °C, u = 0.05 µm" in told
+    assert "Gauge block, 20 mm, U = 0.10 µm (k = 2) at 20 °C" in told
     assert "K 118" in told
     assert "bidirectional lengths" not in outcome.results["conformity"][0]["missing"][0]
     assert any("that of the short gauge, 20 mm" in text for text in outcome.results["conformity"][0]["remarks"])

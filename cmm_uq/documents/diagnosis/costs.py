@@ -11,7 +11,7 @@ from cmm_uq.documents.document import Column, Section, Table
 from cmm_uq.documents.effect_words import parameter_title, titles
 from cmm_uq.documents.quantity_data import quantity_data
 from cmm_uq.documents.result import Diagnosed
-from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
+from cmm_uq.documents.wording import OUTCOME_WORDS, probability, with_uncertainty
 from cmm_uq.messages import NOTHING, Text, Verbatim, after, commas, plural, say
 from cmm_uq.uncertainty.quantity import Quantity
 
@@ -121,8 +121,7 @@ def _decisions(found: Diagnosed) -> list[tuple[Text, ...]]:
 
 
 def _size(quantity: Quantity) -> Text:
-    value, U, _ = expanded(quantity)
-    return say("{value} ± {U}", value=value, U=U)
+    return with_uncertainty(quantity)
 
 
 def _data(named: Named) -> dict[str, Any]:

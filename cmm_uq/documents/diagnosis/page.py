@@ -37,14 +37,14 @@ from cmm_uq.documents.results_file import diagnosis_data, head
 from cmm_uq.documents.where_section import where_section
 from cmm_uq.documents.withheld import other_periods
 from cmm_uq.documents.withheld import sentences as withheld_sentences
-from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, probability
+from cmm_uq.documents.wording import OUTCOME_WORDS, probability, with_uncertainty
 from cmm_uq.documents.working_page import working_page
 from cmm_uq.messages import Text, Verbatim, commas, day, names, number, say, sentences
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.degrees_of_freedom import factor_of_noise
-from cmm_uq.uncertainty.rounding import alike
+from cmm_uq.uncertainty.rounding import alike, figure
 from cmm_uq.units import MICROMETRE
 
 
@@ -239,8 +239,8 @@ def _changes(found: Diagnosed) -> Table | None:
     rows = tuple(
         (
             _title_of(u.key, d.before),
-            number(value, ".4g"),
-            number(late[u.key], ".4g"),
+            figure(value, 10 if u.key[0] == ARTEFACT else 4),
+            figure(late[u.key], 10 if u.key[0] == ARTEFACT else 4),
             u.unit,
         )
         for u, value, known in zip(before.unknowns, before.value, before.determined, strict=True)
@@ -270,15 +270,7 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
     blocks: list[Block] = []
     rows = []
     for name, (before, after) in found.consequences.figures.items():
-        (one, U_one, _), (two, U_two, _) = expanded(before), expanded(after)
-        rows.append(
-            (
-                TITLES[name],
-                say("{one} ± {u_one}", one=one, u_one=U_one),
-                say("{two} ± {u_two}", two=two, u_two=U_two),
-                UNITS[name],
-            )
-        )
+        rows.append((TITLES[name], with_uncertainty(before), with_uncertainty(after), UNITS[name]))
     heads = (
         Column(say("Figure"), numeric=False),
         Column(say("As recorded")),

@@ -10,6 +10,7 @@ import numpy as np
 from cmm_uq.conformity.limits import Judged
 from cmm_uq.documents.part.found import PartFound
 from cmm_uq.messages import DASH, NOTHING, Number, Text, Verbatim, commas, names, number, say, signed
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.in_words import CHARACTERISTICS
 from cmm_uq.parts.result import Stated
 from cmm_uq.uncertainty.rounding import rounded, significant
@@ -48,6 +49,15 @@ class Printed:
     def expanded(self) -> float:
         """Half of the shortest 95 % interval of the errors, mm or rad."""
         raise NotImplementedError
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether it is a measured width, which has no side below zero: it is stated by its interval."""
+        raise NotImplementedError
+
+    def with_factor(self, k: float) -> tuple[Text, Text]:
+        """U and k; dashes of what is stated by its interval."""
+        return (DASH, DASH) if self.one_sided else (self.small(self.expanded), self.factor_of(k))
 
     def small(self, size: float) -> Number:
         """An uncertainty, two digits of it, in µm or ″."""
@@ -163,10 +173,10 @@ class Figures(Printed):
         """Half of the shortest 95 % interval of the errors, mm or rad."""
         return self.stated.U
 
-    @property
-    def factor(self) -> Text:
-        """U over u; a dash where there is no u."""
-        return self.factor_of(self.stated.k)
+    @cached_property
+    def one_sided(self) -> bool:
+        """Whether it is a measured width, which is never negative."""
+        return self.stated.value is not None and bool(never_negative(self.found.plan)[self.place])
 
     @property
     def interval(self) -> Text:
@@ -198,7 +208,10 @@ class Figures(Printed):
 
     @property
     def result(self) -> Text:
-        """The value with U; U alone where nothing was measured."""
+        """The value with U, or the interval of a width; U alone where nothing was measured."""
+        if self.one_sided:
+            return say("{value} {unit}, 95 % interval {interval} {unit}", value=self.at(self.stated.value or 0.0),
+                       interval=self.interval, unit=self.scale.value)  # fmt: skip
         U = say("U = {U} {unit}", U=self.small(self.expanded), unit=self.scale.small)
         if self.stated.value is None:
             return U

@@ -27,6 +27,7 @@ from cmm_uq.parts.deviating import deviations_of
 from cmm_uq.parts.in_words import ASSOCIATIONS, KINDS
 from cmm_uq.parts.plan import Plan, Stylus
 from cmm_uq.points import Floats
+from cmm_uq.uncertainty.rounding import nominal
 from cmm_uq.units import MICROMETRE, unit
 
 _SHORT = 8
@@ -87,12 +88,12 @@ def _lies(found: PartFound) -> list[tuple[Text, Text]]:
 
 
 def _stylus(one: Stylus) -> Text:
-    return say("{name}: tip of {diameter:g} mm, offset {offset} mm", name=Verbatim(one.name), diameter=one.diameter_mm,
+    return say("{name}: tip of {diameter} mm, offset {offset} mm", name=Verbatim(one.name), diameter=nominal(one.diameter_mm),
                offset=_three(one.offset_mm.tolist()))  # fmt: skip
 
 
 def _three(values: Sequence[float]) -> Text:
-    return in_a_row(signed(value, ".6g") for value in values)
+    return in_a_row(nominal(value) for value in values)
 
 
 def errors_section(found: PartFound) -> Section:

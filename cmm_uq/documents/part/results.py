@@ -101,6 +101,7 @@ def _characteristic(found: PartFound, i: int) -> dict[str, Any]:
         "measured": None if found.measured is None else _in(facts, float(found.measured[i])),
         "mean_error": _in(facts, stated.error), "value": None if stated.value is None else _in(facts, stated.value),
         "value_is": "median" if never_negative(found.plan)[i] else "mean",
+        "stated_by": "interval" if stated.value is not None and never_negative(found.plan)[i] else "U",
         "u": _in(facts, stated.u), "U": _in(facts, stated.U), "k": stated.k if isfinite(stated.k) else None,
         "interval95": [low, high], "worst_cause": found.budget.worst(facts.name),
         "limits": None if judged is None else _limits(facts, judged),

@@ -72,6 +72,11 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "characteristics[].measured": (OWN, "Value of the measured points."),
         "characteristics[].mean_error": (OWN, "What such measurements err by on average."),
         "characteristics[].value": (OWN, "What is stated, by `value_is`."),
+        "characteristics[].stated_by": (
+            "",
+            "How a page states it: `U` for value and U with k; `interval` for a measured width, which has one side, by its "
+            "`interval95`.",
+        ),
         "characteristics[].value_is": (
             "", "mean: measured less mean_error; median: of the values that such a measurement may come from, zero at least."),
         "characteristics[].u": (OWN, "Standard uncertainty."),

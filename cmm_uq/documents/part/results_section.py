@@ -37,7 +37,7 @@ def _table(every: Sequence[Figures], *, measured: bool) -> Table:
     columns = (
         Column(say("No.")), Column(say("Characteristic"), numeric=False),
         *((Column(say("Value"), scale.value),) if measured else ()),
-        Column(say("u"), scale.small), Column(say("U"), scale.small), Column(say("k")),
+        Column(say("U"), scale.small), Column(say("k")),
         Column(say("95 % interval"), scale.value if measured else scale.small, numeric=False),
         *(() if measured else (Column(say("Mean error"), scale.small),)),
     )  # fmt: skip
@@ -52,9 +52,7 @@ def _row(one: Figures, *, measured: bool) -> tuple[Text, ...]:
         one.number,
         one.beside,
         *value,
-        one.small(one.stated.u),
-        one.small(one.expanded),
-        one.factor,
+        *one.with_factor(one.stated.k),
         one.interval,
         *error,
     )
@@ -63,19 +61,21 @@ def _row(one: Figures, *, measured: bool) -> tuple[Text, ...]:
 def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
     notes: list[Text] = [
         say(
-            "u: standard uncertainty. 95 % interval: the shortest that holds 95 % of the virtual measurements; that of a "
-            "measured form, orientation or location is never below zero, and as likely to hold a small width as a large one "
-            "(Feldman and Cousins, 1998); its value is the median. U = k · u is half of the errors' interval, of such a width "
-            "no less than half of its own, and reaches to the end of one that begins at zero; the value lies in the middle "
-            "only where errors to both sides are alike."
+            "95 % interval: the shortest that holds 95 % of the virtual measurements. U = k · u is half of it, u the standard "
+            "uncertainty; the value lies in the middle only where errors to both sides are alike."
         )
     ]
+    if any(one.one_sided for one in every):
+        notes.append(
+            say(
+                "A measured form, orientation or location has one side and is stated by its interval, which is never below "
+                "zero and as likely to hold a small width as a large one (Feldman and Cousins, 1998); its value is the median."
+            )
+        )
     if every[0].stated.value is None:
         notes.append(say("The interval is that of the true value less the indicated one."))
         return tuple(notes)
     notes.append(say("All other values are stated less the mean of their errors."))
-    if any(one.stated.value == 0 for one in every):
-        notes.append(say("A width of zero was measured better than its errors: U reaches to the end of its interval."))
     return tuple(notes)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import degrees
+from math import degrees, isfinite
 
 from cmm_uq.conformity.decision import Outcome
 from cmm_uq.documents.document import Standing
@@ -12,6 +12,7 @@ from cmm_uq.documents.in_short import Figure, Summary, Verdict
 from cmm_uq.documents.part.found import Further, PartFound
 from cmm_uq.documents.wording import probability
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, number, plural, say
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.in_words import CHARACTERISTICS
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import unit
@@ -62,10 +63,13 @@ def _figure(found: PartFound, i: int) -> Figure:
     own = unit("°") if angle else unit("mm")
     factor = degrees(1.0) if angle else 1.0
     U = factor * stated.U
-    k = say("k = {k}", k=number(stated.k, ".2f")) if stated.u else NOTHING
+    k = say("k = {k}", k=number(stated.k, ".2f")) if stated.u and isfinite(stated.k) else NOTHING
     if stated.value is None:
         return _named(found, i), say("U = {u} {unit}", u=significant(U), unit=own), k
     value, u = rounded(factor * stated.value, U)
+    if never_negative(found.plan)[i]:
+        low, high = (rounded(factor * end, U)[0] for end in stated.interval)
+        return _named(found, i), say("{low} to {high} {unit}", low=low, high=high, unit=own), say("95 % interval")
     return _named(found, i), say("{value} ± {u} {unit}", value=value, u=u, unit=own), k
 
 

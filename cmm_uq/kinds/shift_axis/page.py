@@ -15,7 +15,7 @@ from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.kinds.shifting.page import artefact_section, figures_section, method_section, summary_of
 from cmm_uq.messages import Number, Text, Verbatim, in_a_row, number, plural, say
 from cmm_uq.physics.rigid_body import SCALE
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import figure, nominal, rounded, significant
 from cmm_uq.units import unit
 
 
@@ -97,11 +97,11 @@ def _open(result: ShiftResult) -> Section:
     blocks: list[Block] = [
         Paragraph(
             say(
-                "Every shift is a multiple of {period:.4g} mm, so an error of that period, or of a half, a "
+                "Every shift is a multiple of {period} mm, so an error of that period, or of a half, a "
                 "third of it, is the same in all placings and shows in no reading: it looks like another "
-                "artefact. A placing shifted by another length, such as {other:.3g} mm, would show it.",
-                period=free.period,
-                other=0.618 * free.period,
+                "artefact. A placing shifted by another length, such as {other} mm, would show it.",
+                period=nominal(free.period),
+                other=figure(0.618 * free.period, 3),
             )
         )
     ]
@@ -149,8 +149,10 @@ def _open(result: ShiftResult) -> Section:
 
 def _artefact(result: ShiftResult) -> Section:
     facts, estimate = shift_facts(result.job), result.estimate
-    shifts = in_a_row(number(s, "g") for s in facts.shifts_mm)
-    rows = ((say("Shifts"), say("{shifts} mm, u = {u:g} µm", shifts=shifts, u=facts.u_shift_um)),)
+    shifts = in_a_row(nominal(s) for s in facts.shifts_mm)
+    rows = (
+        (say("Shifts"), say("{shifts} mm, U = {U} µm (k = 2)", shifts=shifts, U=significant(2 * facts.u_shift_um))),
+    )
     blocks: list[Block] = []
     if result.distances is not None:
         cells = tuple(

@@ -14,6 +14,7 @@ from cmm_uq.inference.ensembles import Chains
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds.shifting.facts import shift_facts
 from cmm_uq.messages import Text, Verbatim, day, number, say
+from cmm_uq.uncertainty.rounding import nominal, significant
 
 Named = Sequence[Left]
 """Quantities that are stated, each with its place in results.json and its name."""
@@ -66,8 +67,9 @@ def artefact_section(
     rows = artefact_rows(job, otherwise)
     if (known := facts.known) is not None:
         told = say(
-            "{points} {first} to {last}: {length:.10g} mm, u = {u:g} µm",
-            points=points, first=known.from_point, last=known.to_point, length=known.length_mm, u=known.u_um,
+            "{points} {first} to {last}: {length} mm, U = {U} µm (k = 2)",
+            points=points, first=known.from_point, last=known.to_point, length=nominal(known.length_mm),
+            U=significant(2 * known.u_um),
         )  # fmt: skip
         rows.append((say("Known length"), told))
     return traceability_section(job, (*rows, *certificate_rows(facts.certificate), *shifts), *further)

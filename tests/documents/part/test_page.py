@@ -30,6 +30,7 @@ from cmm_uq.documents.part.results_section import results_section
 from cmm_uq.documents.pdf import render_pdf
 from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.messages import say
+from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.displaced import Displaced
 from tests.documents.parts_found import ERRORS, found_of, measured_points
 from tests.documents.parts_found import STANDING as CERTIFICATE
@@ -129,33 +130,37 @@ def agrees(text: str, value: float) -> bool:
 
 def test_every_figure_of_the_results_is_what_was_found(measured: PartFound) -> None:
     (table,) = tables(page(measured), "Results")
-    assert [column.unit for column in table.columns] == ["", "", "mm", "µm", "µm", "", "mm"]
+    assert [column.unit for column in table.columns] == ["", "", "mm", "µm", "", "mm"]
     for i, (row, one) in enumerate(zip(table.rows, measured.stated, strict=True)):
-        number, _, value, u, U, k, interval = row
+        number, _, value, U, k, interval = row
         assert int(number) == i + 1
         assert one.value is not None
         assert agrees(value, one.value)
-        assert agrees(u, 1e3 * one.u)
-        assert agrees(U, 1e3 * 0.5 * (one.interval[1] - one.interval[0]))
-        assert agrees(k, one.k)
+        width = never_negative(measured.plan)[i]
+        if width:
+            assert (U, k) == ("–", "–")
+        else:
+            assert agrees(U, 1e3 * 0.5 * (one.interval[1] - one.interval[0]))
+            assert agrees(k, one.k)
         low, high = interval.split(" to ")
         assert agrees(low, one.interval[0])
         assert agrees(high, one.interval[1])
         places = [figure(each).as_tuple().exponent for each in (value, low, high)]
         assert len(set(places)) == 1
-        assert figure(value).as_tuple().exponent == min(figure(U).as_tuple().exponent - 3, figure(U).adjusted() - 4)  # type: ignore[operator]
+        if not width:
+            assert figure(value).as_tuple().exponent == min(figure(U).as_tuple().exponent - 3, figure(U).adjusted() - 4)  # type: ignore[operator]
 
 
 def test_angles_are_stated_in_degrees_and_seconds(every_kind: PartFound) -> None:
     lengths, angles = tables(page(every_kind), "Results")
-    assert [column.unit for column in angles.columns] == ["", "", "°", "″", "″", "", "°"]
+    assert [column.unit for column in angles.columns] == ["", "", "°", "″", "", "°"]
     assert [int(row[0]) for row in angles.rows] == [1, 2]
     assert [int(row[0]) for row in lengths.rows] == [3, 4, 5]
     one = every_kind.stated[0]
     assert one.value is not None
     assert agrees(angles.rows[0][2], np.degrees(one.value))
-    assert agrees(angles.rows[0][3], 3600 * np.degrees(one.u))
-    assert agrees(angles.rows[0][6].split(" to ")[0], np.degrees(one.interval[0]))
+    assert agrees(angles.rows[0][3], 3600 * np.degrees(one.U))
+    assert agrees(angles.rows[0][5].split(" to ")[0], np.degrees(one.interval[0]))
 
 
 def test_of_a_planned_measurement_only_its_uncertainty_is_stated(planned: PartFound) -> None:
@@ -164,16 +169,15 @@ def test_of_a_planned_measurement_only_its_uncertainty_is_stated(planned: PartFo
     assert [column.heading for column in table.columns] == [
         "No.",
         "Characteristic",
-        "u",
         "U",
         "k",
         "95 % interval",
         "Mean error",
     ]
     for row, one in zip(table.rows, planned.stated, strict=True):
-        assert agrees(row[2], 1e3 * one.u)
-        assert agrees(row[5].split(" to ")[0], 1e3 * one.interval[0])
-        assert agrees(row[6], 1e3 * one.error)
+        assert agrees(row[2], 1e3 * one.U)
+        assert agrees(row[4].split(" to ")[0], 1e3 * one.interval[0])
+        assert agrees(row[5], 1e3 * one.error)
     assert document.title == "Measurement uncertainty"
     assert document.overview is not None
     assert document.overview.verdict == "Uncertainty of a planned measurement: nothing was measured"
@@ -387,7 +391,7 @@ def test_what_no_cause_moves_has_no_uncertainty_and_a_page_all_the_same(measured
     judged = Judged(29.95, 30.05, "pass", 1.0, 0.0, (29.95, 30.05), say("rule"))
     found = replace(measured, stated=(still, *measured.stated[1:]), judged=(judged, *measured.judged[1:]))
     (table,) = in_section(results_section(found))
-    assert table.rows[0][2:6] == ("30", "0", "0", "–")
+    assert table.rows[0][2:5] == ("30", "0", "–")
 
 
 @pytest.mark.parametrize("which", ["planned", "measured", "every_kind"])
