@@ -112,7 +112,9 @@ def _decided(
         wide = (2 if signed else 1) * limit >= ratio * 2 * COVERAGE_FACTOR * u
         return (_by_band(size, limit, 0.0), 0.0) if wide else ("undecided", None)
     if (risk := largest_risk(rule)) is not None:
-        return _by_probability(size, limit, *chances, risk), _guard_band(u, limit, risk, signed)
+        # Beyond the nearer limit by the guard band: to lie anywhere else than between two limits is no proof, for u large.
+        nearer = max(chances[0], float(special.ndtr((limit - size) / u)))
+        return _by_probability(size, limit, nearer, chances[1], risk), _guard_band(u, limit, risk, signed)
     width = guard_width(rule) * COVERAGE_FACTOR * u
     band = width if width <= limit else None
     if "non-binary" in rule_name(rule):

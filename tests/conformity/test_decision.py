@@ -201,3 +201,10 @@ def test_a_machine_at_its_limit_passes_as_often_as_the_rule_allows(rule: Rule, r
     measured = 10.0 + np.random.default_rng(0).standard_normal(100_000)
     accepted = np.array([decide(value, 1.0, 10.0, rule, signed=signed).outcome == "pass" for value in measured])
     assert accepted.mean() == pytest.approx(risk, abs=0.003)
+
+
+def test_an_uncertainty_however_large_proves_no_nonconformity() -> None:
+    """11 ± 162 lies between −10 and 10 with 4.9 %, for it may lie anywhere; beyond 10 it is no farther than by chance."""
+    for u in (0.7, 9.0, 162.0, 1e4):
+        assert decide(11.0, u, 10.0, "ISO 14253-1", signed=True).outcome == "undecided"
+    assert decide(11.0, 0.6, 10.0, "ISO 14253-1", signed=True).outcome == "fail"
