@@ -22,6 +22,7 @@ from cmm_uq.documents.outcome import Outcome
 from cmm_uq.documents.results_file import as_json
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.languages.language import ENGLISH, code_of
 from cmm_uq.records import content as contents
 from cmm_uq.records.facts import STANDING, Certificate, Value
@@ -156,7 +157,7 @@ def _again(
         data = json.loads(as_json(outcome.results))
         changes = tuple(compared(certificate.values, [Value(*row) for row in contents.values(data, called)]))
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
-        found = Affected(certificate, touching, changes, contents.decision(data), verdict)
+        found = Affected(certificate, touching, changes, Verdicts.of_results(data).overall, verdict)
         if folder is None or not found.changed:
             return found
         form = REPORT if certificate.command == "report" else DIAGNOSE

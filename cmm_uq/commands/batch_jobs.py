@@ -14,8 +14,8 @@ from cmm_uq.commands.written import RESULTS
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.languages.language import ENGLISH
-from cmm_uq.records.content import decision
 from cmm_uq.scheduling.found import job_folders
 from cmm_uq.writing import Manifest, read_manifest, sha256_of
 from cmm_uq.writing.replacing import journal_for
@@ -151,7 +151,7 @@ def results_of(folder: Path) -> dict[str, Any] | None:
 
 def conforming(results: Mapping[str, Any]) -> bool:
     """Whether every statement of conformity is a pass, and the recording agrees with the model that the job names."""
-    return decision(results) in ("pass", "none") and verdict(results) in ("consistent", "")
+    return Verdicts.of_results(results).conforming and verdict(results) in ("consistent", "")
 
 
 def verdict(results: Mapping[str, Any]) -> str:

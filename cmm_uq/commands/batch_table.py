@@ -9,7 +9,8 @@ from typing import Any
 
 from cmm_uq.commands.batch_jobs import verdict
 from cmm_uq.commands.recording import called
-from cmm_uq.records.content import decision, values
+from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.records.content import values
 from cmm_uq.scheduling.parquet import Row, write_parquet
 
 COLUMNS = (
@@ -60,6 +61,6 @@ def rows(results: Mapping[str, Any]) -> Iterator[Row]:
     """
     job = results["job"]
     head = (job["id"], job["origin"], job["machine"], job.get("serial", ""), dt.date.fromisoformat(job["date"]))
-    tail = (decision(results), verdict(results), results["software"]["version"])
+    tail = (Verdicts.of_results(results).overall, verdict(results), results["software"]["version"])
     for value in values(results, called):
         yield (*head, *value, *tail)

@@ -49,7 +49,7 @@ def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = 
     return Outcome(
         plan, lambda: document, plan_results(plan), plan_summary(plan), document.warnings,
         {TO_FILL_IN: recording_to_be(plan)} if plan.to_measure else {},
-        conforming=all(condition.met for condition in plan.conditions),
+        in_order=all(condition.met for condition in plan.conditions),
     )  # fmt: skip
 
 

@@ -159,7 +159,7 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
     if given.results is None:
         return None
-    from cmm_uq.verification.consistent import check_figures
+    from cmm_uq.verification.consistent import check_figures, check_verdicts
     from cmm_uq.verification.decided_again import check_decisions
     from cmm_uq.verification.inputs import check_dates, check_job, check_results, inputs_of
     from cmm_uq.verification.stated import check_stated
@@ -169,6 +169,7 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
         check_results(inquiry, given)
         check_figures(inquiry, data, name)
         check_decisions(inquiry, data, name)
+        check_verdicts(inquiry, data, name)
         if given.html is not None:
             check_stated(inquiry, data, given.html[1], files=(given.html[0], name))
     inputs = inputs_of(inquiry, given)

@@ -28,6 +28,7 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
     """
     if given.results is None:
         return None
+    from cmm_uq.verification.consistent import check_verdicts
     from cmm_uq.verification.inputs import check_results, inputs_of
     from cmm_uq.verification.part_decided import check_part_decisions
     from cmm_uq.verification.part_figures import check_part_figures
@@ -37,6 +38,7 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
         check_results(inquiry, given)
         check_part_figures(inquiry, data, name)
         check_part_decisions(inquiry, data, name)
+        check_verdicts(inquiry, data, name)
         _check_stated(inquiry, given)
     inputs = inputs_of(inquiry, given)
     if inputs is None:

@@ -45,11 +45,10 @@ def certified(result: Result, page: Page) -> Outcome:
         | stating.data()
         | ({} if draws is None else {"posterior": draws.entry})
     )
-    passed = all(statement.outcome == "pass" for statement in result.statements)
     return Outcome(
         result, lambda: _certificate(result, page, told), page.with_further(result, data), summary(result, warned), warned,
-        {draws.name: draws.content} if draws else {}, draws=result.draws,
-        conforming=passed and result.diagnosed.diagnosis.verdict == "consistent",
+        {draws.name: draws.content} if draws else {}, draws=result.draws, verdicts=result.verdicts,
+        in_order=result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.draws import Draws
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import Origin
+from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.messages import Text
 
 
@@ -39,7 +40,8 @@ class Outcome:
     summary : for the end of a command.
     warnings : what the reader must know before using a figure.
     files : further ones, by name.
-    conforming : whether every statement of conformity is a pass, and the recording agrees with the model that the job names.
+    verdicts : every statement of conformity.
+    in_order : whether all else is: the recording agrees with the model that the job names, a plan meets its conditions.
     draws : of the posterior of all that is reported, where the kind's analysis draws from one.
     """
 
@@ -49,8 +51,14 @@ class Outcome:
     summary: Summary
     warnings: tuple[Text, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
-    conforming: bool = True
+    verdicts: Verdicts = NO_VERDICTS
+    in_order: bool = True
     draws: Draws | None = None
+
+    @property
+    def conforming(self) -> bool:
+        """Whether every statement of conformity is a pass, and all else is in order."""
+        return self.verdicts.conforming and self.in_order
 
     @cached_property
     def document(self) -> Document:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.conformity.consequences import Consequences, Costs
 from cmm_uq.conformity.statement import Statement
-from cmm_uq.conformity.tolerances import Judged
+from cmm_uq.conformity.verdicts import by_standard, by_tolerance
 from cmm_uq.diagnosis.diagnosis import Diagnosis
 from cmm_uq.diagnosis.unseen import Smallest
 from cmm_uq.documents.simulated import Simulated
@@ -21,6 +21,7 @@ from cmm_uq.inference.draws import Draws
 from cmm_uq.inference.least_squares import LeastSquares
 from cmm_uq.inference.posterior import NoisyPosterior
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.planning.advice import NextPlan, Suggestion
@@ -233,15 +234,16 @@ class Result:
         return Covariance.of_draws({".".join(key): values for key, values in reported.items()})
 
     @cached_property
-    def judged(self) -> tuple[Judged, ...]:
-        """First parameters of the effects that the job sets a tolerance for and the recording determines."""
+    def verdicts(self) -> Verdicts:
+        """All statements of conformity, and the gravest: those of standards, then (first) parameters with a tolerance."""
         tolerances = self.job.facts.model.tolerances
-        found = []
+        found = [by_standard(statement) for statement in self.statements]
         for effect in self.model.effects:
-            if effect.name in tolerances and effect.name not in self.free:
+            if effect.name in tolerances:
                 name, quantity = next(iter(self.parameters[effect.name].items()))
-                found.append(Judged(effect.name, effect.title, name, quantity, tolerances[effect.name]))
-        return tuple(found)
+                found.append(by_tolerance(f"{effect.name}.{name}", effect.title, quantity, tolerances[effect.name],
+                                          determined=effect.name not in self.free))  # fmt: skip
+        return Verdicts(found)
 
     @cached_property
     def flagged(self) -> NDArray[np.bool_]:

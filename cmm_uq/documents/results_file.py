@@ -9,6 +9,7 @@ import numpy as np
 
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.conformity.statement import Decided, Statement
+from cmm_uq.conformity.verdicts import TOLERANCE_WORDS
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, LeftOut
 from cmm_uq.diagnosis.held_out import Improvement
 from cmm_uq.documents.against import corrections
@@ -24,6 +25,7 @@ from cmm_uq.documents.simulated import Simulated
 from cmm_uq.documents.withheld import periods_data, withheld_data
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.languages.language import ENGLISH
 from cmm_uq.screening.screened import Finding
 from cmm_uq.uncertainty.budget_results import budget_data
@@ -82,7 +84,7 @@ def results(result: Result) -> dict[str, Any]:
             for combination in result.undetermined
             for one in result.differences(combination)
         ],
-        "tolerances": {one.effect: {one.parameter: one.tolerance, "verdict": one.verdict} for one in result.judged},
+        "tolerances": tolerances_data(result.verdicts),
         "noise": {
             "stated_coordinate_um": result.noise.stated_um,
             "coordinate_um": quantity_data(result.noise.coordinate),
@@ -101,6 +103,7 @@ def results(result: Result) -> dict[str, Any]:
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
         "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
         "conformity": [_statement(statement) for statement in result.statements],
+        "verdicts": result.verdicts.data(),
         "diagnosis": diagnosis_data(result.diagnosed),
         "screening": [finding_data(finding, result.job.facts.recording.file) for finding in result.findings],
     }
@@ -176,6 +179,16 @@ def improvement_data(gain: Improvement) -> dict[str, Any]:
         "heldout_rms_before_um": gain.heldout_rms_before_um, "heldout_rms_after_um": gain.heldout_rms_after_um,
         "elpd_gain": gain.elpd_gain, "elpd_gain_se": gain.elpd_gain_se,
     }  # fmt: skip
+
+
+def tolerances_data(verdicts: Verdicts) -> dict[str, Any]:
+    """Each parameter that is determined with its tolerance, and whether it is in or out, or neither is proved."""
+    found: dict[str, Any] = {}
+    for one in verdicts:
+        if not one.by and one.value is not None:
+            effect, _, parameter = one.name.partition(".")
+            found[effect] = {parameter: one.limit, "verdict": TOLERANCE_WORDS[one.outcome]}
+    return found
 
 
 def covariance_data(covariance: Covariance) -> dict[str, Any]:

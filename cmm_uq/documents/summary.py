@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
-from cmm_uq.documents.document import Standing
 from cmm_uq.documents.in_short import Summary, Verdict, figure_row
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import CERTAIN, OUTCOME_WORDS, measured, probability, title_of
+from cmm_uq.jobs.verdicts import Verdict as Stated
 from cmm_uq.messages import Text, Verbatim, commas, day, lines, number, say, semicolons
-from cmm_uq.uncertainty.rounding import significant
-
-_STANDING: Mapping[str, Standing] = {"pass": "good", "conditional fail": "bad", "fail": "bad"}
-"""Of an outcome; all others leave something open."""
+from cmm_uq.uncertainty.rounding import rounded, significant
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> Summary:
@@ -32,25 +29,40 @@ def summary(result: Result, warnings: Iterable[Text]) -> Summary:
         for name, quantity in result.parameters[effect.name].items():
             key = (effect.name, name)
             figures.append(figure_row(title_of(key, result), quantity, known=key not in free))
-    decided = tuple(_verdict(each) for each in result.statements)
+    remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
+    decided = tuple(
+        Verdict(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
+        for one, told in zip(result.verdicts, remarks, strict=True)
+    )
     return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
 
 
 def in_short(result: Result) -> Text:
     """What each statement comes to, a line each, for the first page."""
     return lines(
-        say("{standard}, {what}: {outcome}", standard=Verbatim(one.facts.standard), what=Verbatim(one.characteristic),
-            outcome=OUTCOME_WORDS[one.outcome])
-        for one in result.statements
+        say("{standard}, {what}: {outcome}", standard=Verbatim(one.by), what=Verbatim(one.name), outcome=outcome)
+        if one.by else say("{subject}: {outcome}", subject=subject_of(one), outcome=outcome)
+        for one in result.verdicts for outcome in (OUTCOME_WORDS[one.outcome],)
     )  # fmt: skip
 
 
-def _verdict(statement: Statement) -> Verdict:
-    outcome = statement.outcome
-    subject = say(
-        "{standard}, {what}", standard=Verbatim(statement.facts.standard), what=Verbatim(statement.characteristic)
-    )
-    return Verdict(outcome.upper(), _STANDING.get(outcome, "open"), subject, tuple(_remarks(statement)))
+def subject_of(one: Stated) -> Text:
+    """What is decided: standard and characteristic, or a parameter with its tolerance."""
+    if one.by:
+        return say("{standard}, {what}", standard=Verbatim(one.by), what=Verbatim(one.name))
+    return say("{title}, tolerance {limit} {unit}", title=one.title, limit=number(one.limit or 0.0, "g"), unit=one.unit)
+
+
+def tolerances_of(result: Result) -> list[Stated]:
+    """Statements by tolerances."""
+    return [one for one in result.verdicts if not one.by]
+
+
+def _tolerance_remarks(one: Stated) -> list[Text]:
+    if one.value is None or one.U is None:
+        return list(one.missing)
+    value, U = rounded(one.value, one.U)
+    return [say("{value} ± {u} {unit}", value=value, u=U, unit=one.unit)]
 
 
 def _remarks(statement: Statement) -> list[Text]:

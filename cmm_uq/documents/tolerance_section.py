@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
-from cmm_uq.documents.document import Column, Section, Table
+from cmm_uq.documents.document import Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.summary import tolerances_of
 from cmm_uq.documents.tolerance_plot import tolerance_plot
 from cmm_uq.documents.wording import expanded
 from cmm_uq.messages import listed, names, number, say
 from cmm_uq.units import unit
 
-_VERDICTS = {"in": say("in"), "out": say("out"), "open": say("open")}
+_WORDS = {"pass": say("in"), "fail": say("out"), "undecided": say("open")}
 
 
 def sections(result: Result) -> list[Section]:
     """Every parameter with a tolerance; none when the job sets none."""
-    judged = result.judged
+    toleranced = tolerances_of(result)
+    left_out = sorted(one.name.partition(".")[0] for one in toleranced if one.value is None)
+    unknown = say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(left_out)))
+    judged = [one for one in toleranced if one.value is not None]
+    title = say("Tolerances by parameter")
     if not judged:
-        return []
-    rows = []
+        return [Section(title, (Paragraph(unknown),))] if left_out else []
+    rows, ratios = [], []
     for one in judged:
-        value, U, _ = expanded(one.quantity)
-        rows.append((one.title, value, U, number(one.tolerance, "g"), one.quantity.unit, _VERDICTS[one.verdict]))
+        effect, _, parameter = one.name.partition(".")
+        quantity, tolerance = result.parameters[effect][parameter], result.job.facts.model.tolerances[effect]
+        value, U, _ = expanded(quantity)
+        rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _WORDS[one.outcome]))
+        part = quantity.times(1 / tolerance, unit("1"))
+        ratios.append((part.value, *part.interval95))
     columns = (
         Column(say("Parameter"), numeric=False), Column(say("Estimate")), Column(say("U")), Column(say("Tolerance")),
         Column(say("Unit"), numeric=False), Column(say("Verdict"), numeric=False),
     )  # fmt: skip
-    left_out = sorted(set(result.job.facts.model.tolerances) - {one.effect for one in judged})
     notes = [say("In or out: the whole 95 % interval is; otherwise open.")]
     if left_out:
-        notes.append(
-            say("Not determined by this recording, so not judged: {left_out}.", left_out=listed(names(left_out)))
-        )
-    out = [one.title for one in judged if one.verdict == "out"]
-    ratios = [
-        (part.value, *part.interval95) for part in (one.quantity.times(1 / one.tolerance, unit("1")) for one in judged)
-    ]
+        notes.append(unknown)
+    out = [one.title for one in judged if one.outcome == "fail"]
     plot = tolerance_plot(
         [one.title for one in judged],
         *map(list, zip(*ratios, strict=True)),
@@ -45,7 +48,7 @@ def sections(result: Result) -> list[Section]:
     )
     return [
         Section(
-            say("Tolerances by parameter"),
+            title,
             (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), tuple(notes))),
         )
     ]

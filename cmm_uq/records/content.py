@@ -12,13 +12,11 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import JobFile
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.units import UNITS
 
 Named = Callable[[str], str]
 """How a value is called in the field, by its name: ``scale_x.ppm``."""
-
-WORST_FIRST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
-"""Decisions of statements of conformity; the first that any statement has is the certificate's."""
 
 _UNIT_OF = (
     ("arcsec_per_m_k", "″/(m·K)"), ("arcsec_per_m", "″/m"), ("um_per_m", "µm/m"), ("um_per_h", "µm/h"), ("ppm_per_h", "ppm/h"),
@@ -57,11 +55,12 @@ def certificate_content(
     CmmUqError : it is no results.json of a job.
     """
     try:
-        job = data["job"]
+        job, verdicts = data["job"], Verdicts.of_results(data)
         return {
             "command": command, "job": str(job["id"]), "origin": str(job["origin"]), "day": str(job["date"]),
             **(_of_job(facts) if facts else _of_results(job)),
-            "decision": decision(data), "diagnosis": str((data.get("diagnosis") or {}).get("verdict") or ""),
+            "decision": verdicts.overall, **({"verdicts": verdicts.data()} if verdicts else {}),
+            "diagnosis": str((data.get("diagnosis") or {}).get("verdict") or ""),
             "version": str((data.get("software") or {}).get("version") or ""), "folder": folder,
             "results_sha256": results_sha256, "files": dict(files), "inputs": dict(job.get("inputs_sha256") or {}),
             "values": values(data, named), "covariance": covariance(data), **_unstated(data),
@@ -73,12 +72,6 @@ def certificate_content(
 def kind_of_entry(content: Mapping[str, Any]) -> str:
     """Whether a content is of an interim check or of a report."""
     return "check" if content.get("interim") else "report"
-
-
-def decision(data: Mapping[str, Any]) -> str:
-    """The worst of the statements of conformity; ``none`` where there is none."""
-    made = {str(statement["decision"]) for statement in data.get("conformity") or ()}
-    return next((word for word in WORST_FIRST if word in made), min(made, default="none"))
 
 
 def values(data: Mapping[str, Any], named: Named) -> list[list[Any]]:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from cmm_uq.jobs.verdicts import Verdict, Verdicts
 from cmm_uq.verification.found import Inquiry
 
 QUANTITY = frozenset({"value", "u", "interval95", "U", "k"})
@@ -132,6 +133,32 @@ def _check_tolerances(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> N
             if verdict != should:
                 inquiry.wrong("decisions", file, f"tolerances.{effect}.verdict", "does not follow from the interval",
                               verdict, should)  # fmt: skip
+
+
+def check_verdicts(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
+    """The list of verdicts, where there is one: what standards, tolerances and limits decided, and the gravest of these."""
+    if "verdicts" not in data:
+        return
+    stated = Verdicts.of_results(data)
+    decided = Verdicts.of_results({key: value for key, value in data.items() if key != "verdicts"})
+    inquiry.looked("decisions", 1 + len(stated))
+    # a parameter that the recording does not determine stands in this list alone
+    left = [one for one in stated if one.by or one.value is not None or one.outcome != "undecided"]
+    if [_said(one) for one in left] != [_said(one) for one in decided]:
+        inquiry.wrong("decisions", file, "verdicts.statements", "are not what was decided", [_said(one) for one in left],
+                      [_said(one) for one in decided])  # fmt: skip
+    for i, (one, should) in enumerate(zip(left, decided, strict=False)):
+        if one.U != should.U and not math.isclose(one.U or 0.0, should.U or 0.0, rel_tol=_DIGITS):
+            inquiry.wrong(
+                "figures", file, f"verdicts.statements[{i}].U", "is not that of what was decided", one.U, should.U
+            )
+    if data["verdicts"]["overall"] != stated.overall:
+        inquiry.wrong("decisions", file, "verdicts.overall", "is not the gravest", data["verdicts"]["overall"],
+                      stated.overall)  # fmt: skip
+
+
+def _said(one: Verdict) -> tuple[object, ...]:
+    return one.called, one.outcome, one.value, one.limit, one.missing
 
 
 def _check_sampling(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:

@@ -16,8 +16,8 @@ import numpy as np
 
 from cmm_uq.conformity.decision import largest_risk, largest_share, least_probability
 from cmm_uq.conformity.limits import Limits, accepted_by, outcome_of
-from cmm_uq.documents.part.found import outcome_of_part
 from cmm_uq.jobs.conformity import Rule
+from cmm_uq.jobs.verdicts import gravest
 from cmm_uq.verification.decided_again import rule_of
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.part_figures import Wrong, is_zone
@@ -80,7 +80,7 @@ def check_part_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -
         for key, problem, stands, should in wrong:
             inquiry.wrong("decisions", file, f"characteristics[{i}].{key}", problem, stands, should)
     inquiry.looked("decisions")
-    whole = outcome_of_part(outcomes)
+    whole = gravest(outcomes) if outcomes else None
     if data["decision"]["outcome"] != whole:
         inquiry.wrong("decisions", file, "decision.outcome", "is not the worst of the characteristics",
                       data["decision"]["outcome"], whole)  # fmt: skip

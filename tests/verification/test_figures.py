@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.verification.consistent import check_figures
+from cmm_uq.verification.consistent import check_figures, check_verdicts
 from cmm_uq.verification.decided_again import check_decisions
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.html_page import read_html
@@ -44,6 +44,19 @@ def changed(data: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
 def test_the_figures_of_a_certificate_agree(data: dict[str, Any]) -> None:
     assert not places(check_figures, data)
     assert not places(check_decisions, data)
+    assert not places(check_verdicts, data)
+
+
+@pytest.mark.parametrize(("path", "value", "place"), [
+    ("verdicts.overall", "pass", "verdicts.overall"),
+    ("verdicts.statements.0.value", 33.9, "verdicts.statements"),
+    ("verdicts.statements.0.missing", [], "verdicts.statements"),
+    ("verdicts.statements.0.U", lambda U: U * (1 + 1e-6), "verdicts.statements[0].U"),
+    ("verdicts.statements", [], "verdicts.statements"),
+    ("tolerances", {"scale_x": {"ppm": 900.0, "verdict": "in"}}, "verdicts.statements"),
+])  # fmt: skip
+def test_a_verdict_that_was_not_decided_is_named(data: dict[str, Any], path: str, value: Any, place: str) -> None:
+    assert place in places(check_verdicts, changed(data, path, value))
 
 
 @pytest.mark.parametrize(("path", "value", "place"), [

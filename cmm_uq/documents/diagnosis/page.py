@@ -322,4 +322,4 @@ def diagnosed_outcome(found: Diagnosed) -> Outcome:
     with lettered_in(found.job.facts.job.language):
         document = diagnosis_document(found)
     consistent = found.diagnosis.verdict == "consistent"
-    return Outcome(found, lambda: document, diagnosis_results(found), short, document.warnings, conforming=consistent)
+    return Outcome(found, lambda: document, diagnosis_results(found), short, document.warnings, in_order=consistent)

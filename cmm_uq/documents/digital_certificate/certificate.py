@@ -53,7 +53,7 @@ _TITLES: Mapping[str, Text] = MappingProxyType({
 
 _NOT_STATED_THERE = (
     "schema", "software", "job", "import", "acquisition", "sampling", "identifiability", "diagnosis", "screening", "posterior",
-    "accuracy", "conformity", "covariance", "iso17025",
+    "accuracy", "conformity", "verdicts", "covariance", "iso17025",
 )  # fmt: skip
 """Keys that are no results of the machine, or stand elsewhere in the certificate; the attached results.json has them."""
 

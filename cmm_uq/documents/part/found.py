@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -14,6 +14,7 @@ from cmm_uq.conformity.decision import Outcome, rule_words
 from cmm_uq.conformity.limits import Judged
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.verdicts import gravest
 from cmm_uq.messages import Text
 from cmm_uq.parts.budget import Budget
 from cmm_uq.parts.by_method import Comparison
@@ -143,14 +144,6 @@ class Further:
     missed: tuple[str, ...] = ()
 
 
-WORST_FIRST: tuple[Outcome, ...] = ("fail", "conditional fail", "undecided", "conditional pass", "pass")
-
-
-def outcome_of_part(outcomes: Sequence[Outcome]) -> Outcome | None:
-    """The worst of its characteristics; ``None`` where nothing is decided."""
-    return next((one for one in WORST_FIRST if one in outcomes), None)
-
-
 @dataclass(frozen=True, eq=False)
 class PartFound:
     """A part's measurement, with its uncertainty and what follows.
@@ -238,9 +231,9 @@ class PartFound:
         return [one.outcome for one in self.judged if one is not None and one.outcome is not None]
 
     @property
-    def outcome(self) -> Outcome | None:
-        """Of the part: see :func:`outcome_of_part`."""
-        return outcome_of_part(self.outcomes)
+    def outcome(self) -> str | None:
+        """Of the part: the gravest of its characteristics; ``None`` where nothing is decided."""
+        return gravest(self.outcomes) if self.outcomes else None
 
     @property
     def judged_by(self) -> Text:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from cmm_uq.conformity.decision import Outcome
-from cmm_uq.documents.document import Overview, Standing
+from cmm_uq.documents.document import Overview
 from cmm_uq.documents.part.budget_section import best_words, largest_words, unseen_words
 from cmm_uq.documents.part.figures import Figures, critical, figures_of
-from cmm_uq.documents.part.found import PartFound, outcome_of_part
+from cmm_uq.documents.part.found import PartFound
 from cmm_uq.documents.wording import probability
+from cmm_uq.jobs.verdicts import gravest, standing_of
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say, semicolons, sentences, signed
-
-STANDING: Mapping[str | None, Standing] = {
-    "pass": "good", "conditional pass": "open", "undecided": "open", "conditional fail": "bad", "fail": "bad",
-    None: "unknown",
-}  # fmt: skip
-"""What an outcome means for who is to act."""
 
 
 def overview_of(found: PartFound) -> Overview:
@@ -34,7 +29,7 @@ def overview_of(found: PartFound) -> Overview:
     )
     return Overview(
         verdict_words(found.outcomes, measured=found.measured is not None),
-        STANDING[found.outcome],
+        "unknown" if found.outcome is None else standing_of(found.outcome),
         tuple(row for row in rows if row[1]),
     )
 
@@ -47,8 +42,8 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
     outcomes : of the characteristics that were decided on.
     measured : whether anything was.
     """
-    outcome = outcome_of_part(outcomes)
-    if outcome is None:
+    outcome = gravest(outcomes)
+    if not outcomes:
         return say("Measured: no limits to decide on") if measured else _UNMEASURED
     all_ = len(outcomes)
     if outcome == "pass":

@@ -14,6 +14,7 @@ from cmm_uq.documents.program import NAME
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.languages.language import ENGLISH
 from cmm_uq.messages import Text
 from cmm_uq.parts.characteristics import never_negative
@@ -26,6 +27,7 @@ def part_results(found: PartFound) -> dict[str, Any]:
     """Contents of ``results.json``."""
     simulated, facts = found.simulated, found.job.facts
     names = [one.name for one in found.characteristics]
+    stated = [_characteristic(found, i) for i in range(len(names))]
     return {
         "schema": SCHEMA,
         "software": {"name": NAME, "version": __version__},
@@ -40,7 +42,7 @@ def part_results(found: PartFound) -> dict[str, Any]:
             "coefficients": sum(len(cause.factors) for cause in found.virtual.places[0].causes),
             "not_drawn": [{"effect": name, "lacks": column} for name, column in found.virtual.places[0].lacking.items()],
         },
-        "characteristics": [_characteristic(found, i) for i in range(len(names))],
+        "characteristics": stated,
         "correlation": {"characteristics": names, "matrix": found.correlation.tolist()},
         "covariance": {"characteristics": names, "units": [unit_of(one) for one in found.characteristics],
                        "matrix": _covariance(found).tolist()},
@@ -49,6 +51,7 @@ def part_results(found: PartFound) -> dict[str, Any]:
             "prior": None if facts.decision.prior is None else facts.decision.prior.model_dump(),
             "outcome": found.outcome, "probability_all_conform": found.together,
         },
+        "verdicts": Verdicts.of_results({"characteristics": stated}).data(),
         "budget": _budget(found),
         "unseen": [_unseen(one) for one in found.unseen],
         "further": None if found.further is None else _further(found.further),

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from cmm_uq.documents.results_keys import RESULTS
+
 OWN = "its `unit`"
 """Unit of values of a characteristic: the one that stands beside them, mm or °."""
 
@@ -105,6 +107,7 @@ PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "decision.prior": ("", "What was known beforehand, as the job says."),
         "decision.outcome": ("", "Of the part: the worst of all."),
         "decision.probability_all_conform": ("", "Probability that all limits are kept at once."),
+        **{key: ("", sentence) for key, sentence in RESULTS.items() if key.startswith("verdicts.")},
         "budget.characteristics": ("", "Names of the columns of the shares."),
         "budget.causes[].cause": ("", "Line of the budget."),
         "budget.causes[].first": ("", "First-order share of each variance (Sobol), by characteristic."),

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import degrees, isfinite
 
-from cmm_uq.conformity.decision import Outcome
-from cmm_uq.documents.document import Standing
 from cmm_uq.documents.effect_words import titles
 from cmm_uq.documents.in_short import Figure, Summary, Verdict
 from cmm_uq.documents.part.found import Further, PartFound
 from cmm_uq.documents.wording import probability
+from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, number, plural, say
 from cmm_uq.parts.characteristics import never_negative
 from cmm_uq.parts.in_words import CHARACTERISTICS
 from cmm_uq.uncertainty.rounding import rounded, significant
 from cmm_uq.units import unit
-
-_STANDING: Mapping[Outcome, Standing] = {
-    "pass": "good", "conditional pass": "open", "undecided": "open", "conditional fail": "bad", "fail": "bad",
-}  # fmt: skip
-
-_WORDS: Mapping[Outcome, str] = {
-    "pass": "PASS", "conditional pass": "CONDITIONAL PASS", "undecided": "UNDECIDED", "conditional fail": "CONDITIONAL FAIL",
-    "fail": "FAIL",
-}  # fmt: skip
 
 
 def part_summary(found: PartFound) -> Summary:
@@ -42,11 +31,13 @@ def _verdicts(found: PartFound) -> list[Verdict]:
         if judged is None or judged.outcome is None:
             continue
         chance = say("conforms with {p}", p=probability(judged.probability or 0.0))
-        told.append(Verdict(_WORDS[judged.outcome], _STANDING[judged.outcome], _named(found, i), (chance, judged.rule)))
+        told.append(
+            Verdict(judged.outcome.upper(), standing_of(judged.outcome), _named(found, i), (chance, judged.rule))
+        )
     if found.together is not None and len(told) > 1:
         whole = found.outcome or "undecided"
         chance = say("all conform with {p}", p=probability(found.together))
-        told.insert(0, Verdict(_WORDS[whole], _STANDING[whole], say("the part"), (chance,)))
+        told.insert(0, Verdict(whole.upper(), standing_of(whole), say("the part"), (chance,)))
     return told
 
 

@@ -98,7 +98,7 @@ def proof_outcome(proof: Proof) -> Outcome:
     """What there is to write."""
     return Outcome(
         proof, lambda: proof_document(proof), proof_results(proof), proof_summary(proof), warnings_of(proof),
-        {TRUTH: proof.truth, RECORDS: proof.answers}, conforming=proof.conforming,
+        {TRUTH: proof.truth, RECORDS: proof.answers}, in_order=proof.conforming,
     )  # fmt: skip
 
 

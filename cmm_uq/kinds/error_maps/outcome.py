@@ -18,7 +18,7 @@ def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
     with lettered_in(found.job.facts.job.language):
         document = maps_document(found, seed)
     consistent = verdict == "consistent"
-    return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, conforming=consistent)
+    return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, in_order=consistent)
 
 
 OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

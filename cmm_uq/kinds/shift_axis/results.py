@@ -6,6 +6,7 @@ from typing import Any
 
 from cmm_uq.documents.results_file import covariance_data, head, quantity_data
 from cmm_uq.inference.ensembles import Chains
+from cmm_uq.jobs.verdicts import NO_VERDICTS
 from cmm_uq.kinds.shift_axis.analysis import ShiftResult
 from cmm_uq.kinds.shift_axis.curve import Curve
 from cmm_uq.physics.rigid_body import SCALE
@@ -56,6 +57,7 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
         },
         "improvement": {"rms_before_um": before, "rms_after_um": after},
         "conformity": [],
+        "verdicts": NO_VERDICTS.data(),
     }  # fmt: skip
 
 

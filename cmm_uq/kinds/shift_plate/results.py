@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cmm_uq.documents.results_file import covariance_data, head, quantity_data
+from cmm_uq.jobs.verdicts import NO_VERDICTS
 from cmm_uq.kinds.shift_axis.results import curve_data, sampling_data
 from cmm_uq.kinds.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.points import AXES
@@ -56,4 +57,5 @@ def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
         },
         "improvement": {"rms_before_um": before, "rms_after_um": after},
         "conformity": [],
+        "verdicts": NO_VERDICTS.data(),
     }  # fmt: skip

@@ -1,0 +1,174 @@
+"""Statements of conformity as one list: what each comes to, and the gravest of all; as results.json has them, and from it.
+
+Every output that says whether something conforms takes it from here: a document, an exit code, a message, the records.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Literal
+
+from cmm_uq.messages import NOTHING, Text, Verbatim
+from cmm_uq.units import UNITS, printed_unit
+
+GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
+"""Outcomes of statements, the gravest first."""
+
+NONE = "none"
+"""In place of an outcome where nothing is stated."""
+
+BEYOND = frozenset({"fail", "conditional fail"})
+"""Outcomes that find a machine beyond a limit."""
+
+STANDS: Mapping[str, Literal["good", "bad"]] = MappingProxyType(
+    {"pass": "good", "fail": "bad", "conditional fail": "bad"}
+)
+"""What an outcome means for who is to act; all others leave something open."""
+
+TOLERANCE_OUTCOMES: Mapping[str, str] = MappingProxyType({"in": "pass", "out": "fail", "open": "undecided"})
+"""By the word that results.json has beside a tolerance."""
+
+
+def standing_of(outcome: str) -> Literal["good", "open", "bad"]:
+    """Whether an outcome leaves nothing to do, something open, or finds something beyond its limit."""
+    return STANDS.get(outcome, "open")
+
+
+def gravest(outcomes: Iterable[str]) -> str:
+    """The gravest outcome; ``none`` where nothing is stated. A word of another package is no better than undecided."""
+    return min(outcomes, key=lambda one: (GRAVEST.index(one if one in GRAVEST else "undecided"), one), default=NONE)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One statement of conformity, by a standard or by a tolerance that the job sets.
+
+    Parameters
+    ----------
+    name : of what is decided: ``E0``; ``scale_x.ppm``; the name of a characteristic of a part.
+    outcome : one of :data:`GRAVEST`.
+    value, U, limit : in ``unit``; ``None`` where there is none.
+    unit : as printed.
+    by : the standard with its edition; empty where it is by a tolerance or a limit of the job.
+    title : what is decided, in words.
+    missing : what it lacks, a sentence each.
+    """
+
+    name: str
+    outcome: str
+    value: float | None
+    U: float | None
+    limit: float | None
+    unit: Text
+    by: str = ""
+    title: Text = NOTHING
+    missing: tuple[Text, ...] = ()
+
+    @property
+    def standing(self) -> Literal["good", "open", "bad"]:
+        """See :func:`standing_of`."""
+        return standing_of(self.outcome)
+
+    @property
+    def called(self) -> str:
+        """Standard and characteristic, or the name of what has a tolerance."""
+        return f"{self.by} {self.name}".strip()
+
+    def data(self) -> dict[str, Any]:
+        """For results.json."""
+        return {
+            "name": self.name, "by": self.by or None, "title": str.__str__(self.title) or None, "outcome": self.outcome,
+            "value": self.value, "U": self.U, "limit": self.limit, "unit": str.__str__(self.unit),
+            "missing": [str.__str__(one) for one in self.missing],
+        }  # fmt: skip
+
+
+class Verdicts(tuple[Verdict, ...]):
+    """All statements of a result: those of standards in the job's order, then those of tolerances."""
+
+    __slots__ = ()
+
+    @property
+    def overall(self) -> str:
+        """The gravest outcome; ``none`` where nothing is stated."""
+        return gravest(one.outcome for one in self)
+
+    @property
+    def conforming(self) -> bool:
+        """Whether nothing that is stated is anything but a pass."""
+        return self.overall in ("pass", NONE)
+
+    def of(self, *outcomes: str) -> list[Verdict]:
+        """Those with one of the outcomes."""
+        return [one for one in self if one.outcome in outcomes]
+
+    def data(self) -> dict[str, Any]:
+        """For results.json, key ``verdicts``."""
+        return {"overall": self.overall, "statements": [one.data() for one in self]}
+
+    @classmethod
+    def of_results(cls, results: Mapping[str, Any]) -> Verdicts:
+        """Of a results.json; of one without the key from what its standards and tolerances decided.
+
+        Parameters
+        ----------
+        results : its contents, or the content of an entry of the records.
+        """
+        there = results.get("verdicts")
+        if isinstance(there, Mapping) and "statements" in there:
+            return cls(_read(one) for one in there["statements"])
+        return cls((*map(_by_standard, results.get("conformity") or ()), *_by_tolerance(results),
+                    *_of_part(results.get("characteristics") or ())))  # fmt: skip
+
+
+NO_VERDICTS = Verdicts()
+"""Of what states no conformity."""
+
+
+def _read(one: Mapping[str, Any]) -> Verdict:
+    return Verdict(
+        str(one["name"]), str(one["outcome"]), one["value"], one["U"], one["limit"], Verbatim(one["unit"]),
+        one["by"] or "", Verbatim(one["title"] or ""), tuple(map(Verbatim, one["missing"])),
+    )  # fmt: skip
+
+
+def _by_standard(one: Mapping[str, Any]) -> Verdict:
+    u = one.get("u_um")
+    return Verdict(
+        str(one.get("characteristic") or ""), str(one.get("decision")), one.get("value_um"), 2 * u if u else None,
+        one.get("limit_um"), UNITS["µm"], str(one.get("standard") or ""), Verbatim(one.get("quantity") or ""),
+        tuple(map(Verbatim, one.get("missing") or ())),
+    )  # fmt: skip
+
+
+def _by_tolerance(results: Mapping[str, Any]) -> list[Verdict]:
+    found = []
+    for effect, held in (results.get("tolerances") or {}).items():
+        outcome = TOLERANCE_OUTCOMES.get(str(held.get("verdict")), "undecided")
+        for parameter, limit in held.items():
+            if parameter != "verdict":
+                known = ((results.get("estimates") or {}).get(effect) or {}).get(parameter) or {}
+                found.append(Verdict(f"{effect}.{parameter}", outcome, known.get("value"), known.get("U"), limit,
+                                     printed_unit(parameter)))  # fmt: skip
+    return found
+
+
+def _of_part(characteristics: Any) -> list[Verdict]:
+    found = []
+    for one in characteristics:
+        if isinstance(one, Mapping) and one.get("decision"):
+            limits = one.get("limits") or {}
+            limit = _nearest(one.get("value"), limits.get("lower"), limits.get("upper"))
+            found.append(Verdict(str(one["name"]), str(one["decision"]["outcome"]), one.get("value"), one.get("U"), limit,
+                                 Verbatim(one.get("unit") or "")))  # fmt: skip
+    return found
+
+
+def _nearest(value: float | None, lower: float | None, upper: float | None) -> float | None:
+    """The limit that a value is nearest to, or farthest beyond."""
+    ends = [end for end in (lower, upper) if end is not None]
+    if value is None or len(ends) < 2:
+        return ends[0] if ends else None
+    return lower if value - ends[0] < ends[1] - value else upper
