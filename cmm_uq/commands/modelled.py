@@ -41,7 +41,7 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
             f"the placings have {count} freedoms together, more than are estimated beside the machine's errors at once",
             where=job.recording_path, fix=f"{FREEDOMS.most} are the most: split the recording",
         )  # fmt: skip
-    stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.set_aside
+    stated, aside = job.facts.recording.u_coordinate_um, job.facts.recording.measurements_aside
     if unknown := set(aside) - set(job.points.measurement.tolist()):
         raise CmmUqError(f"there is no measurement {min(unknown)}", where="job.toml [recording] set_aside",
                          fix="Name measurements that the recording has")  # fmt: skip

@@ -186,7 +186,7 @@ def _part(tell: Progress, low: float, high: float) -> Callable[[int, int], None]
 
 def _start(job: Job, setting: Setting) -> tuple[Text, tuple[Placing, ...], Points]:
     if len(job.points):
-        points = job.points.select(~np.isin(job.points.measurement, job.facts.recording.set_aside))
+        points = job.points.select(~np.isin(job.points.measurement, job.facts.recording.measurements_aside))
         return RECORDED, split(points, lambda n: say("recorded as measurement {n}", n=n)), points
     try:
         name, placings = ready_plan(setting)

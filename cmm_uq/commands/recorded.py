@@ -33,7 +33,7 @@ def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     recording = screened(
         job.points, job.facts.artefact, kind.offers("screen", Screening), observe,
         needed={column for effect in acting for column in effect.columns},
-        set_aside=job.facts.recording.set_aside, where=where,
+        set_aside=job.facts.recording.measurements_aside, where=where,
     )  # fmt: skip
     artefact = observe(job.facts.artefact, recording.points, where=where)
     return model_of(job, artefact), (*recording.findings, *_unread(artefact))

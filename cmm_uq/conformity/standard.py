@@ -297,6 +297,7 @@ class Test:
         outside = () if self.left_out is None else self.left_out.without_value
         if self.left_out is not None and (aside or outside):
             more = [*self.left_out.in_words([item.measurement for item in aside] if not outside else [None]), *more]
+        more = [*_set_aside(self.circumstances.set_aside), *more]
         joint = None if causes is None or outside or counted(aside) else _joint(items, causes, signed)
         return Statement(
             self.facts, self.characteristic.name, quantity, measured, items, missing, (*remarks, *more), signed,
@@ -319,6 +320,18 @@ class Test:
         band = worst.decision.guard_band
         accepted = -20.0 * worst.u_um if band is None else worst.limit_um - band
         return global_risks(accepted, worst.limit_um, worst.u_um, prior, signed=signed)
+
+
+def _set_aside(reasons: Mapping[int, str]) -> list[Text]:
+    """What the laboratory leaves out of the estimates, and why."""
+    return [
+        say("Measurement {number}, left out of the estimates by the laboratory, is decided with the others: {reason}.",
+            number=number, reason=Verbatim(reason.rstrip(". ")))
+        if reason
+        else say("Measurement {number}, left out of the estimates by the laboratory, is decided with the others; no reason is "
+                 "stated.", number=number)
+        for number, reason in reasons.items()
+    ]  # fmt: skip
 
 
 def _joint(items: Sequence[Decided], causes: Causes, signed: bool) -> float | None:

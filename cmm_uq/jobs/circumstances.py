@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, Self
 
@@ -102,6 +103,7 @@ class Circumstances:
     cte_per_k : coefficient of expansion of the artefact, 1/K; ``None`` where it is not stated.
     short_gauge : recorded beside lengths that are not bidirectional by themselves.
     cmc : of the laboratory, below which no test value is said to be known.
+    set_aside : measurements that the laboratory leaves out of the estimates, each with its reason.
     """
 
     uncertainty: TestUncertainty = field(default_factory=TestUncertainty)
@@ -110,3 +112,4 @@ class Circumstances:
     cte_per_k: float | None = None
     short_gauge: ShortGauge | None = None
     cmc: Capability | None = None
+    set_aside: Mapping[int, str] = field(default_factory=dict)

@@ -9,10 +9,10 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Self
 
-from pydantic import Field, ValidationInfo, create_model, field_validator, model_validator
+from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
 from cmm_uq.errors import suggestion
-from cmm_uq.files.limits import CONFORMITY, EFFECTS
+from cmm_uq.files.limits import CONFORMITY, EFFECTS, LISTED
 from cmm_uq.jobs.acquire import AcquireFacts
 from cmm_uq.jobs.acquired import Provenance
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -33,7 +33,7 @@ from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.table import (
     Limit,
     Names,
-    Numbers,
+    Number,
     Table,
     at_least,
 )
@@ -87,6 +87,23 @@ class JobFacts(Identification):
         return self
 
 
+class SetAside(Table):
+    """A measurement that the laboratory leaves out of the estimates."""
+
+    measurement: Number
+    """Its number."""
+    reason: str = ""
+    """Why it is left out, as the certificate says it beside every decision."""
+
+
+def _as_entry(given: Any) -> Any:
+    """A number alone, as the table that says the same."""
+    return {"measurement": given} if isinstance(given, int) and not isinstance(given, bool) else given
+
+
+Aside = Annotated[SetAside, BeforeValidator(_as_entry, json_schema_input_type=SetAside | Number)]
+
+
 class Recorded(Table):
     """Which recording, and what is stated of it."""
 
@@ -98,8 +115,14 @@ class Recorded(Table):
     """Date of the earlier recording."""
     u_coordinate_um: Limit | None = None
     """Stated standard uncertainty of one recorded coordinate; left out, it is estimated from repeats and residuals."""
-    set_aside: Numbers = []
-    """Numbers of measurements that stay on the certificate but are not used for estimates."""
+    set_aside: Annotated[list[Aside], Field(max_length=LISTED.most)] = []
+    """Measurements that stay on the certificate, and in every decision, but are not used for estimates: numbers, or with
+    their reasons, `{ measurement = 3, reason = "…" }`."""
+
+    @property
+    def measurements_aside(self) -> tuple[int, ...]:
+        """Numbers of what is set aside."""
+        return tuple(entry.measurement for entry in self.set_aside)
 
 
 class RecordingFacts(ImportKeys, Recorded):
@@ -197,6 +220,7 @@ class JobFile(Table):
         return Circumstances(
             self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
             cmc=self.laboratory.cmc,
+            set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside},
         )  # fmt: skip
 
     @model_validator(mode="before")

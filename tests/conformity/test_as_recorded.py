@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -15,6 +17,7 @@ from cmm_uq.conformity.statement import Statement
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.job import RecordingFacts
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.points import Floats, Points
@@ -28,12 +31,14 @@ ISO = {"standard": "ISO 10360-2:2009", "mpe": "2.5 + L/300"}
 UNDER = Circumstances(TestUncertainty(u_repeat_um=0.05))
 
 
-def decided(points: Points, facts: ArtefactFacts, **wish: Any) -> Statement:
+def decided(
+    points: Points, facts: ArtefactFacts, under: Circumstances = UNDER, aside: Sequence[int] = (), **wish: Any
+) -> Statement:  # fmt: skip
     """A recording screened as every command does, and decided."""
     kind = kind_named(facts.kind)
     assert kind is not None
     points = numbered_lines(points)
-    recording = screened(points, facts, needed=set(), set_aside=[], where="recording.csv")
+    recording = screened(points, facts, needed=set(), set_aside=aside, where="recording.csv")
     observe = partial(kind.observing("decided"), facts)
     artefact = observe(recording.points)
     lengths = artefact.lengths()
@@ -42,7 +47,7 @@ def decided(points: Points, facts: ArtefactFacts, **wish: Any) -> Statement:
     }  # fmt: skip
     left_out = LeftOut.of(points, recording.findings, observe)
     facts_of = ConformityFacts.model_validate(wish)
-    return statement(facts_of, artefact, accuracy, "[[conformity]] 1", [LENGTHS, BARS, FORMS], None, UNDER, left_out)
+    return statement(facts_of, artefact, accuracy, "[[conformity]] 1", [LENGTHS, BARS, FORMS], None, under, left_out)
 
 
 def numbered_lines(points: Points) -> Points:
@@ -222,3 +227,27 @@ def test_further_repeats_of_one_length_are_no_gaps() -> None:
     some = points.select((points.repeat <= 3) | ((points.measurement == 1) & (points.point <= 2)))
     assert not numbered(some, 3)
     assert numbered(some)
+
+
+def test_what_the_laboratory_sets_aside_is_decided_and_said_with_its_reason() -> None:
+    """Of 5 mm in a measurement that the laboratory sets aside, too: its reason is printed, and nothing passes by it."""
+    points = recorded.gauge().points
+    chosen = (points.measurement == 2) & (points.point == 3)
+    under = replace(UNDER, set_aside={2: "The door stood open.", 4: ""})
+    found = decided(along_line(points, chosen, 5.0), STEP_GAUGE, under=under, aside=[2, 4], **ISO)
+    assert found.outcome == "fail"
+    told = [text for text in found.remarks if "by the laboratory" in text]
+    assert told == [
+        "Measurement 2, left out of the estimates by the laboratory, is decided with the others: The door stood open.",
+        "Measurement 4, left out of the estimates by the laboratory, is decided with the others; no reason is stated.",
+    ]
+
+
+@pytest.mark.parametrize(("written", "numbers", "reasons"), [
+    ([3, 5], (3, 5), {3: "", 5: ""}),
+    ([{"measurement": 3, "reason": "Door open"}, 5], (3, 5), {3: "Door open", 5: ""}),
+])  # fmt: skip
+def test_measurements_are_set_aside_by_number_or_with_a_reason(written: Any, numbers: Any, reasons: Any) -> None:
+    facts = RecordingFacts.model_validate({"file": "recording.csv", "set_aside": written})
+    assert facts.measurements_aside == numbers
+    assert {entry.measurement: entry.reason for entry in facts.set_aside} == reasons

@@ -88,7 +88,7 @@ def test_every_input_is_hashed(iota: Path) -> None:
         (r"^length_mm = .*", "length_mm = 1e-9", r"\[artefact\] length_mm: must be at least 1e-06"),
         (r"^file = .*", 'file = "ballbar.csv"\nu_coordinate_um = 1e-9', r"u_coordinate_um: must be at least 1e-06"),
         (r"^file = .*", 'file = "ballbar.csv"\nu_coordinate_um = 1.7e308', r"u_coordinate_um: .* 1000000"),
-        (r"^file = .*", 'file = "ballbar.csv"\nset_aside = [99999999999]', r"set_aside\.0: .* 1000000000"),
+        (r"^file = .*", 'file = "ballbar.csv"\nset_aside = [99999999999]', r"set_aside\.0\.measurement: .* 1000000000"),
         (r"^limit_um = .*", "limit_um = 1e308", r"limit_um: input should be less than or equal to 1000000"),
         (r"^limit_um = .*", "mpe = { a_um = 1.0, k = 1e-300 }", r"k: must be at least 0\.001"),
         (r"^origin_mm = .*", "origin_mm = [1e300, 0.0, 0.0]", r"origin_mm\.0: input should be less than"),

@@ -174,7 +174,7 @@ def check_facts(job: Job) -> None:
     ------
     CmmUqError : with the key.
     """
-    facts, aside = job.facts, job.facts.recording.set_aside
+    facts, aside = job.facts, job.facts.recording.measurements_aside
     if facts.model.effects:
         raise CmmUqError("a shift job estimates errors as free functions, not by effects",
                          where="job.toml [model] effects", fix="Write effects = []")  # fmt: skip
