@@ -13,6 +13,7 @@ from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
+from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say
 from cmm_uq.uncertainty.rounding import nominal
@@ -68,6 +69,7 @@ def certificate_of(
         date=facts.job.issued or facts.job.date,
         banner=DRAFT if draft(job) else NOTHING,
         draft=draft(job),
+        logo=logo_of(facts.laboratory, job.inputs),
     )  # fmt: skip
 
 

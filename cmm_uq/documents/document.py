@@ -11,11 +11,12 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Literal
 
 from cmm_uq.documents.view_words import label
+from cmm_uq.jobs.logo import Logo
 from cmm_uq.languages.language import ENGLISH, code_of
 from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import NOTHING, Text, say
@@ -148,6 +149,7 @@ class Document:
     banner : what every page must say at its head, such as that nothing was measured.
     overview : what comes before everything else.
     draft : whether the banner says only that something is still to be stated.
+    logo : of the issuer.
     """
 
     title: Text
@@ -167,6 +169,7 @@ class Document:
     banner: Text = NOTHING
     overview: Overview | None = None
     draft: bool = False
+    logo: Logo | None = None
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.
@@ -174,7 +177,8 @@ class Document:
         Every block carries its ``kind``; tables and plots also their ``label``, counted through the document
         ("Table 2", "Figure 1"), so that the views number them alike; tables also what their layout goes by.
         """
-        data: dict[str, Any] = _printable(asdict(self))
+        data: dict[str, Any] = _printable(asdict(replace(self, logo=None)))
+        data["logo"] = self.logo and {"uri": self.logo.uri, "alternative": data["issuer"][0] if self.issuer else "–"}
         data["date"] = self.date.isoformat() if self.date else None
         counted: Counter[str] = Counter()
         language = code_of(self.language)

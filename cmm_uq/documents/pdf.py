@@ -62,6 +62,7 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
         "colour": COLOURS,
         "date": document.date.isoformat() if document.date else EPOCH,
         "attachments": [_attachment(name, data, language) for name, data in attachments.items()],
+        "logo": document.logo and {"format": document.logo.format, "data": list(document.logo.content)},
         "missing": "",
     }
     return _with_fallback(content, [str(file.parent) for file in fonts_of(language)])

@@ -31,6 +31,9 @@ MODEL_BYTES = Limit(4_000_000, "bytes", "model file of a budget", "holds 250 000
 TABLE_BYTES = Limit(64_000_000, "bytes", "recording, temperature log", "100 000 rows of 30 columns take half of it")
 UNPACKED = Limit(400_000_000, "bytes", "workbook once it is unpacked", "200 000 rows of 30 columns take half of it")
 MAP_BYTES = Limit(4_000_000, "bytes", "error map", "30 000 positions")
+LOGO_BYTES = Limit(500_000, "bytes", "logo of a laboratory", "it stands on every certificate, and is attached to it")
+LOGO_PIXELS = Limit(4_000, "pixels", "side of a logo", "three times what a printer shows of it")
+LOGO_ELEMENTS = Limit(5_000, "elements", "logo as SVG", "a coat of arms has a tenth")
 DCC_BYTES = Limit(
     64_000_000, "bytes", "digital certificate", "attached files and its human-readable copy take a few of them"
 )
@@ -90,9 +93,10 @@ JSON_DEPTH = Limit(40, "levels", "brackets in results.json", "the deepest figure
 GIVEN = Limit(1_000, "files", "files that are verified together", "a job names a few dozen")
 
 LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, DCC_BYTES, SECRET_BYTES, KEY_BYTES, SIGNED_BYTES, ROWS, MAP_ROWS,
-    COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL, DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME,
-    EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS, PDF_BYTES, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED, PDF_DRAWN, HTML_BYTES,
-    HTML_DEPTH, JSON_BYTES, JSON_DEPTH, GIVEN, XML_ELEMENTS, XML_DEPTH, XML_ATTRIBUTES,
+    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, LOGO_BYTES, LOGO_PIXELS, LOGO_ELEMENTS, DCC_BYTES, SECRET_BYTES,
+    KEY_BYTES, SIGNED_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL,
+    DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS, PDF_BYTES, PDF_OBJECTS,
+    PDF_PAGES, PDF_UNPACKED, PDF_DRAWN, HTML_BYTES, HTML_DEPTH, JSON_BYTES, JSON_DEPTH, GIVEN, XML_ELEMENTS, XML_DEPTH,
+    XML_ATTRIBUTES,
 )  # fmt: skip
 """All of them, in the order of docs/limits.md."""

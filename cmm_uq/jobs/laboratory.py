@@ -71,6 +71,8 @@ class Laboratory(Table):
     """Who authorises the certificate (7.8.2.1 o)."""
     signatory_role: str = ""
     """Function of who authorises it."""
+    logo: str = ""
+    """File of its logo, SVG or PNG, beside job.toml: it stands at the head of certificates."""
     four_eyes: bool = False
     """Whether two persons, neither of them the operator, must release a certificate before it is released."""
     cmc: Capability | None = None

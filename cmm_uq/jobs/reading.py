@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import create_model
 
 from cmm_uq.errors import CmmUqError, Gathered
-from cmm_uq.files.limits import JOB_BYTES, MAP_BYTES, TABLE_BYTES, Limit
+from cmm_uq.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
@@ -26,6 +26,7 @@ from cmm_uq.jobs.importing.format import HEAD
 from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
+from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.predicted import files_of, prediction_of
@@ -106,14 +107,18 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     maps, logs, calibrations = _of_the_machine(facts.machine)
     predicted, predicting_maps = files_of(facts, path)
     certificate = reference_file(facts.artefact)
+    logo = [*filter(None, [facts.laboratory.logo])]
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     recordings += [facts.short_gauge.file] if facts.short_gauge else []
-    check_distinct([*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps], str(path))
+    check_distinct(
+        [*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps, *logo], str(path)
+    )
     before = results_named(facts.job.as_found)
     others = calibrations if before is None else [*calibrations, before]
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
     if says is not None:
         inputs |= _contents(source, certificate, TABLE_BYTES)
+    inputs |= _pictures(source, logo)
     if not facts.artefact.with_recording:
         _refuse_what_needs_a_recording(facts, path)
         check_examples(content, facts.job.origin, str(path))
@@ -153,6 +158,14 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     how = tuple(filter(None, told))
     return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how,
                acquired=acquired, certified={} if says is None else says.table)  # fmt: skip
+
+
+def _pictures(source: Source, names: Sequence[str]) -> dict[str, bytes]:
+    """Logos, checked."""
+    found = _contents(source, names, LOGO_BYTES)
+    for name, content in found.items():
+        checked_logo(content, str(source.toml.parent / name))
+    return found
 
 
 def _acquired(facts: JobFile, source: Source, inputs: dict[str, bytes]) -> Provenance | None:

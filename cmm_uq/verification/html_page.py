@@ -7,6 +7,7 @@ template and no others. Whatever else is in a page is named, since it may show s
 from __future__ import annotations
 
 import re
+from base64 import b64decode
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
@@ -22,6 +23,7 @@ _NAMES = {"id", "class", "role", "dir", "aria-labelledby", "aria-label", "aria-h
 ALLOWED: Mapping[str, frozenset[str]] = MappingProxyType({
     tag: frozenset(_NAMES | set(more.split())) for tag, more in {
         "html": "lang", "head": "", "meta": "charset name content http-equiv", "link": "rel href", "title": "", "style": "",
+        "img": "src alt",
         "body": "", "aside": "", "header": "", "main": "", "footer": "", "section": "", "address": "", "div": "tabindex",
         "h1": "", "h2": "", "h3": "", "p": "", "span": "", "bdi": "", "strong": "", "b": "", "br": "", "ul": "", "li": "",
         "dl": "", "dt": "", "dd": "", "figure": "", "figcaption": "", "table": "style", "thead": "", "tbody": "",
@@ -33,7 +35,7 @@ ALLOWED: Mapping[str, frozenset[str]] = MappingProxyType({
 })  # fmt: skip
 """Tags of the template and of its pictures, each with its attributes."""
 
-_VOID = frozenset({"meta", "link", "br"})
+_VOID = frozenset({"meta", "link", "br", "img"})
 _UNSEEN = frozenset({"head", "title", "style"})
 _REACHES_OUT = re.compile(r"url\s*\(\s*(?!#)|@import|expression\s*\(|javascript:", re.IGNORECASE)
 
@@ -66,6 +68,7 @@ class HtmlPage:
     language : of the text.
     style : its style sheet.
     tables, decisions : in order.
+    pictures : contents of pictures that are no drawings: the logo.
     problems : what does not belong there, each with its place.
     """
 
@@ -74,6 +77,7 @@ class HtmlPage:
     banner: str = ""
     language: str = ""
     style: str = ""
+    pictures: list[bytes] = field(default_factory=list)
     metas: dict[str, str] = field(default_factory=dict)
     tables: list[HtmlTable] = field(default_factory=list)
     decisions: list[HtmlDecision] = field(default_factory=list)
@@ -204,8 +208,19 @@ class _Reader(HTMLParser):
                 self._problem(f"has the attribute {name!r} in <{tag}>, which the template has not")
             elif name == "href" and not (value or "").startswith("#") and value != "data:,":
                 self._problem(f"refers to {value!r}")
+            elif name == "src" and not self._inside(value or ""):
+                self._problem(f"refers to {(value or '')[:60]!r}")
             elif name == "style" and (_REACHES_OUT.search(value or "") or "display" in (value or "")):
                 self._problem(f"has the style {value!r} in <{tag}>")
+
+    def _inside(self, source: str) -> bool:
+        """Keep a picture that the page carries inside, and say whether it is one."""
+        kind, _, content = source.partition(";base64,")
+        try:
+            self.page.pictures.append(b64decode(content, validate=True))
+        except ValueError:
+            return False
+        return kind in ("data:image/png", "data:image/svg+xml")
 
     def _label(self, label: str) -> None:
         """The heading that a cell has on narrow screens, which must be that of its column."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from typing import Any
 
 from cmm_uq.records.content import unit_of
@@ -37,6 +38,10 @@ def check_stated(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, *, f
     files : names of the page and of results.json.
     """
     name, source = files
+    known = set((data["job"].get("inputs_sha256") or {}).values())
+    for picture in page.pictures:
+        if sha256(picture).hexdigest() not in known:
+            inquiry.wrong("figures", name, "logo", f"is no input of {source}")
     if "estimates" in data:
         free = _undetermined(data)
         for group in GROUPS:

@@ -15,6 +15,7 @@ from cmm_uq.documents.part.overview import overview_of, part_words
 from cmm_uq.documents.part.pictured import errors_section, part_section
 from cmm_uq.documents.part.results_section import conformity_section, correlation_section, results_section
 from cmm_uq.documents.provenance import FILE as PROVENANCE
+from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.messages import NOTHING, Text, Verbatim, day, names, say
 
@@ -53,6 +54,7 @@ def part_document(found: PartFound) -> Document:
         number=Verbatim(facts.job.number or facts.job.id),
         subject=say("{part}, {came}", part=part_words(found), came=came),
         issuer=issuer_of(facts.laboratory),
+        logo=logo_of(facts.laboratory, found.job.inputs),
         particulars=_particulars(found),
         warnings=(*found.warnings, *not_stated(lacking)),
         sections=tuple(section for section in sections if section.blocks),

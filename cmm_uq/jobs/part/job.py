@@ -9,9 +9,10 @@ from pathlib import Path
 
 from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.content import text_of
-from cmm_uq.files.limits import JOB_BYTES, JSON_BYTES, LISTED, TABLE_BYTES
+from cmm_uq.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES
 from cmm_uq.files.toml import toml_of
 from cmm_uq.jobs.file_names import RESULTS
+from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.origin import COMPENSATED, SIMULATED, check_examples, check_mark
 from cmm_uq.jobs.part.by_readings import OtherReadings, other_readings
 from cmm_uq.jobs.part.checks import check_names, check_plan
@@ -158,6 +159,11 @@ def _read(source: Source, *, machine: bool) -> PartJob:
         for name in stated_by:
             with wrong.going_on():
                 inputs[name] = source.content(name, TABLE_BYTES, fix, written=True)
+
+    if logo := facts.laboratory.logo:
+        with wrong.going_on():
+            inputs[logo] = source.content(logo, LOGO_BYTES, f"Put it beside job.toml, or mend its name in {path}")
+            checked_logo(inputs[logo], str(folder / logo))
 
     def recorded(name: str) -> tuple[bytes, str]:
         inputs[name] = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {path}")
