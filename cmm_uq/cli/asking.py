@@ -21,14 +21,20 @@ def answers(name: str) -> dict[str, dict[str, Any]]:
                 said if isinstance(default, str) and key in _TEXTS else value_of(str(said))
             )
     certificate = found.get("artefact", {})
-    chain = {key: certificate.pop(f"certificate_{key}") for key in ("number", "laboratory")
-             if f"certificate_{key}" in certificate}  # fmt: skip
+    chain = {key: certificate.pop(f"certificate_{key}") for key in _CHAIN if f"certificate_{key}" in certificate}
     if chain:
         certificate["certificate"] = chain
     return {table: keys for table, keys in found.items() if keys}
 
 
-_TEXTS = ("name", "serial", "customer", "certificate_number", "certificate_laboratory", "mpe")
+_CHAIN = {
+    "number": "Number of its certificate", "laboratory": "Laboratory that certified it",
+    "issuer": "What that is (national institute, accredited, not accredited, in-house)",
+    "arrangement": "Arrangement that covers it (CIPM MRA, ILAC MRA, EA MLA, …)",
+    "accreditation": "Number of its accreditation", "accredited_by": "Body that accredited it",
+    "date": "Date of the certificate, as 2026-05-31", "due": "Last day on which it holds",
+}  # fmt: skip
+_TEXTS = ("name", "serial", "customer", "mpe", *(f"certificate_{key}" for key in _CHAIN if key not in ("date", "due")))
 
 
 def _questions(usual: dict[str, Any]) -> list[tuple[str, str, str, str]]:
@@ -43,8 +49,7 @@ def _questions(usual: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     if "name" in artefact:
         asked += [
             ("artefact", "name", "Artefact", artefact["name"]), ("artefact", "serial", "Its serial number", ""),
-            ("artefact", "certificate_number", "Number of its certificate", ""),
-            ("artefact", "certificate_laboratory", "Laboratory that certified it", ""),
+            *(("artefact", f"certificate_{key}", question, "") for key, question in _CHAIN.items()),
         ]  # fmt: skip
     for key, question in (
         ("length_mm", "Certified length or diameter in mm"),

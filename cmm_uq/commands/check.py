@@ -189,7 +189,7 @@ def check_read(job: Job) -> Checked:
 
 
 def _clauses(job: Job | None) -> tuple[Clause, ...]:
-    return clauses(job.facts) if job is not None and certifies(job) else ()
+    return clauses(job) if job is not None and certifies(job) else ()
 
 
 def _of_a_job(job: Job, path: Path, wrong: Gathered) -> list[Problem]:
@@ -243,7 +243,7 @@ def _to_be_known(job: Job, path: Path) -> list[Problem]:
             one.key,
             f"Give {one.key}",
         )
-        for one in (missing(job.facts) if certifies(job) else ())
+        for one in (missing(job) if certifies(job) else ())
     ]
     return [*(Problem(str(text), str(path)) for text in contradictions(job)), *unstated]
 

@@ -12,8 +12,7 @@ from typing import Any, Literal
 
 from cmm_uq.conformity.decision import rule_name
 from cmm_uq.documents.origin import CERTIFICATE
-from cmm_uq.documents.traceability_section import statement_of_traceability
-from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.documents.traceability_section import claimed
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
@@ -71,20 +70,21 @@ class Clause:
         }  # fmt: skip
 
 
-def clauses(facts: JobFile) -> tuple[Clause, ...]:
+def clauses(job: Job) -> tuple[Clause, ...]:
     """Every clause of 7.8 that speaks of calibration certificates, in the standard's order."""
+    facts = job.facts
     return (
         *_reporting(facts),
         *_of_every_report(facts),
-        *_of_a_calibration(facts),
+        *_of_a_calibration(job),
         *_statements(facts),
         *_replacing(facts),
     )
 
 
-def missing(facts: JobFile) -> tuple[Clause, ...]:
+def missing(job: Job) -> tuple[Clause, ...]:
     """What every certificate must state and this one does not."""
-    return tuple(one for one in clauses(facts) if one.status == "missing")
+    return tuple(one for one in clauses(job) if one.status == "missing")
 
 
 def certifies(job: Job) -> bool:
@@ -94,12 +94,16 @@ def certifies(job: Job) -> bool:
 
 def clauses_data(job: Job) -> dict[str, Any]:
     """For results.json, of what is to be a certificate."""
-    return {"iso17025": [one.data for one in clauses(job.facts)]} if certifies(job) else {}
+    if not certifies(job):
+        return {}
+    chain = claimed(job)
+    said = {"claim": chain.claim, "statement": str.__str__(chain.statement)}
+    return {"iso17025": [one.data for one in clauses(job)], "traceability": said}
 
 
 def draft(job: Job) -> bool:
     """Whether a certificate of the job is a draft only."""
-    return certifies(job) and bool(missing(job.facts))
+    return certifies(job) and bool(missing(job))
 
 
 def replaced_certificate(replaced: Replaced) -> Text:
@@ -180,13 +184,13 @@ def of_every_report(job: Identification, laboratory: Laboratory, title: str, ite
     )  # fmt: skip
 
 
-def _of_a_calibration(facts: JobFile) -> tuple[Clause, ...]:
-    job = facts.job
+def _of_a_calibration(of: Job) -> tuple[Clause, ...]:
+    facts, job = of.facts, of.facts.job
     return (
         asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
                "U, k and 95 % with every result", "[laboratory] cmc"),
         asked("7.8.4.1 b", say("conditions"), job.conditions, "[job] conditions"),
-        *_traceable(facts),
+        *_traceable(of),
         _where("7.8.4.1 d", "results before and after an adjustment", job.as_found, "[job] as_found"),
         _where("7.8.4.1 e", "statement of conformity", _standards(facts), "[[conformity]]"),
         _where("7.8.4.1 f", "opinions and interpretations", "annex of opinions and interpretations",
@@ -198,25 +202,12 @@ def _of_a_calibration(facts: JobFile) -> tuple[Clause, ...]:
     )  # fmt: skip
 
 
-def _traceable(facts: JobFile) -> tuple[Clause, ...]:
-    """How the results are traceable, through what of artefact and short gauge is certified."""
-    found: list[Clause] = []
-    if facts.artefact.traced and not facts.recording.earlier:
-        found += _chain(facts.artefact.certificate, "[artefact.certificate]", say("certificate of the artefact"),
-                        say("who certified the artefact"))  # fmt: skip
-    if facts.short_gauge is not None:
-        found += _chain(facts.short_gauge.certificate, "[short_gauge.certificate]", say("certificate of the short gauge"),
-                        say("who certified the short gauge"))  # fmt: skip
-    statement = asked("7.8.4.1 c", "how the results are traceable", statement_of_traceability(facts))
-    return (statement, *found)
-
-
-def _chain(chain: Traceability | None, table: str, certificate: Text, laboratory: Text) -> tuple[Clause, ...]:
-    stated = chain or Traceability()
-    return (
-        asked("7.8.4.1 c", certificate, stated.number, f"{table} number"),
-        asked("7.8.4.1 c", laboratory, stated.laboratory, f"{table} laboratory"),
-    )
+def _traceable(job: Job) -> tuple[Clause, ...]:
+    """How the results are traceable; where that is not shown, all that each certificate which they rest on lacks."""
+    chain = claimed(job)
+    if chain.claim != "not shown":
+        return (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
+    return tuple(Clause("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
 
 
 def _statements(facts: JobFile) -> tuple[Clause, ...]:

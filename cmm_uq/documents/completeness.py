@@ -22,16 +22,12 @@ def formal_warnings(job: Job) -> tuple[Text, ...]:
         return ()
     if job.facts.job.interim:
         return (_INTERIM, *contradictions(job))
-    return (*contradictions(job), *_missing(job.facts))
+    return (*contradictions(job), *not_stated(missing(job)))
 
 
 def contradictions(job: Job) -> tuple[Text, ...]:
     """Dates out of their order, and an artefact that was certified on the machine which it tests."""
     return (*_circular(job.facts), *dates_out_of_order(job))
-
-
-def _missing(facts: JobFile) -> list[Text]:
-    return not_stated(missing(facts))
 
 
 def not_stated(lacking: Iterable[Clause]) -> list[Text]:

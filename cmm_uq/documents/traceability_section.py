@@ -6,36 +6,20 @@ from typing import TYPE_CHECKING
 
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
 from cmm_uq.documents.wording import NO_FACTOR, expanded
-from cmm_uq.jobs.artefact import Traceability
-from cmm_uq.jobs.chain import certified_on_this_machine
-from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.chain import Chain, chain_of
+from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
 from cmm_uq.model.artefact import Size
+from cmm_uq.physics.catalogue import every
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import figure, nominal, significant
 from cmm_uq.units import MICROMETRE, Unit, unit
 
 if TYPE_CHECKING:
     from cmm_uq.documents.result import Result
-
-_NO_CERTIFICATE = say(
-    "No certificate of the artefact is stated, so the results are not shown to be traceable to the International System of "
-    "Units (SI)."
-)
-_OWN_MACHINE = say(
-    "The artefact was certified on the machine that is calibrated here. It is no independent reference, so the results are "
-    "not shown to be traceable to the International System of Units (SI)."
-)
-_UNCALIBRATED = say(
-    "No certified length enters. The size of lengths, and the scale that axes have in common, are not traceable to the metre "
-    "by this measurement; what the artefact shows by comparison with itself in other places needs no certified length."
-)
-_CHANGES = say(
-    "The results are changes since the earlier recording; they rest on it and on the artefact having stayed as it was."
-)
-
 
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
     """The artefact and the statement of traceability.
@@ -46,9 +30,17 @@ def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further
     further : blocks after the statement.
     """
     read = tuple((say("Imported file"), recognised.sentence) for recognised in job.imported)
-    facts = Facts(tuple((label, text) for label, text in (*rows, *read, *_acquired(job)) if text))
-    said = (Paragraph(statement_of_traceability(job.facts)),) if job.origin == MEASURED else ()
+    facts = Facts(tuple((label, text) for label, text in (*rows, *_thermometers(job), *read, *_acquired(job)) if text))
+    said = (Paragraph(claimed(job).statement),) if job.origin == MEASURED else ()
     return Section(say("Artefact and traceability"), (facts, *said, *further))
+
+
+def _thermometers(job: Job) -> list[tuple[Text, Text]]:
+    """What temperatures were read from, each with its certificate."""
+    return [
+        (say("Thermometer"), sentences((*names(filter(None, (one.name, one.serial))), *_listed(one.certificate))))
+        for one in job.facts.thermometer
+    ]
 
 
 def _acquired(job: Job) -> list[tuple[Text, Text]]:
@@ -82,36 +74,21 @@ def certificate_rows(chain: Traceability | None) -> list[tuple[Text, Text]]:
     if chain is None:
         return []
     issued = [say("of {date}", date=day(chain.date))] if chain.date else []
-    issued += [say("due {date}", date=day(chain.due))] if chain.due else []
+    issued += [say("due {date}", date=day(chain.until))] if chain.until else []
     return [
         (say("Its certificate"), sentences((*names(filter(None, (chain.number,))), *issued))),
         (say("Issued by"), Verbatim(chain.laboratory)),
     ]
 
 
-def statement_of_traceability(facts: JobFile) -> Text:
-    """To what the results are traceable, and through which certificate; or that they are not."""
-    chain = facts.artefact.certificate
-    if facts.recording.earlier:
-        return _CHANGES
-    if not facts.artefact.traced:
-        return _UNCALIBRATED
-    if certified_on_this_machine(facts):
-        return _OWN_MACHINE
-    if chain is None or not (chain.number or chain.laboratory):
-        return _NO_CERTIFICATE
-    certificate = [say("certificate {number}", number=Verbatim(chain.number))] if chain.number else []
-    certificate += [say("issued by {laboratory}", laboratory=Verbatim(chain.laboratory))] if chain.laboratory else []
-    return say(
-        "The results are traceable to the metre of the International System of Units (SI) through the calibration of the "
-        "artefact: {certificate}.",
-        certificate=commas(certificate),
-    )
+def _listed(chain: Traceability | None) -> list[Text]:
+    return [text for _, text in certificate_rows(chain) if text]
 
 
-def traceable(facts: JobFile) -> bool:
-    """Whether the results are said to be traceable to the metre."""
-    return statement_of_traceability(facts) not in (_CHANGES, _UNCALIBRATED, _OWN_MACHINE, _NO_CERTIFICATE)
+def claimed(job: Job) -> Chain:
+    """To what the results of a job are traceable, and what of that is not shown: every output reads it here."""
+    known = every()
+    return chain_of(job, {column for name in job.facts.model.effects if name in known for column in known[name].columns})
 
 
 def traceability(result: Result) -> Section:
@@ -141,7 +118,7 @@ def _short_gauge(gauge: ShortGaugeFacts | None) -> list[tuple[Text, Text]]:
         return []
     shown = say("{length} at 20 °C", length=_with_u(nominal(gauge.length_mm), unit("mm"), gauge.u_um))
     what = commas((*names(filter(None, (gauge.name, gauge.serial))), shown))
-    chain = [text for _, text in certificate_rows(gauge.certificate) if text]
+    chain = _listed(gauge.certificate)
     return [(say("Short gauge"), what), (say("Certificate of the short gauge"), sentences(chain) if chain else NOTHING)]
 
 

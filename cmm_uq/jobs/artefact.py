@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from typing import Any, ClassVar, Self
 
 from pydantic import model_validator
@@ -11,27 +10,7 @@ from cmm_uq.jobs.certified_value import LENGTH, CertifiedValue
 from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
-
-
-class Traceability(Table):
-    """The artefact's own certificate.
-
-    Attributes
-    ----------
-    machine : measuring machine that the artefact was certified on, by its name or its serial number.
-    """
-
-    number: str = ""
-    """Number of the artefact's certificate, for the statement of traceability."""
-    laboratory: str = ""
-    """Who certified the artefact."""
-    machine: str = ""
-    """Measuring machine that the artefact was certified on, by its name or serial number: the machine that it tests
-    is warned of."""
-    date: dt.date | None = None
-    """Date of the artefact's certificate."""
-    due: dt.date | None = None
-    """Date by which the artefact is to be calibrated again."""
+from cmm_uq.jobs.traceability import Traceability
 
 
 class CertificateFile(FileKeys, Traceability):
@@ -81,7 +60,7 @@ class ArtefactFacts(Table):
     """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
     by it."""
     certificate: CertificateFile | None = None
-    """The artefact's own certificate, to which the results are traceable."""
+    """The artefact's own certificate, that the results are traceable by."""
 
     @model_validator(mode="before")
     @classmethod

@@ -105,7 +105,8 @@ def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> di
     due = next((one.date for one in certificate.administrative.statements if _RECALIBRATION in one.ref_type), None)
     says: dict[str, str | dt.date | None] = {
         "number": core.identifier, "laboratory": str(certificate.administrative.laboratory.contact.name),
-        "date": core.issued or core.end, "due": due,
+        "date": core.issued or core.end, "due": None if "interval_months" in given else due,
+        "accreditation": certificate.administrative.laboratory.code,
     }  # fmt: skip
     for key, value in says.items():
         if value and key in given and given[key] != value:

@@ -1,13 +1,300 @@
-"""What of a job's dates and of its artefact's certificate contradicts itself: the chain of traceability on its day."""
+"""To what the results are traceable, and on what that rests; what of a job's dates contradicts itself.
+
+Two routes are claimed without more: a national metrology institute under the CIPM MRA, and a laboratory that a signatory of
+the ILAC arrangement, or of one that ILAC recognises, accredits (ILAC-P10:07/2020, 1 and 2; ISO/IEC 17025:2017, A.3). By its
+other routes (3a, 3b, in-house calibration, reference materials) a laboratory answers for the competence of the issuer itself, and
+the statement says so with its evidence. Of every certificate number, issuer, date and the day until which it holds are stated, and
+the measurement lies between both dates, the first and the last day among them.
+"""
 
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
 
-from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.acquired import ARTEFACT
 from cmm_uq.jobs.as_found import KEY
+from cmm_uq.jobs.column_words import in_words
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.messages import Text, Verbatim, day, say
+from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.traceability import (
+    ACCREDITED,
+    CONSENSUS,
+    IN_HOUSE,
+    MATERIAL,
+    NATIONAL,
+    OTHER,
+    Traceability,
+)
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
+
+Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
+"""What a statement of traceability says; the last where nothing that is certified enters."""
+
+Lack = tuple[Text, str]
+"""What a claim lacks, in words without keys, and the key of job.toml that would mend it."""
+
+NOT_MEASURED = say("Nobody measured this recording, and no result of it is traceable.")
+OWN_MACHINE = say(
+    "The artefact was certified on the machine that is calibrated here. It is no independent reference, so the results are "
+    "not shown to be traceable to the International System of Units (SI)."
+)
+UNCALIBRATED = say(
+    "No certified length enters. The size of lengths, and the scale that axes have in common, are not traceable to the metre "
+    "by this measurement; what the artefact shows by comparison with itself in other places needs no certified length."
+)
+GAUGE_ALONE = say("No certified length of the artefact enters; the short gauge is the only length that does.")
+CHANGES = say(
+    "The results are changes since the earlier recording; they rest on it and on the artefact having stayed as it was."
+)
+_KELVIN = say(
+    "The results are traceable to the metre and the kelvin of the International System of Units (SI) by what follows."
+)
+_HEADS: Mapping[Claim, Text] = {
+    "traceable": say("The results are traceable to the metre of the International System of Units (SI) by what follows."),
+    "by evidence": say(
+        "The laboratory holds the results to be traceable to the International System of Units (SI). Not every calibration that "
+        "they rest on is covered by an arrangement; for such a one it answers itself, by the evidence named."
+    ),
+    "not shown": say("The results are not shown to be traceable to the International System of Units (SI)."),
+}
+_NO_EVIDENCE = say("no arrangement covers this calibration, and no evidence of the issuer's competence is named")
+
+
+@dataclass(frozen=True)
+class Link:
+    """One certificate that results rest on.
+
+    Parameters
+    ----------
+    what : was calibrated.
+    table : of job.toml that states it.
+    chain : the certificate; ``None`` where none is stated.
+    day : of the measurement.
+    kelvin : whether temperatures rest on it, and no lengths.
+    another : serial number of the instrument that a live recording names in place of this one.
+    """
+
+    what: Text
+    table: str
+    chain: Traceability | None
+    day: dt.date
+    kelvin: bool = False
+    another: str = ""
+
+    @property
+    def claim(self) -> Claim:
+        """What may be said of it."""
+        if tuple(self.lacks()):
+            return "not shown"
+        return "traceable" if self.chain is not None and _covered(self.chain) else "by evidence"
+
+    def lacks(self) -> Iterator[Lack]:
+        """What is not stated, or contradicts itself."""
+        chain = self.chain or Traceability()
+        for text, what, key in (
+            (chain.number, say("the number of the certificate is not stated"), "number"),
+            (chain.laboratory, say("who issued the certificate is not stated"), "laboratory"),
+        ):
+            if not text.strip():
+                yield what, f"{self.table} {key}"
+        yield from self._issuer(chain)
+        yield from self._dates(chain)
+        if self.another:
+            what = say("the temperatures were read from {serial}", serial=Verbatim(self.another))
+            yield what, f"{self.table} serial"
+
+    def _issuer(self, chain: Traceability) -> Iterator[Lack]:
+        if chain.issuer is None:
+            yield (
+                say("whether its issuer is a national metrology institute or an accredited laboratory is not stated"),
+                f"{self.table} issuer",
+            )
+        elif chain.issuer == CONSENSUS:
+            told = say("a value by consensus is no route to the SI for lengths and temperatures")
+            yield told, f"{self.table} issuer"
+        elif not _covered(chain) and not chain.evidence.strip():
+            key = "arrangement" if chain.issuer in (NATIONAL, ACCREDITED) else "evidence"
+            yield _NO_EVIDENCE, f"{self.table} {key}"
+        if chain.issuer == ACCREDITED:
+            for text, what, key in (
+                (chain.accreditation, say("the number of the issuer's accreditation is not stated"), "accreditation"),
+                (chain.accredited_by, say("who accredited the issuer is not stated"), "accredited_by"),
+            ):
+                if not text.strip():
+                    yield what, f"{self.table} {key}"
+
+    def _dates(self, chain: Traceability) -> Iterator[Lack]:
+        """The first and the last day belong to the time for which a calibration holds."""
+        until = chain.until
+        if chain.date is None:
+            yield say("the date of the certificate is not stated"), f"{self.table} date"
+        elif chain.date > self.day:
+            what = say(
+                "the certificate is dated {date}, after the measurement of {day}",
+                date=day(chain.date),
+                day=day(self.day),
+            )
+            yield what, f"{self.table} date"
+        if until is None:
+            yield say("until when the calibration holds is not stated"), f"{self.table} due"
+        elif until < self.day:
+            what = say(
+                "the calibration was due on {due}, before the measurement of {day}", due=day(until), day=day(self.day)
+            )
+            yield what, f"{self.table} due"
+        elif chain.date is not None and until < chain.date:
+            yield say("the calibration was due before the certificate was issued"), f"{self.table} due"
+
+    @property
+    def sentence(self) -> Text:
+        """What was calibrated, by which certificate and by what right, or what of that is not shown."""
+        if self.chain is None:
+            return say("{what:capital}: no certificate is stated.", what=self.what)
+        if lacks := [what for what, _ in self.lacks()]:
+            return say("{what:capital}: {lacks}.", what=self.what, lacks=semicolons(lacks))
+        certificate = commas((
+            say("certificate {number} of {date}", number=Verbatim(self.chain.number), date=day(self.chain.date or self.day)),
+            say("issued by {laboratory}", laboratory=Verbatim(self.chain.laboratory)), right(self.chain),
+            say("valid until {date}", date=day(self.chain.until or self.day)),
+        ))  # fmt: skip
+        return say("{what:capital}: {certificate}.", what=self.what, certificate=certificate)
+
+
+def _covered(chain: Traceability) -> bool:
+    """Whether an arrangement covers the calibration."""
+    return chain.issuer in (NATIONAL, ACCREDITED) and chain.arrangement is not None
+
+
+def right(chain: Traceability) -> Text:
+    """By what right an issuer calibrates, with the route of ILAC-P10:07/2020; nothing where it is not stated."""
+    held = say("; evidence held: {evidence}", evidence=Verbatim(chain.evidence)) if chain.evidence.strip() else NOTHING
+    if chain.issuer == NATIONAL and chain.arrangement is not None:
+        return say("a national metrology institute whose service the CIPM MRA covers (route 1 of ILAC-P10:07/2020)")
+    if chain.issuer == ACCREDITED and chain.arrangement is not None:
+        return say(
+            "accredited by {body} ({number}), a signatory of the {arrangement} (route 2 of ILAC-P10:07/2020)",
+            body=Verbatim(chain.accredited_by), number=Verbatim(chain.accreditation), arrangement=Verbatim(chain.arrangement),
+        )  # fmt: skip
+    if chain.issuer == NATIONAL:
+        return say(
+            "a national metrology institute, by a service that the CIPM MRA does not cover (route 3a of ILAC-P10:07/2020"
+            "{held})", held=held,
+        )  # fmt: skip
+    if chain.issuer in (ACCREDITED, OTHER):
+        return say("a laboratory that no arrangement covers (route 3b of ILAC-P10:07/2020{held})", held=held)
+    if chain.issuer == IN_HOUSE:
+        return say("an in-house calibration (ILAC-P10:07/2020, 2{held})", held=held)
+    if chain.issuer == MATERIAL:
+        return say("a certified reference material (ILAC-P10:07/2020{held})", held=held)
+    return say("by consensus") if chain.issuer == CONSENSUS else NOTHING
+
+
+@dataclass(frozen=True)
+class Chain:
+    """To what the results of a job are traceable.
+
+    Parameters
+    ----------
+    links : the certificates that they rest on.
+    said : the statement where it follows from no certificate, or stands before what does.
+    claim : what is said.
+    """
+
+    links: tuple[Link, ...]
+    said: Text
+    claim: Claim
+
+    @property
+    def statement(self) -> Text:
+        """To what the results are traceable and by which certificates, or what of that is not shown."""
+        if self.said and not self.links:
+            return self.said
+        head = _KELVIN if self.claim == "traceable" and any(link.kelvin for link in self.links) else _HEADS[self.claim]
+        told = [link for link in self.links if self.claim != "not shown" or link.claim == "not shown"]
+        return sentences([*([self.said] if self.said else []), head, *(link.sentence for link in told)])
+
+    @property
+    def lacks(self) -> tuple[Lack, ...]:
+        """All that a claim of traceability lacks."""
+        if self.said == OWN_MACHINE:
+            return ((say("traceability by another certificate of the artefact"), "[artefact.certificate] machine"),)
+        return tuple(
+            (say("traceability by the {what}, as {lack}", what=link.what, lack=lack), key)
+            for link in self.links for lack, key in link.lacks()
+        )  # fmt: skip
+
+
+def chain_of(job: Job, read: Collection[str] = ()) -> Chain:
+    """To what the results of a job are traceable.
+
+    Parameters
+    ----------
+    read : columns that the effects of its model go by, beside the artefact's temperature.
+    """
+    facts = job.facts
+    if job.origin != MEASURED:
+        return Chain((), NOT_MEASURED, "not shown")
+    if facts.recording.earlier:
+        return Chain((), CHANGES, "none needed")
+    links = tuple(_lengths(facts))
+    if not links:
+        return Chain((), UNCALIBRATED, "none needed")
+    links = (*links, *_temperatures(job, read))
+    if facts.artefact.traced and certified_on_this_machine(facts):
+        return Chain((), OWN_MACHINE, "not shown")
+    claims = {link.claim for link in links}
+    worst: Claim = "not shown" if "not shown" in claims else "by evidence" if "by evidence" in claims else "traceable"
+    return Chain(links, NOTHING if facts.artefact.traced else GAUGE_ALONE, worst)
+
+
+def _lengths(facts: JobFile) -> Iterator[Link]:
+    """Of what of the artefact, and of the short gauge, is certified."""
+    if facts.artefact.traced:
+        yield Link(say("artefact"), "[artefact.certificate]", facts.artefact.certificate, facts.job.date)
+    if facts.short_gauge is not None:
+        yield Link(say("short gauge"), "[short_gauge.certificate]", facts.short_gauge.certificate, facts.job.date)
+
+
+def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
+    """Of the thermometers of the artefact and of what the effects go by; columns without one are named."""
+    gauge = () if job.short_gauge is None else job.short_gauge.points.columns
+    recorded = [name for name in (*job.points.columns, *gauge) if _temperature(name)]
+    columns = {name for name in recorded if name == ARTEFACT or name in read}
+    facts, date = job.facts, job.facts.job.date
+    for number, one in enumerate(facts.thermometer, 1):
+        if own := sorted(columns & {*one.columns}):
+            named = commas(names(filter(None, (one.name, one.serial))))
+            what = say("thermometer {named}", named=named) if named else _nameless(own)
+            yield Link(what, f"[[thermometer]] {number} certificate", one.certificate, date, True,
+                       _another(job, own, one.serial))  # fmt: skip
+    known = {name for one in facts.thermometer for name in one.columns}
+    for name in sorted(columns - known):
+        yield Link(_nameless([name]), "[[thermometer]] certificate", None, date, True)
+
+
+def _nameless(columns: Iterable[str]) -> Text:
+    return say("thermometer of the {column}", column=commas(map(in_words, columns)))
+
+
+def _temperature(column: str) -> bool:
+    return column.startswith("temp_") and column.endswith("_c")
+
+
+def _another(job: Job, columns: Collection[str], serial: str) -> str:
+    """Serial number of the instrument that a live recording has these columns from, where it is another."""
+    taken = [] if job.acquired is None else job.acquired.said.instruments
+    return next(
+        (one.serial for one in taken if one.serial and one.serial != serial and {*one.columns.values()} & {*columns}),
+        "",
+    )
+
+
+def holds_on(chain: Traceability, day: dt.date) -> bool:
+    """Whether a calibration holds on a day."""
+    return chain.until is not None and (chain.date or day) <= day <= chain.until
 
 
 def certified_on_this_machine(facts: JobFile) -> bool:
@@ -24,8 +311,8 @@ def dates_out_of_order(of: Job) -> tuple[Text, ...]:
     ordered: tuple[tuple[dt.date | None, dt.date | None, Text, str], ...] = (
         (job.issued, job.date, say("issued before it was measured"), "[job] issued"),
         (job.date, chain.date, say("the artefact was certified after it was measured with"), "[artefact.certificate] date"),
-        (chain.due, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
-        (chain.due, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
+        (chain.until, job.date, say("the artefact was due for calibration before this"), "[artefact.certificate] due"),
+        (chain.until, chain.date, say("the artefact's certificate was due before its date"), "[artefact.certificate] due"),
         (job.date, job.received, say("it was measured before it was received"), "[job] received"),
         (
             job.issued, None if job.replaces is None else job.replaces.date,

@@ -37,6 +37,7 @@ from cmm_uq.jobs.table import (
     Table,
     at_least,
 )
+from cmm_uq.jobs.traceability import ThermometerFacts
 from cmm_uq.notebook import html_table
 from cmm_uq.points import Points
 from cmm_uq.writing import Owner, staged
@@ -169,6 +170,8 @@ class JobFile(Table):
     """What was recorded, and in which file."""
     short_gauge: ShortGaugeFacts | None = None
     """A short gauge met from both sides, recorded beside lengths that are not bidirectional by themselves."""
+    thermometer: Annotated[list[ThermometerFacts], Field(max_length=100)] = []
+    """The thermometers that recorded temperatures were read from, each a table of its own with its certificate."""
     simulation: SimulationFacts | None = None
     """A prediction of another program, or an error map, that the recording is diagnosed against."""
     probe: ProbeFacts = ProbeFacts()

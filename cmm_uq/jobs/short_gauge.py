@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.artefact import Traceability
 from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.table import AnyFloat, Length, Limit, Table
+from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 

@@ -122,7 +122,7 @@ def _of_job(facts: JobFile) -> dict[str, Any]:
         "artefact": {
             "serial": artefact.serial, "name": artefact.name, "certificate": chain.number if chain else "",
             "laboratory": chain.laboratory if chain else "", "calibrated": _iso(chain.date if chain else None),
-            "due": _iso(chain.due if chain else None),
+            "due": _iso(chain.until if chain else None),
         },
         "kind": artefact.kind, "adjusted_since": _iso(job.adjusted_since), "interim": job.interim,
         "operator": job.operator or laboratory.signatory, "four_eyes": laboratory.four_eyes,

@@ -122,7 +122,7 @@ def check_dates(inquiry: Inquiry, job: Job) -> None:
     chain = job.facts.artefact.certificate
     if certified_on_this_machine(job.facts):
         inquiry.notes.append("The artefact was certified on the machine that it tests; the certificate says so.")
-    if chain is not None and chain.number and chain.due is None:
+    if chain is not None and chain.number and chain.until is None:
         inquiry.notes.append(
             "The artefact's certificate has no date by which it is due: that it was in date is not shown."
         )

@@ -30,7 +30,16 @@ address = "Street 2"
 signatory = "A. Huber"
 
 """
-CHAIN = '[artefact.certificate]\nnumber = "4711"\nlaboratory = "NMI"\n\n'
+CHAIN = """\
+[artefact.certificate]
+number = "4711"
+laboratory = "NMI"
+issuer = "national institute"
+arrangement = "CIPM MRA"
+date = 2000-01-01
+due = 2099-01-01
+
+"""
 """What ISO/IEC 17025:2017, 7.8 asks for; without it a certificate is a draft that nobody releases."""
 
 

@@ -13,8 +13,8 @@ from pydantic import BaseModel
 from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conditions import conditions
-from cmm_uq.documents.traceability_section import statement_of_traceability
-from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.documents.traceability_section import claimed
+from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
 from tests.conftest import ROOT
@@ -53,13 +53,17 @@ WHOLE = {
             "issued": dt.date(2030, 1, 1)},
     "machine": {"serial": "7"},
 }  # fmt: skip
-CHAIN = Traceability(number="4711", laboratory="NMI", date=dt.date(2003, 5, 1), due=dt.date(2029, 5, 1))
+CHAIN = Traceability(
+    number="4711", laboratory="NMI", date=dt.date(2003, 5, 1), due=dt.date(2029, 5, 1), issuer="national institute",
+    arrangement="CIPM MRA",
+)  # fmt: skip
+KEYS = ["[artefact.certificate] " + key for key in ("number", "laboratory", "issuer", "date", "due")]
 
 
 @pytest.mark.parametrize("name", sorted(CERTIFIED))
 def test_an_artefact_of_any_kind_that_is_certified_needs_its_certificate(name: str) -> None:
     job = measured(name, **WHOLE, artefact={"certificate": None})
-    assert missing(job) == ["[artefact.certificate] number", "[artefact.certificate] laboratory"]
+    assert missing(job) == KEYS
     assert missing(changed(job, artefact={"certificate": CHAIN})) == []
 
 
@@ -91,8 +95,9 @@ def test_an_artefact_certified_on_the_machine_that_it_tests_is_told(says: str, c
     chain = CHAIN.model_copy(update={"machine": says})
     job = measured("iota-1102-20C", machine={"serial": "A-17"}, artefact={"certificate": chain})
     assert any("certified on the machine that it now tests" in text for text in formal_warnings(job)) == circular
-    assert ("no independent reference" in statement_of_traceability(job.facts)) == circular
-    assert ("traceable to the metre" in statement_of_traceability(job.facts)) != circular
+    assert ("no independent reference" in claimed(job).statement) == circular
+    assert ("traceable to the metre" in claimed(job).statement) != circular
+    assert (missing(job)[-1:] == ["[artefact.certificate] machine"]) == circular
 
 
 DAY, BEFORE, AFTER = dt.date(2026, 3, 2), dt.date(2026, 3, 1), dt.date(2026, 3, 3)
@@ -122,18 +127,15 @@ def test_dates_out_of_their_order_are_told(
 
 def test_the_statement_of_traceability_names_the_certificate_that_carries_it() -> None:
     job = measured("sphere-simulated", artefact={"certificate": CHAIN})
-    assert statement_of_traceability(job.facts) == (
-        "The results are traceable to the metre of the International System of Units (SI) through the calibration of the "
-        "artefact: certificate 4711, issued by NMI."
-    )
-    assert "not shown to be traceable" in statement_of_traceability(measured("sphere-simulated").facts)
+    assert "Artefact: certificate 4711 of 2003-05-01, issued by NMI, " in claimed(job).statement
+    assert "not shown to be traceable" in claimed(measured("sphere-simulated")).statement
 
 
 @pytest.mark.parametrize(("name", "said"), [
     ("bryan-simulated", "No certified length enters"), ("plate-two-dates-simulated", "changes since the earlier recording"),
 ])  # fmt: skip
 def test_without_a_certified_length_nothing_is_said_to_be_traceable_to_the_metre(name: str, said: str) -> None:
-    text = statement_of_traceability(measured(name, artefact={"certificate": CHAIN}).facts)
+    text = claimed(measured(name, artefact={"certificate": CHAIN})).statement
     assert said in text
     assert "are traceable to" not in text
 

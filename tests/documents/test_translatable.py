@@ -16,7 +16,7 @@ from cmm_uq.documents.document import Column, Document, Paragraph, Plot, Section
 from cmm_uq.documents.origin import marked
 from cmm_uq.documents.program import NAME
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.artefact import Traceability
+from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.jobs.job import JobFacts
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts

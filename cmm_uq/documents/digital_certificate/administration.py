@@ -30,7 +30,7 @@ from cmm_uq.dcc.results import Statement
 from cmm_uq.documents.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
 from cmm_uq.documents.digital_certificate.words import NOT_STATED, SayIn, one_line, rich_of, words_of
 from cmm_uq.documents.origin import BANNERS
-from cmm_uq.documents.traceability_section import statement_of_traceability, traceable
+from cmm_uq.documents.traceability_section import claimed
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.messages import Text, Verbatim, say
@@ -172,11 +172,12 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
                       ref_type=("cmm_notACertificate",))
         )  # fmt: skip
     if certifies(job):
+        chain = claimed(job)
         found += [Statement(declaration=rich_of((text,), say_in), ref_type=("cmm_general",)) for text in STATEMENTS]
         found.append(
             Statement(
-                name=words_of(say("Traceability"), say_in), traceable=traceable(job.facts),
-                declaration=rich_of((statement_of_traceability(job.facts),), say_in),
+                name=words_of(say("Traceability"), say_in), traceable=chain.claim == "traceable",
+                declaration=rich_of((chain.statement,), say_in),
                 ref_type=("basic_metrologicallyTraceableToSI",),
             )
         )  # fmt: skip

@@ -13,9 +13,11 @@ from cmm_uq.documents.conditions import TEMPERATURES
 from cmm_uq.documents.digital_certificate.uncertainty import P_STANDARD
 from cmm_uq.documents.digital_certificate.words import NOT_STATED, SayIn, english, one_line, rich_of, words_of
 from cmm_uq.documents.stated import SIGN, UNCERTAINTY
-from cmm_uq.jobs.artefact import CertificateFile, Traceability
+from cmm_uq.jobs.artefact import CertificateFile
+from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.messages import Text, Verbatim, day, say
 from cmm_uq.units import UNITS, Unit
 
@@ -67,6 +69,10 @@ def equipment(job: Job, say_in: SayIn) -> Equipments:
         )
         named = gauge.name or str.__str__(say("Short gauge"))
         found.append(_reference(job, named, gauge.serial, gauge.certificate, say_in, tuple(quantities)))
+    found += [
+        _reference(job, one.name or str.__str__(say("Thermometer")), one.serial, one.certificate, say_in, ())
+        for one in job.facts.thermometer
+    ]
     taken = [] if job.acquired is None else job.acquired.said.instruments
     found += [
         Equipment(
@@ -110,13 +116,14 @@ def _certificate(job: Job, chain: Traceability | None, say_in: SayIn) -> Hash | 
     number = one_line(chain.number) or (file or str.__str__(NOT_STATED))
     told: list[Text] = [Verbatim(chain.laboratory)] if chain.laboratory else []
     told += [say("of {date}", date=day(chain.date))] if chain.date else []
-    told += [say("due {date}", date=day(chain.due))] if chain.due else []
+    told += [say("due {date}", date=day(chain.until))] if chain.until else []
+    told += [say("{right:capital}", right=right(chain))] if right(chain) else []
     digest = sha256(job.inputs)[file] if file is not None and file in job.inputs else None
     return Hash(
         referral=words_of(say("Calibration certificate"), say_in), referral_id=number,
         procedure="SHA-256" if digest else NO_HASH, value=digest or NO_HASH,
         description=rich_of(told, say_in) if told else None,
-        in_validity_range=None if chain.due is None else chain.due >= job.facts.job.date,
+        in_validity_range=None if chain.until is None else holds_on(chain, job.facts.job.date),
     )  # fmt: skip
 
 
