@@ -50,7 +50,7 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "iso17025[].status": "stated; missing, which makes a draft; not applicable; laboratory, which no certificate shows.",
         "iso17025[].stated": "What satisfies it; null where nothing does.",
         "iso17025[].key": "Key of job.toml that states it, or would; null where the form of the certificate does.",
-        "traceability.claim": "traceable; by evidence, which the laboratory holds; not shown; none needed, where nothing certified enters.",
+        "traceability.claim": "traceable; by evidence of the laboratory; not shown; none needed, of no certified length.",
         "traceability.statement": "The statement of traceability on the certificate.",
         "estimates.EFFECT.PARAMETER": "Quantity: a parameter of an effect of the model, over all of `diagnosis.remaining`.",
         "artefact.SIZE": "Quantity: a size of the artefact as the measurement leaves it, over the same.",

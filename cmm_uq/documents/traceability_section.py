@@ -21,6 +21,7 @@ from cmm_uq.units import MICROMETRE, Unit, unit
 if TYPE_CHECKING:
     from cmm_uq.documents.result import Result
 
+
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
     """The artefact and the statement of traceability.
 
@@ -88,7 +89,9 @@ def _listed(chain: Traceability | None) -> list[Text]:
 def claimed(job: Job) -> Chain:
     """To what the results of a job are traceable, and what of that is not shown: every output reads it here."""
     known = every()
-    return chain_of(job, {column for name in job.facts.model.effects if name in known for column in known[name].columns})
+    return chain_of(
+        job, {column for name in job.facts.model.effects if name in known for column in known[name].columns}
+    )
 
 
 def traceability(result: Result) -> Section:

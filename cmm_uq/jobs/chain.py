@@ -2,9 +2,9 @@
 
 Two routes are claimed without more: a national metrology institute under the CIPM MRA, and a laboratory that a signatory of
 the ILAC arrangement, or of one that ILAC recognises, accredits (ILAC-P10:07/2020, 1 and 2; ISO/IEC 17025:2017, A.3). By its
-other routes (3a, 3b, in-house calibration, reference materials) a laboratory answers for the competence of the issuer itself, and
-the statement says so with its evidence. Of every certificate number, issuer, date and the day until which it holds are stated, and
-the measurement lies between both dates, the first and the last day among them.
+other routes (3a, 3b, in-house calibration, reference materials) a laboratory answers for the competence of the issuer itself,
+and the statement says so with its evidence. Of every certificate number, issuer, date and the day until which it holds are
+stated, and the measurement lies between both dates, the first and the last day among them.
 """
 
 from __future__ import annotations
@@ -53,10 +53,12 @@ _KELVIN = say(
     "The results are traceable to the metre and the kelvin of the International System of Units (SI) by what follows."
 )
 _HEADS: Mapping[Claim, Text] = {
-    "traceable": say("The results are traceable to the metre of the International System of Units (SI) by what follows."),
+    "traceable": say(
+        "The results are traceable to the metre of the International System of Units (SI) by what follows."
+    ),
     "by evidence": say(
-        "The laboratory holds the results to be traceable to the International System of Units (SI). Not every calibration that "
-        "they rest on is covered by an arrangement; for such a one it answers itself, by the evidence named."
+        "The laboratory holds the results to be traceable to the International System of Units (SI). Not every calibration "
+        "that they rest on is covered by an arrangement; for such a one it answers itself, by the evidence named."
     ),
     "not shown": say("The results are not shown to be traceable to the International System of Units (SI)."),
 }

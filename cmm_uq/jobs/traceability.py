@@ -1,6 +1,6 @@
 """What a job says of a certificate that its results rest on: number, issuer and by what right it calibrates, and dates.
 
-The certificates of the artefact and of the short gauge are tables of theirs; those of thermometers stand in ``[[thermometer]]``.
+The certificates of the artefact and of the short gauge are tables of theirs; thermometers stand in ``[[thermometer]]``.
 What follows from them is said in :mod:`cmm_uq.jobs.chain`.
 """
 
@@ -54,7 +54,7 @@ class Traceability(Table):
     """What covers this calibration: `CIPM MRA` of a national institute; of an accredited laboratory the arrangement that its
     accreditation body has signed, as `ILAC MRA` or `EA MLA`."""
     evidence: str = ""
-    """Evidence that the laboratory holds of the issuer's competence, where no arrangement covers the calibration (ILAC-P10)."""
+    """Evidence of the issuer's competence that the laboratory holds, where no arrangement covers the calibration."""
 
     @model_validator(mode="after")
     def _one_end(self) -> Self:
@@ -66,8 +66,8 @@ class Traceability(Table):
     def _arranged(self) -> Self:
         if self.arrangement is not None and (self.arrangement == CIPM) != (self.issuer == NATIONAL):
             raise ValueError(
-                f'arrangement = "{self.arrangement}" does not fit issuer = "{self.issuer or ""}": the CIPM MRA covers national '
-                "institutes, the others accredited laboratories"
+                f'arrangement = "{self.arrangement}" does not fit issuer = "{self.issuer or ""}": the CIPM MRA covers '
+                "national institutes, the others accredited laboratories"
             )
         return self
 

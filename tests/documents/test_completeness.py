@@ -14,9 +14,9 @@ from cmm_uq.commands.reading import read_job
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.traceability_section import claimed
-from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.traceability import Traceability
 from tests.conftest import ROOT
 
 CERTIFIED = {

@@ -16,11 +16,11 @@ from cmm_uq.documents.document import Column, Document, Paragraph, Plot, Section
 from cmm_uq.documents.origin import marked
 from cmm_uq.documents.program import NAME
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.jobs.job import JobFacts
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.languages.saying import said_in
 from cmm_uq.messages import Message, Number, Text, Verbatim, say
 from cmm_uq.physics.catalogue import every

@@ -52,9 +52,11 @@ def without(chain: dict[str, Any], *keys: str, **other: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("chain", "claim", "sentence"), [
-    (NATIONAL, "traceable", TRACEABLE + "Artefact: certificate 1234-PTB-25 of 2025-06-01, issued by PTB, a national metrology "
+    (NATIONAL, "traceable", TRACEABLE +
+     "Artefact: certificate 1234-PTB-25 of 2025-06-01, issued by PTB, a national metrology "
      "institute whose service the CIPM MRA covers (route 1 of ILAC-P10:07/2020), valid until 2027-06-01."),
-    (ACCREDITED, "traceable", TRACEABLE + "Artefact: certificate K-77 of 2025-06-01, issued by Messlabor AG, accredited by DAkkS "
+    (ACCREDITED, "traceable", TRACEABLE +
+     "Artefact: certificate K-77 of 2025-06-01, issued by Messlabor AG, accredited by DAkkS "
      "(D-K-15000-01-00), a signatory of the ILAC MRA (route 2 of ILAC-P10:07/2020), valid until 2027-06-01."),
     (without(ACCREDITED, arrangement="EA MLA"), "traceable", "a signatory of the EA MLA"),
     (without(NATIONAL, "arrangement", **EVIDENCE), "by evidence", "by a service that the CIPM MRA does not cover (route 3a of "
@@ -63,11 +65,12 @@ def without(chain: dict[str, Any], *keys: str, **other: Any) -> dict[str, Any]:
     (without(NATIONAL, "arrangement", issuer="not accredited", **EVIDENCE), "by evidence", "(route 3b of"),
     (without(NATIONAL, "arrangement", issuer="in-house", **EVIDENCE), "by evidence", "an in-house calibration"),
     (without(NATIONAL, "arrangement", issuer="reference material", **EVIDENCE), "by evidence", "certified reference material"),
-    (without(NATIONAL, "arrangement", issuer="consensus", **EVIDENCE), "not shown", "a value by consensus is no route to the SI"),
+    (without(NATIONAL, "arrangement", issuer="consensus", **EVIDENCE), "not shown", "by consensus is no route to the SI"),
     (None, "not shown", NOT_SHOWN + "Artefact: no certificate is stated."),
-    ({"number": "7", "laboratory": "our own toolroom"}, "not shown", NOT_SHOWN + "Artefact: whether its issuer is a national "
-     "metrology institute or an accredited laboratory is not stated; the date of the certificate is not stated; until when the "
-     "calibration holds is not stated."),
+    ({"number": "7", "laboratory": "our own toolroom"}, "not shown", NOT_SHOWN +
+     "Artefact: whether its issuer is a national "
+     "metrology institute or an accredited laboratory is not stated; the date of the certificate is not stated; until when "
+     "the calibration holds is not stated."),
     (without(NATIONAL, "arrangement"), "not shown", "no arrangement covers this calibration, and no evidence"),
     (without(ACCREDITED, "arrangement"), "not shown", "no arrangement covers this calibration, and no evidence"),
     (without(NATIONAL, "arrangement", issuer="not accredited"), "not shown", "no evidence of the issuer's competence"),
@@ -163,7 +166,7 @@ WARM = replace(
     ([], "not shown", "Thermometer of the temperature of the artefact: no certificate is stated."),
     ([{"serial": "T 7"}], "not shown", "Thermometer T 7: the number of the certificate is not stated; who issued"),
     ([{"serial": "T 7", "certificate": Traceability(**ACCREDITED)}], "traceable",
-     "traceable to the metre and the kelvin of the International System of Units (SI) by what follows. Artefact: certificate 1234"),
+     "traceable to the metre and the kelvin of the International System of Units (SI) by what follows. Artefact: "),
     ([{"serial": "T 7", "columns": ["temp_air_c"], "certificate": Traceability(**ACCREDITED)}], "not shown",
      "Thermometer of the temperature of the artefact"),
     ([{"serial": "T 7", "certificate": Traceability(**without(ACCREDITED, due=dt.date(2026, 3, 1)))}], "not shown",
@@ -223,7 +226,9 @@ def test_nothing_is_claimed_of_a_recording_that_nobody_measured() -> None:
         assert claimed(changed(job_with(NATIONAL), job={"origin": origin})).claim == "not shown"
 
 
-@pytest.mark.parametrize("chain", [NATIONAL, without(NATIONAL, "due"), without(NATIONAL, due=dt.date(2026, 3, 1)), None])
+@pytest.mark.parametrize(
+    "chain", [NATIONAL, without(NATIONAL, "due"), without(NATIONAL, due=dt.date(2026, 3, 1)), None]
+)
 def test_the_clause_is_stated_where_traceability_is_shown_and_missing_where_it_is_not(
     chain: dict[str, Any] | None,
 ) -> None:
