@@ -26,6 +26,7 @@ from cmm_uq.documents.wording import OUTCOME_WORDS
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 from tests.dcc.schemas import by_lxml
+from tests.documents.test_completeness import CHAIN
 from tests.documents.test_every_layout import REPORTED
 from tests.kinds.simulated import results
 from tests.recordings import with_columns
@@ -299,9 +300,9 @@ def complete() -> Job:
         "name": "Laboratory", "address": "2 Way", "signatory": "A. N. Other", "country": "CA", "accreditation": "D-K-1",
     })  # fmt: skip
     machine = job.facts.machine.model_copy(update={"serial": "S 1"})
-    return replace(
-        job, facts=job.facts.model_copy(update={"job": stated, "laboratory": laboratory, "machine": machine})
-    )
+    artefact = job.facts.artefact.model_copy(update={"certificate": CHAIN})
+    tables = {"job": stated, "laboratory": laboratory, "machine": machine, "artefact": artefact}
+    return replace(job, facts=job.facts.model_copy(update=tables))
 
 
 def test_a_complete_certificate_says_who_for_whom_and_what() -> None:
@@ -326,7 +327,11 @@ def test_a_complete_certificate_says_who_for_whom_and_what() -> None:
     standard = whole.measurements[0].equipment
     assert standard is not None
     assert standard.equipment[0].certificate is not None
-    assert standard.equipment[0].certificate.referral_id == "Harris 2004, Table 21"
+    assert standard.equipment[0].certificate.referral_id == "4711"
+    assert standard.equipment[0].certificate.in_validity_range
+    traced = next(one for one in administrative.statements if "basic_metrologicallyTraceableToSI" in one.ref_type)
+    assert traced.traceable
+    assert "certificate 4711 of 2003-05-01, issued by NMI" in str(traced.declaration)
     assert whole.document is not None
     assert whole.document.data == HTML
     assert by_lxml("3.2.1").validate(etree.fromstring(written(whole)))
