@@ -14,8 +14,9 @@ import numpy as np
 from cmm_uq.conformity.length_conditions import tip_offsets
 from cmm_uq.conformity.measurement_lines import position_of
 from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan
-from cmm_uq.conformity.standard import Test
+from cmm_uq.conformity.standard import NOT_STATED, Test
 from cmm_uq.conformity.statement import Decided, Statement
+from cmm_uq.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats
@@ -84,7 +85,7 @@ def _budget(test: Test) -> tuple[Budget, Text]:
 
 def offset_probe(test: Test) -> Statement:
     """Difference of the bar's lengths with the stylus tip to one side and to the other, in each position."""
-    u = test.circumstances.uncertainty.u_repeat_um
+    u = u_of_repeats(test.artefact.sizes[0].nominal, test.circumstances)
     test.refuse_without_uncertainty(u, "u_repeat_um")
     found = _differences(test.artefact)
     test.refuse_nothing_measured(
@@ -107,11 +108,7 @@ def offset_probe(test: Test) -> Statement:
         )
         for position, number, value in found
     )
-    told = (
-        say("u is what of the bar changed between both readings ([test_uncertainty] u_repeat_um).")
-        if u > 0
-        else say("u_repeat_um is not stated: no uncertainty is considered, and no probability can be given.")
-    )
+    told = say("u is what of the bar changed between both readings.") if u > 0 else NOT_STATED
     return test.stated(say("difference of the bar's lengths with opposite offsets, worst against its limit"),
                        say("differences"), items, [told])  # fmt: skip
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import hypot, isfinite
 from typing import Literal
 
 from scipy import special
@@ -63,12 +64,12 @@ class Decision:
 
 
 def decide(
-    value: float, u: float, limit: float, rule: Rule, *, signed: bool, prior: Known | None = None
+    value: float, u: float, limit: float, rule: Rule, *, signed: bool, prior: Known | None = None, unstated: float = 0.0
 ) -> Decision:  # fmt: skip
     """Decide whether a quantity conforms.
 
     Conformity is proved by a value inside the limits only, nonconformity by a value outside only, however large u is. The
-    binary rule of ILAC-G8 alone rejects inside them.
+    binary rule of ILAC-G8 alone rejects inside them. No larger size has a better outcome, and what has no value is outside.
 
     Parameters
     ----------
@@ -83,6 +84,7 @@ def decide(
         wrongly accepted items (ANSI/NCSL Z540.3-2006, 5.3 b).
     signed : whether the limit holds on both sides of zero.
     prior : what is known of the quantity beforehand.
+    unstated : standard uncertainty of what is not stated: by ISO 14253-1 it counts before nonconformity is proved.
 
     Raises
     ------
@@ -91,21 +93,23 @@ def decide(
     if u <= 0 and needs_uncertainty(rule):
         raise ValueError(f"the rule {rule_name(rule)} needs an uncertainty")
     size = abs(value) if signed else value
+    if not isfinite(size):
+        return Decision("fail", None, None, 0.0, rule_words(rule))
     if u <= 0:
         return Decision("pass" if size <= limit else "fail", None, None, 0.0, rule_words(rule))
     beyond = _beyond(size, u, limit, signed)
     within = _within(size, u, limit, signed, beyond)
     known = None if prior is None else prior.after(value, u)
     if known is None:
-        outcome, band = _decided(size, u, limit, rule, signed, (within, beyond))
+        outcome, band = _decided(size, u, limit, rule, signed, beyond, unstated)
     else:
         within, beyond = known.within(limit, signed=signed), known.beyond(limit, signed=signed)
-        outcome, band = _decided_knowing(value, u, limit, rule, signed, prior or known)
+        outcome, band = _decided_knowing(value, u, limit, rule, signed, prior or known, unstated)
     return Decision(outcome, within, beyond, band, rule_words(rule, None if band is None else band / u))
 
 
 def _decided(
-    size: float, u: float, limit: float, rule: Rule, signed: bool, chances: tuple[float, float]
+    size: float, u: float, limit: float, rule: Rule, signed: bool, beyond: float, unstated: float
 ) -> tuple[Outcome, float | None]:
     """Outcome and guard band, by rules that need no prior."""
     if (ratio := least_ratio(rule)) is not None:
@@ -113,8 +117,9 @@ def _decided(
         return (_by_band(size, limit, 0.0), 0.0) if wide else ("undecided", None)
     if (risk := largest_risk(rule)) is not None:
         # Beyond the nearer limit by the guard band: to lie anywhere else than between two limits is no proof, for u large.
-        nearer = max(chances[0], float(special.ndtr((limit - size) / u)))
-        return _by_probability(size, limit, nearer, chances[1], risk), _guard_band(u, limit, risk, signed)
+        doubt = hypot(u, unstated) if isinstance(rule, str) else u
+        within = float(special.ndtr((limit - size) / doubt))
+        return _by_probability(size, limit, within, beyond, risk), _guard_band(u, limit, risk, signed)
     width = guard_width(rule) * COVERAGE_FACTOR * u
     band = width if width <= limit else None
     if "non-binary" in rule_name(rule):
@@ -125,9 +130,13 @@ def _decided(
 
 
 def _decided_knowing(
-    value: float, u: float, limit: float, rule: Rule, signed: bool, prior: Known
+    value: float, u: float, limit: float, rule: Rule, signed: bool, prior: Known, unstated: float
 ) -> tuple[Outcome, float | None]:
-    """The same with a prior, of which rules that need none take no account."""
+    """The same with a prior, of which rules that need none take no account.
+
+    A prior that leans to one side makes a small error of the other sign less likely to conform than a large one: the outcome
+    is that of the less favourable sign.
+    """
     size = abs(value) if signed else value
     if (share := largest_share(rule)) is not None:
         accepted = acceptance_limit(share, limit, u, prior, signed=signed)
@@ -135,10 +144,10 @@ def _decided_knowing(
             return "pass", limit - accepted
         return "fail" if size > limit else "undecided", None if accepted is None else limit - accepted
     if (least := least_probability(rule)) is None:
-        beyond = _beyond(size, u, limit, signed)
-        return _decided(size, u, limit, rule, signed, (_within(size, u, limit, signed, beyond), beyond))
-    known = prior.after(value, u)
-    within, beyond = known.within(limit, signed=signed), known.beyond(limit, signed=signed)
+        return _decided(size, u, limit, rule, signed, _beyond(size, u, limit, signed), unstated)
+    both = [prior.after(side * value, u) for side in ((1, -1) if signed and prior.mean else (1,))]
+    within = min(known.within(limit, signed=signed) for known in both)
+    beyond = max(known.beyond(limit, signed=signed) for known in both)
     outcome = _by_probability(size, limit, within, beyond, 1 - least)
     side = -1.0 if signed and value < 0 else 1.0
     return outcome, _posterior_band(u, limit, 1 - least, signed, prior, side)

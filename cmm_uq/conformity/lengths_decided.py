@@ -17,8 +17,9 @@ from cmm_uq.conformity.plans import Condition
 from cmm_uq.conformity.remeasured import Again, with_standing
 from cmm_uq.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
 from cmm_uq.conformity.short_gauge import added_in_words
-from cmm_uq.conformity.standard import Test
+from cmm_uq.conformity.standard import NOT_STATED, Test
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TestUncertainty
 from cmm_uq.messages import NOTHING, Text, plural, say, semicolons
@@ -112,27 +113,28 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
 def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = None) -> Statement:
     """Range of the first repeats of each length in each place, against the limit of repeatability.
 
-    What the artefact's certificate leaves uncertain is common to the repeats and cancels: u is what of it changes between them
-    (``[test_uncertainty] u_repeat_um``).
+    What the artefact's certificate leaves uncertain is common to the repeats and cancels: u is what of it changes between them.
     """
     found = test.indications()
     rows = _of_this_test(test, found, chosen)
-    u = test.circumstances.uncertainty.u_repeat_um
-    test.refuse_without_uncertainty(u, "u_repeat_um")
+    least = u_of_repeats(float(found.lengths[rows].min()), test.circumstances)
+    test.refuse_without_uncertainty(least, "u_repeat_um")
     points, first = test.artefact.points, found.rows[:, 0]
     position, both = lines(test.artefact, found), test.artefact.bidirectional(found.rows)
     kind = np.zeros(len(found.rows), dtype=np.int64) if both is None else both.astype(np.int64)
     aside = test.set_aside(found.rows)
     keys = np.column_stack([points.measurement[first], nominals(found.lengths), kind])
-    items = []
+    items, single = [], []
     for key in dict.fromkeys(map(tuple, keys[rows])):
         own = rows[np.all(keys[rows] == key, axis=1)]
         own = own[np.isin(points.repeat[first[own]], np.unique(points.repeat[first[own]])[:repeats])]
+        length = float(found.lengths[own].mean())
         if len(np.unique(points.repeat[first[own]])) < 2:
+            single.append(say("repeats of {length:.5g} mm in measurement {number}", length=length, number=int(key[0])))
             continue
-        value, length = float(np.ptp(found.errors[own])) / MICROMETRE, float(found.lengths[own].mean())
+        value = float(np.ptp(found.errors[own])) / MICROMETRE
         limit = float(test.limits_um(np.array([length]))[0])
-        known = test.at_least(u, length)
+        known = test.at_least(u_of_repeats(length, test.circumstances), length)
         items.append(Decided(
             value, known, limit, test.decide(value, known, limit, signed=False), int(key[0]), None, length,
             position[own[0]], set_aside=bool(aside[own].any()),
@@ -145,15 +147,15 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
             count=len(items),
         ),
         say(
-            "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is [test_uncertainty] "
-            "u_repeat_um."
+            "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge changes "
+            "between them."
         )
-        if u > 0
-        else say("u_repeat_um is not stated: no uncertainty is considered, and no probability can be given."),
+        if least > 0
+        else NOT_STATED,
     ]
     quantity = say("range of repeated lengths, worst against its limit")
     return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats,
-                       causes=_each_its_own([item.u_um for item in items]))  # fmt: skip
+                       causes=_each_its_own([item.u_um for item in items]), lacking=single)  # fmt: skip
 
 
 def length_unstated(artefact: ArtefactFacts) -> str | None:
@@ -206,7 +208,7 @@ def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
             "the length named; nothing else is stated ([test_uncertainty]).",
             u_um=worst.u_um,
         )  # fmt: skip
-    return say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
+    return NOT_STATED
 
 
 def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:

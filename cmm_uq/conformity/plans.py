@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cmm_uq.conformity.measurement_lines import FACE_DIAGONALS, PARALLELS, SPACE_DIAGONALS
-from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, say
 from cmm_uq.points import Floats
 
 
@@ -143,10 +143,12 @@ class Condition:
     ----------
     what : it asks, and how much of it there is.
     missing : what is not there, each in words; nothing when the condition is met.
+    remedy : which key of the job states what is missing, for who writes it.
     """
 
     what: Text
     missing: tuple[Text, ...] = ()
+    remedy: Text = NOTHING
 
     @property
     def met(self) -> bool:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.conformity.plans import Condition
-from cmm_uq.jobs.circumstances import Circumstances
-from cmm_uq.messages import Verbatim, say
+from cmm_uq.jobs.circumstances import Circumstances, RatedConditions
+from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.points import Points
 
 SECONDS_PER_HOUR = 3600.0
@@ -16,9 +16,13 @@ _ROUNDING = 1e-9
 
 
 def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Condition, ...]:
-    """Those that the job states; what was not recorded is not shown to be met."""
+    """Those that the job states; what was not recorded is not shown to be met, and limits hold for stated conditions only."""
     rated = circumstances.rated
     found = []
+    if rated.temperature_c is None and rated.declared is None:
+        what = say("rated conditions: the temperatures for which the limits hold are not stated")
+        remedy = Verbatim('temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }')
+        found.append(Condition(what, (what,), remedy))
     if rated.temperature_c is not None:
         found.append(_temperature(points, *rated.temperature_c))
     if rated.change_k_per_h is not None:
@@ -36,6 +40,15 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
             lacks = say("{asked} ({given})", asked=asked, given=Verbatim(given) if given else say("not stated"))
             found.append(Condition(asked, () if met else (lacks,)))
     return tuple(found)
+
+
+def rated_in_words(rated: RatedConditions) -> list[Text]:
+    """Who answers for rated conditions that are not stated, and why."""
+    given = rated.declared
+    if given is None:
+        return []
+    by, reason = Verbatim(given.by), Verbatim(given.reason.rstrip(". "))
+    return [say("Rated conditions: declared to be met by {by}: {reason}.", by=by, reason=reason)]
 
 
 def _recorded(points: Points) -> list[str]:

@@ -10,8 +10,9 @@ import numpy as np
 
 from cmm_uq.conformity.plans import Condition, RepeatPlan, SpherePlan
 from cmm_uq.conformity.shared_causes import Causes, length_budget
-from cmm_uq.conformity.standard import Test
+from cmm_uq.conformity.standard import NOT_STATED, Test
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import Text, say
@@ -68,7 +69,7 @@ def size_error(test: Test) -> Statement:
     told = (
         say("u is the test uncertainty (ISO/TS 17865, as that of a length by ISO/TS 23165): {u:.2g} µm.", u=u)
         if u > 0
-        else say("u_um is not stated: no uncertainty is considered, and no probability can be given.")
+        else NOT_STATED
     )
     causes = Causes(np.full((len(items), 1), known), np.zeros(len(items)), np.arange(len(items)))
     return test.stated(say("probing size error"), say("points"), items, [told, *_largest(items)], causes=causes,
@@ -86,7 +87,7 @@ def range_of_centres(test: Test) -> Statement:
     if probed.centres is None:
         raise CmmUqError(f"{test.facts.standard} compares middles of a sphere, and the {test.artefact.kind} has none",
                          where=f"job.toml {test.key} standard", fix="Leave the statement out")  # fmt: skip
-    u = test.circumstances.uncertainty.u_repeat_um
+    u = u_of_repeats(test.artefact.sizes[0].nominal, test.circumstances)
     test.refuse_without_uncertainty(u, "u_repeat_um")
     limit = float(test.limits_um(np.array([test.artefact.sizes[0].nominal]))[0])
     known = test.at_least(u, test.artefact.sizes[0].nominal)
@@ -98,11 +99,7 @@ def range_of_centres(test: Test) -> Statement:
             items.append(Decided(value, known, limit, test.decide(value, known, limit, signed=False), int(number),
                                  set_aside=test.set_aside_in(int(number))))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of one sphere in its place")
-    told = (
-        say("u is what of the sphere changed between the repeats ([test_uncertainty] u_repeat_um).")
-        if u > 0
-        else say("u_repeat_um is not stated: no uncertainty is considered, and no probability can be given.")
-    )
+    told = say("u is what of the sphere changed between the repeats.") if u > 0 else NOT_STATED
     return test.stated(say("range of the middle of a fixed ball"), say("ranges"), tuple(items), [told], signed=False)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 
 from cmm_uq.conformity.as_recorded import LeftOut, numbered
 from cmm_uq.conformity.copies import copies_in_words
-from cmm_uq.conformity.decision import Decision, decide, needs_uncertainty
+from cmm_uq.conformity.decision import Decision, decide, needs_uncertainty, rule_words
 from cmm_uq.conformity.plans import Condition
-from cmm_uq.conformity.rated import rated_conditions
+from cmm_uq.conformity.rated import rated_conditions, rated_in_words
 from cmm_uq.conformity.risk import Known, Risks, global_risks
 from cmm_uq.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.conformity.statement import Decided, Statement, counted, least_favourable
+from cmm_uq.conformity.uncertainty_lines import declared_in_words, uncertainty_conditions, with_declared
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
@@ -31,11 +33,16 @@ from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE, unit
+from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
+
+LARGEST_EXPANSION = 25e-6
+"""1/K; of what gauges are made of, aluminium expands most."""
 
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
 )
+
+NOT_STATED = say("No uncertainty is stated above zero: none is considered, and no probability can be given.")
 
 RAISED = say(
     "Where the test uncertainty evaluated is smaller, u is half of the laboratory's calibration and measurement capability "
@@ -79,6 +86,7 @@ class Characteristic:
     also : other names of it.
     needs : the key of ``[test_uncertainty]`` without which a rule with an uncertainty says nothing.
     beside : how a short gauge recorded beside the artefact enters; not at all where left out.
+    lines : of the test uncertainty that apply; see :mod:`cmm_uq.conformity.uncertainty_lines`.
     """
 
     name: str
@@ -90,6 +98,7 @@ class Characteristic:
     also: tuple[str, ...] = ()
     needs: str | None = None
     beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
+    lines: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,7 +138,11 @@ class Standard:
         if wish.rule == "simple":
             return None
         asked = self.characteristic(wish.characteristic)
-        if asked.needs is not None and not getattr(stated, asked.needs):
+        if asked.lines and all(stated.declared(line) for line in asked.lines):
+            return None
+        if asked.needs is not None and not (
+            getattr(stated, asked.needs) or stated.u_temperature_k or stated.u_fixturing_um
+        ):
             return asked.needs
         return asked.unstated(artefact)
 
@@ -196,9 +209,34 @@ class Test:
             return most
         return np.asarray(np.minimum(mpe.a_um + lengths_mm / mpe.k, most), dtype=np.float64)
 
+    @cached_property
+    def unstated(self) -> tuple[Condition, ...]:
+        """Lines of the test uncertainty that are neither stated nor declared."""
+        return uncertainty_conditions(self.characteristic.lines, self.recorded, self.circumstances)
+
     def decide(self, value_um: float, u_um: float, limit_um: float, *, signed: bool) -> Decision:
-        """One value by the rule and the prior of the job."""
-        return decide(value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um))
+        """One value by the rule and the prior of the job.
+
+        Where all lines of the uncertainty are declared negligible every rule comes to simple acceptance. Where some are
+        unknown, they are taken to be as large as the limit before anything is proved to be beyond it.
+        """
+        if u_um <= 0 and not self.unstated and needs_uncertainty(self.facts.rule):
+            simple = decide(value_um, 0.0, limit_um, "simple", signed=signed)
+            return replace(simple, rule=rule_words(self.facts.rule))
+        unstated = float(np.hypot(limit_um, self._uncorrected_um)) if self.unstated else 0.0
+        return decide(
+            value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um), unstated=unstated
+        )
+
+    @cached_property
+    def _uncorrected_um(self) -> float:
+        """What of the longest length's expansion may not be corrected, µm: of one whose coefficient is not stated."""
+        recorded = self.recorded.points.columns.get("temp_artefact_c")
+        found = self.recorded.indications()
+        if self.circumstances.cte_per_k is not None or recorded is None or found is None:
+            return 0.0
+        away = float(np.abs(recorded - REFERENCE_TEMPERATURE).max())
+        return float(found.lengths.max()) / MICROMETRE * away * LARGEST_EXPANSION
 
     def least_u(self, lengths_mm: Floats) -> Floats:
         """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.
@@ -241,7 +279,7 @@ class Test:
         ------
         CmmUqError : with the key and the fix.
         """
-        if u <= 0 and needs_uncertainty(self.facts.rule):
+        if u <= 0 and needs_uncertainty(self.facts.rule) and self.unstated:
             problem, fix = needed(name, self.facts)
             raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
 
@@ -261,6 +299,7 @@ class Test:
     def stated(
         self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text], *,
         signed: bool = True, causes: Causes | None = None, budget: Budget | None = None, repeats: int | None = None,
+        lacking: Sequence[Text] = (),
     ) -> Statement:  # fmt: skip
         """What was decided, with what the test lacks, and what the rule leaves out.
 
@@ -274,10 +313,13 @@ class Test:
         causes : of the uncertainty of each item, from which follows the probability that all conform.
         budget : of the least favourable one.
         repeats : up to which a repeat has every point of its measurement; all of them by default.
+        lacking : what could not be decided of what was recorded.
         """
         asked = (
             *self.characteristic.conditions(self.recorded, recorded=True),
             *self.characteristic.asks(self),
+            *(Condition(what, (what,)) for what in lacking),
+            *self.unstated,
             *rated_conditions(self.circumstances, self.recorded.points),
             *numbered(self.recorded.points if self.left_out is None else self.left_out.recording, repeats),
         )
@@ -292,16 +334,20 @@ class Test:
             more.append(RAISED)
         if copies := copies_in_words(self.recorded.points):
             more.append(copies)
-        missing = tuple(text for condition in asked for text in condition.missing)
         aside = [item for item in items if item.set_aside]
         outside = () if self.left_out is None else self.left_out.without_value
         if self.left_out is not None and (aside or outside):
             more = [*self.left_out.in_words([item.measurement for item in aside] if not outside else [None]), *more]
         more = [*_set_aside(self.circumstances.set_aside), *more]
         joint = None if causes is None or outside or counted(aside) else _joint(items, causes, signed)
+        lines, stated = self.characteristic.lines, self.circumstances.uncertainty
+        more += [*declared_in_words(lines, stated), *rated_in_words(self.circumstances.rated)]
+        if budget is not None:
+            budget = with_declared(budget, lines, stated)
+        missing = {text: condition.remedy for condition in asked for text in condition.missing}
         return Statement(
-            self.facts, self.characteristic.name, quantity, measured, items, missing, (*remarks, *more), signed,
-            joint, budget, self._risks(worst, signed), outside,
+            self.facts, self.characteristic.name, quantity, measured, items, tuple(missing), (*remarks, *more), signed,
+            joint, budget, self._risks(worst, signed), outside, tuple(missing.values()),
         )  # fmt: skip
 
     def _raised(self, items: Sequence[Decided]) -> bool:

@@ -50,6 +50,7 @@ from cmm_uq.conformity.spheres_decided import (
 )
 from cmm_uq.conformity.standard import Characteristic, Standard, Test, characteristic_of
 from cmm_uq.conformity.statement import Statement
+from cmm_uq.conformity.uncertainty_lines import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts
@@ -76,14 +77,16 @@ def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:
 _E0 = Characteristic(
     "E0", LENGTHS, partial(errors_of_indication, chosen=at_offset(0.0), again=AGAIN), partial(conditions, ISO_10360_2),
     length_unstated, _asked_of_gauges, beside=supplemented,
+    lines=LENGTH_LINES,
 )  # fmt: skip
 _R0 = Characteristic(
     "R0", LENGTHS, partial(repeatability_range, repeats=3, chosen=at_offset(0.0)), partial(conditions, ISO_10360_2),
-    asks=_short_gauge_repeated, needs="u_repeat_um", beside=supplemented,
+    asks=_short_gauge_repeated, needs="u_repeat_um", beside=supplemented, lines=REPEAT_LINES,
 )  # fmt: skip
 _E150 = Characteristic(
     "E150", LENGTHS, partial(errors_of_indication, chosen=at_offset(150.0), again=AGAIN),
     partial(best_of, ISO_10360_2_OFFSET), length_unstated, _asked_of_gauges, beside=supplemented,
+    lines=LENGTH_LINES,
 )  # fmt: skip
 _SPHERE = (partial(conditions, ISO_10360_5), partial(diameter_allowed, plan=ISO_10360_5))
 
@@ -94,37 +97,38 @@ def _superseded(by: str) -> tuple[Text, ...]:
 
 _STANDARDS = (
     Standard("ASME B89.4.1-1997", (
-        Characteristic("volumetric performance", BARS, volumetric_performance, partial(conditions, B89)),
+        Characteristic("volumetric performance", BARS, volumetric_performance, partial(conditions, B89),
+                       lines=REPEAT_LINES),
         Characteristic("repeatability", FORMS, range_of_centres, partial(repeats_of_sphere, B89_REPEATABILITY),
-                       needs="u_repeat_um"),
+                       needs="u_repeat_um", lines=REPEAT_LINES),
         Characteristic("linear displacement accuracy", LENGTHS,
                        partial(errors_of_indication, chosen=on_lines(B89_LINEAR.positions)),
-                       partial(conditions, B89_LINEAR), length_unstated),
+                       partial(conditions, B89_LINEAR), length_unstated, lines=LENGTH_LINES),
         Characteristic("offset probe performance", BARS, offset_probe, partial(offset_positions, B89_OFFSET),
-                       needs="u_repeat_um"),
+                       needs="u_repeat_um", lines=REPEAT_LINES),
         Characteristic("bidirectional length", LENGTHS,
                        partial(errors_of_indication, chosen=short(B89_BIDIRECTIONAL.longest_mm)),
-                       partial(orientations, B89_BIDIRECTIONAL), length_unstated),
+                       partial(orientations, B89_BIDIRECTIONAL), length_unstated, lines=LENGTH_LINES),
     ), _superseded("ASME B89.4.10360.2-2008")),
     Standard("ASME B89.4.10360.2-2008", (_E0, _R0, _E150), (
         say("ASME B89.4.10360.2-2008 takes over ISO 10360-2; what it adds to it is not tested here."),
     ), "contacting"),
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
     Standard("ISO 10360-5:2010", (
-        Characteristic("P_FTU", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1]),
-        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1]),
+        Characteristic("P_FTU", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1], lines=FORM_LINES),
+        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1], lines=SIZE_LINES),
     ), _superseded("ISO 10360-5:2020"), "contacting"),
     Standard("ISO 10360-5:2020", (
         Characteristic("P_Form.Sph.1x25:SS:Tact", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1],
-                       ("P_Form.Sph.1x25", "P_Form")),
+                       ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
         Characteristic("P_Size.Sph.1x25:SS:Tact", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1],
-                       ("P_Size.Sph.1x25", "P_Size")),
+                       ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
     ), sensing="contacting"),
     Standard("ISO 10360-8:2013", (
         Characteristic("P_Form.Sph.1x25:Tr:ODS", FORMS, form_error, partial(conditions, ISO_10360_8), form_unstated,
-                       sensing_stated, ("P_Form.Sph.1x25", "P_Form")),
+                       sensing_stated, ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
         Characteristic("P_Size.Sph.1x25:Tr:ODS", FORMS, size_error, partial(conditions, ISO_10360_8), size_unstated,
-                       sensing_stated, ("P_Size.Sph.1x25", "P_Size")),
+                       sensing_stated, ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
     ), sensing="optical"),
     Standard("VDI/VDE 2617", (_E0,), (
         say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."),
@@ -132,7 +136,7 @@ _STANDARDS = (
     ), "contacting"),
     Standard("VDI/VDE 2617-2.1", tuple(
         Characteristic(name, LENGTHS, partial(errors_of_indication, chosen=on_lines(VDI_2617_2_1[name].positions)),
-                       partial(conditions, VDI_2617_2_1[name]), length_unstated)
+                       partial(conditions, VDI_2617_2_1[name]), length_unstated, lines=LENGTH_LINES)
         for name in ("U3", "U1", "U2")
     ), sensing="contacting"),
 )  # fmt: skip

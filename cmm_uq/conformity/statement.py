@@ -1,22 +1,28 @@
-"""A statement of conformity: every quantity decided by itself, what follows from all, and what of the test is missing."""
+"""A statement of conformity: a finding, which every quantity decided by itself makes, and completeness.
+
+A pass needs both. A finding that is worse than a conditional pass is the outcome whatever is missing beside it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Literal
 
 from cmm_uq.conformity.decision import Decision
 from cmm_uq.conformity.risk import Risks
 from cmm_uq.jobs.conformity import ConformityFacts
-from cmm_uq.messages import NOTHING, Text
+from cmm_uq.messages import NOTHING, Text, say
 from cmm_uq.uncertainty.budget import Budget
 
-StatementOutcome = Literal[
-    "pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"
-]  # fmt: skip
+StatementFinding = Literal["pass", "conditional pass", "undecided", "remeasure", "conditional fail", "fail"]
+StatementOutcome = StatementFinding | Literal["incomplete"]
 
-_GRAVEST = ("fail", "remeasure", "conditional fail", "undecided", "conditional pass", "pass")
+GRAVEST: tuple[StatementFinding, ...] = (
+    "fail", "conditional fail", "remeasure", "undecided", "conditional pass", "pass",
+)  # fmt: skip
+"""Findings in the order of their gravity."""
 
 Standing = Literal["counts", "again", "replaced"]
 
@@ -48,7 +54,7 @@ class Decided:
     set_aside: bool = False
 
     @property
-    def outcome(self) -> StatementOutcome:
+    def outcome(self) -> StatementFinding:
         """What follows from it for the test."""
         if self.standing == "again":
             return "remeasure"
@@ -66,13 +72,14 @@ class Statement:
     quantity : what is compared, in words.
     measured : what was measured, in the plural, for "… conform".
     errors : all that was decided, in the recording's order.
-    missing : what the test lacks of its standard's plan, in words.
+    missing : what the test lacks of its standard's plan, or of its uncertainty, in words.
     remarks : what the reader must know of this use of the standard.
     signed : whether limits hold on both sides of zero.
     joint : probability that all quantities conform, what they share being correlated; ``None`` where it is not known.
     budget : uncertainty of the named quantity, line by line; ``None`` where it has none.
     risks : of all machines alike, for the named quantity; ``None`` without a prior.
     outside : readings that the screening left out of the estimates and that have no value, in words: each fails.
+    remedies : of each that is missing, which key of the job would state it; nothing where its words say that.
     """
 
     facts: ConformityFacts
@@ -87,6 +94,15 @@ class Statement:
     budget: Budget | None = None
     risks: Risks | None = None
     outside: tuple[Text, ...] = ()
+    remedies: tuple[Text, ...] = ()
+
+    @property
+    def missing_with_remedies(self) -> tuple[Text, ...]:
+        """What is missing with the keys that would state it, for who wrote the job."""
+        return tuple(
+            say("{what} ({remedy})", what=what, remedy=remedy) if remedy else what
+            for what, remedy in zip_longest(self.missing, self.remedies, fillvalue=NOTHING)
+        )
 
     @property
     def scope(self) -> Literal["complete", "partial"]:
@@ -99,10 +115,14 @@ class Statement:
         return least_favourable(self.errors)
 
     @property
+    def finding(self) -> StatementFinding:
+        """The gravest of all decisions; what is outside without a value fails."""
+        return "fail" if self.outside else self.named.outcome
+
+    @property
     def outcome(self) -> StatementOutcome:
-        """The gravest of all; where nothing stands against the machine, ``incomplete`` if anything is missing."""
-        gravest = "fail" if self.outside else self.named.outcome
-        return "incomplete" if gravest in ("pass", "conditional pass") and self.missing else gravest
+        """The finding; ``incomplete`` where it is a pass, conditional or not, and anything is missing."""
+        return "incomplete" if self.finding in ("pass", "conditional pass") and self.missing else self.finding
 
     @property
     def value_um(self) -> float:
@@ -136,6 +156,6 @@ def least_favourable(errors: Sequence[Decided]) -> Decided:
     def order(item: Decided) -> tuple[int, float, float, float]:
         decision, room = item.decision, item.limit_um - abs(item.error_um)
         within, beyond = decision.probability_conforming, decision.probability_beyond
-        return _GRAVEST.index(item.outcome), 0.0 if within is None else within, -(beyond or 0.0), room
+        return GRAVEST.index(item.outcome), 0.0 if within is None else within, -(beyond or 0.0), room
 
     return min(counted(errors), key=order)

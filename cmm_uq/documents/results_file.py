@@ -249,9 +249,10 @@ def _statement(statement: Statement) -> dict[str, Any]:
         "standard": statement.facts.standard, "characteristic": statement.characteristic,
         "quantity": statement.quantity, "value_um": statement.value_um,
         "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
-        "guard_band_um": statement.decision.guard_band, "decision": statement.outcome,
+        "guard_band_um": statement.decision.guard_band, "decision": statement.outcome, "finding": statement.finding,
         "probability_conforming": statement.decision.probability_conforming, "scope": statement.scope,
-        "missing": list(statement.missing), "remarks": list(statement.remarks), "probability_all_conform": statement.joint,
+        "missing": list(statement.missing_with_remedies), "remarks": list(statement.remarks),
+        "probability_all_conform": statement.joint,
         "mpe": None if statement.facts.mpe is None else statement.facts.mpe.model_dump(),
         "prior": None if statement.facts.prior is None else statement.facts.prior.model_dump(),
         "global_risks": None if statement.risks is None else {

@@ -6,11 +6,63 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.jobs.laboratory import Capability
 from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.jobs.table import Table, Temperature, Uncertainty
+
+
+def _says_something(text: str) -> str:
+    if not text.strip():
+        raise ValueError("must not be empty: the certificate prints it")
+    return text
+
+
+Words = Annotated[str, AfterValidator(_says_something)]
+
+
+class Declared(Table):
+    """What somebody answers for in place of a figure; the certificate prints both."""
+
+    by: Words
+    """Who declares it."""
+    reason: Words
+    """Why."""
+
+
+class MachineLines(Table):
+    """``[test_uncertainty.machine]``: lines of the test uncertainty that are the machine's own, and so what is tested."""
+
+    expansion: Declared | None = None
+    """The machine measures and corrects the artefact's expansion, its coefficient included."""
+    temperature: Declared | None = None
+    """The machine measures and corrects the artefact's temperature."""
+    alignment: Declared | None = None
+    """The machine aligns the artefact."""
+    fixturing: Declared | None = None
+    """The artefact's mounting belongs to the machine."""
+    repeat: Declared | None = None
+    """What changes between repeated readings is the machine's."""
+
+
+class NegligibleLines(Table):
+    """``[test_uncertainty.negligible]``: lines of the test uncertainty that contribute nothing worth counting."""
+
+    calibration: Declared | None = None
+    """Calibration of the artefact."""
+    expansion: Declared | None = None
+    """The artefact's coefficient of expansion."""
+    temperature: Declared | None = None
+    """The artefact's temperature."""
+    alignment: Declared | None = None
+    """Alignment of the artefact."""
+    fixturing: Declared | None = None
+    """Fixturing of the artefact."""
+    form: Declared | None = None
+    """Form deviation of a test sphere, and its calibration."""
+    repeat: Declared | None = None
+    """What of the artefact changes between repeated readings."""
 
 
 class TestUncertainty(Table):
@@ -23,6 +75,7 @@ class TestUncertainty(Table):
     u_alignment_um, u_fixturing_um : of a length, by misalignment and by what the clamping does to it, µm.
     u_form_um : of the calibrated form deviation of a test sphere, µm.
     u_repeat_um : of a range or a difference of repeated readings, by what of the artefact changed between them, µm.
+    negligible, machine : lines that somebody answers for instead.
     """
 
     __test__ = False  # no test of pytest's
@@ -40,6 +93,23 @@ class TestUncertainty(Table):
     u_repeat_um: Uncertainty = 0.0
     """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between
     them."""
+    negligible: NegligibleLines = NegligibleLines()
+    """Lines that are declared negligible, by whom and why."""
+    machine: MachineLines = MachineLines()
+    """Lines that are declared the machine's own, by whom and why."""
+
+    @model_validator(mode="after")
+    def _stated_or_declared(self) -> Self:
+        for line, key in LINE_KEYS.items():
+            where = [table for table in ("negligible", "machine") if getattr(getattr(self, table), line, None)]
+            if len(where) > 1 or (where and getattr(self, key)):
+                raise ValueError(f"{line} is stated more than once: give {key}, or declare it in one table")
+        return self
+
+    def declared(self, line: str) -> Declared | None:
+        """By whom and why a line is declared negligible or the machine's own."""
+        found: Declared | None = getattr(self.negligible, line, None) or getattr(self.machine, line, None)
+        return found
 
     @property
     def of_artefact(self) -> bool:
@@ -47,7 +117,13 @@ class TestUncertainty(Table):
         return any((self.u_cte_per_k, self.u_temperature_k, self.u_alignment_um, self.u_fixturing_um))
 
 
-TEST_KEYS = tuple(TestUncertainty.model_fields)
+LINE_KEYS = {
+    "expansion": "u_cte_per_k", "temperature": "u_temperature_k", "alignment": "u_alignment_um",
+    "fixturing": "u_fixturing_um", "form": "u_form_um", "repeat": "u_repeat_um",
+}  # fmt: skip
+"""Key of each line of the test uncertainty but the calibration, which ``[artefact]`` states."""
+
+TEST_KEYS = tuple(LINE_KEYS.values())
 
 Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2)]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]
@@ -62,6 +138,7 @@ class RatedConditions(Table):
     change_k_per_h : largest change in an hour, K/h.
     difference_k : largest difference between places at one time, K.
     probe, stylus : for which the limits hold, as ``[probe]`` names them.
+    declared : by whom and why the test counts as one under rated conditions, where no rated temperature is stated.
     """
 
     temperature_c: Limits | None = None
@@ -74,6 +151,8 @@ class RatedConditions(Table):
     """Probe for which the limits hold, as `[probe]` names it."""
     stylus: str | None = None
     """Stylus for which the limits hold, as `[probe]` names it."""
+    declared: Declared | None = None
+    """By whom and why the test counts as one under rated conditions, where no rated temperature is stated."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -1,0 +1,162 @@
+"""Whether every line of the test uncertainty that applies is stated above zero, or somebody answers for it.
+
+Of an error of indication ISO/TS 23165:2006 counts calibration, expansion coefficient, temperature, alignment and fixturing of
+the artefact. Of a range of repeats, or of a bar's lengths, the calibration cancels, and what of the artefact changes between
+them is left. A line that is neither stated nor declared is not nought but unknown: no test passes without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.conformity.plans import Condition
+from cmm_uq.jobs.circumstances import LINE_KEYS, Circumstances, TestUncertainty
+from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.model.artefact import Artefact
+from cmm_uq.uncertainty.budget import Budget
+from cmm_uq.units import MICROMETRE
+
+LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")
+"""Of a calibrated length, in the order of its budget."""
+
+SIZE_LINES = LENGTH_LINES[:3]
+FORM_LINES = ("form",)
+REPEAT_LINES = ("repeat",)
+
+_NAMES = {
+    "calibration": say("calibration of the artefact"),
+    "expansion": say("expansion coefficient of the artefact"),
+    "temperature": say("temperature of the artefact"),
+    "alignment": say("alignment of the artefact"),
+    "fixturing": say("fixturing of the artefact"),
+    "form": say("calibration of the form"),
+    "repeat": say("what of the artefact changes between the readings"),
+}
+
+
+def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
+    """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
+    found: list[Condition] = []
+    stated = under.uncertainty
+    for line in lines:
+        met = {"calibration": _calibrated, "repeat": _repeats}.get(line, _stated)
+        if not met(line, artefact, under):
+            found.append(_neither(line))
+    if "form" in lines and not stated.declared("form") and not _form_of_sphere(artefact):
+        found.append(
+            _lacks(say("uncertainty: the form deviation of the test sphere is not stated"), "form_um in [artefact]")
+        )
+    if "expansion" in lines:
+        found += _thermal(artefact, under)
+    return tuple(found)
+
+
+def u_of_repeats(length_mm: float, under: Circumstances) -> float:
+    """Standard uncertainty, µm, of a difference of two readings of one length, by what of it changes between them.
+
+    As ``u_repeat_um`` says, or from temperature and fixturing of each reading; where both are stated whole, the lesser.
+    """
+    by_lines, direct = _two_readings(length_mm, under), under.uncertainty.u_repeat_um
+    if not direct:
+        return 0.0 if under.uncertainty.declared("repeat") else by_lines
+    return min(direct, by_lines) if by_lines and _both_lines(under) else direct
+
+
+def _two_readings(length_mm: float, under: Circumstances) -> float:
+    stated = under.uncertainty
+    warm = length_mm / MICROMETRE * abs(under.cte_per_k or 0.0) * stated.u_temperature_k
+    return float(np.sqrt(2.0) * np.hypot(warm, stated.u_fixturing_um))
+
+
+def _both_lines(under: Circumstances) -> bool:
+    """Whether temperature and fixturing say all that changes between readings."""
+    stated = under.uncertainty
+    known = bool(under.cte_per_k or stated.declared("expansion"))
+    warm = bool(stated.declared("temperature")) or (known and stated.u_temperature_k > 0)
+    return warm and bool(stated.declared("fixturing") or stated.u_fixturing_um)
+
+
+def _repeats(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    return _stated(line, artefact, under) or (_both_lines(under) and _two_readings(1.0, under) > 0)
+
+
+def _stated(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    return bool(getattr(under.uncertainty, LINE_KEYS[line]) or under.uncertainty.declared(line))
+
+
+def _calibrated(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    """Whether each calibrated length, or the size where there are none, has an uncertainty above zero."""
+    found = artefact.indications()
+    u = np.array([artefact.sizes[0].sd]) if found is None else found.u
+    return under.uncertainty.declared(line) is not None or bool(np.all(u > 0))
+
+
+def _form_of_sphere(artefact: Artefact) -> bool:
+    probed = artefact.forms()
+    return probed is not None and probed.certified > 0
+
+
+def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
+    """Expansion coefficient and temperature, without which errors are neither corrected nor uncertain as they are."""
+    stated = under.uncertainty
+    if not under.cte_per_k and not stated.declared("expansion"):
+        yield _lacks(
+            say("uncertainty: the expansion coefficient of the artefact is not stated"),
+            "cte_per_k in [artefact], or expansion in [test_uncertainty.negligible]",
+        )
+    if "temp_artefact_c" in artefact.points.columns:
+        return
+    if stated.machine.temperature is None:
+        yield _lacks(
+            say("uncertainty: the temperature of the artefact during the test was not recorded"),
+            "column temp_artefact_c, or temperature in [test_uncertainty.machine] of a machine that measures and corrects it",
+        )
+    elif not stated.declared("expansion"):
+        yield _lacks(
+            say("uncertainty: how far the artefact was from 20 °C, on which that of its expansion coefficient depends"),
+            "column temp_artefact_c, or expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]",
+        )
+
+
+def _neither(line: str) -> Condition:
+    key = "u_um in [artefact]" if line == "calibration" else f"{LINE_KEYS[line]} in [test_uncertainty]"
+    return _lacks(
+        say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line]),
+        f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]',
+    )
+
+
+def _lacks(what: Text, remedy: str) -> Condition:
+    return Condition(what, (what,), Verbatim(remedy))
+
+
+def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[Text]:
+    """Who answers for which line, and why."""
+    told = []
+    for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
+        negligible, own = getattr(stated.negligible, line, None), getattr(stated.machine, line, None)
+        if negligible:
+            words = {"by": Verbatim(negligible.by), "reason": Verbatim(negligible.reason.rstrip(". "))}
+            told.append(say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line], **words))
+        if own:
+            words = {"by": Verbatim(own.by), "reason": Verbatim(own.reason.rstrip(". "))}
+            told.append(
+                say("{line:capital}: declared the machine's own by {by}: {reason}.", line=_NAMES[line], **words)
+            )
+    return told
+
+
+def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty) -> Budget:
+    """The budget of which each declared line says so; ``lines`` are its first, in their order."""
+    named = [
+        replace(line, name=say("{line} (declared negligible)", line=line.name))
+        if getattr(stated.negligible, name, None)
+        else replace(line, name=say("{line} (declared the machine's own)", line=line.name))
+        if getattr(stated.machine, name, None)
+        else line
+        for line, name in zip(budget.lines, lines, strict=False)
+    ]
+    return replace(budget, lines=[*named, *budget.lines[len(named) :]])
