@@ -1,8 +1,9 @@
 """Tests on a ballbar: the range of its lengths, and what a stylus tip to the side changes (ASME B89.4.1-1997).
 
 Both compare lengths of one bar with each other. What its certificate leaves uncertain is common to them and cancels;
-uncertain is what of the bar changes from one position to the next: its temperature, alignment and fixturing. The machine's own
-scatter is part of what is tested, as it is of ISO 10360-2.
+uncertain is what of the bar changes from one position to the next: its temperature and fixturing. The distance of the centres
+of two balls does not depend on how the bar is aligned. The machine's own scatter is part of what is tested, as it is of ISO
+10360-2.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def volumetric_performance(test: Test) -> Statement:
     artefact, measured = test.artefact, test.accuracy["b89_range_um"]
     bar = artefact.sizes[0].nominal
     budget, told = _budget(test)
-    u = test.at_least(budget.u if budget.u > 0 else measured.u, bar)
+    u = test.at_least(budget.u if budget.u > 0 or test.answered else measured.u, bar)
     limit = float(test.limits_um(np.array([bar]))[0])
     lengths, aside = artefact.lengths(), bool(test.set_aside(artefact.rows).any())
     value = measured.value if lengths is None or not aside else float(np.ptp(lengths)) / MICROMETRE
@@ -51,34 +52,37 @@ def _budget(test: Test) -> tuple[Budget, Text]:
     """Of the difference of two lengths of the bar, and what it says in words."""
     stated, size = test.circumstances.uncertainty, test.artefact.sizes[0]
     two = partial(Line, origin=JUDGEMENT, unit=unit("µm"), sensitivity=float(np.sqrt(2.0)))
-    expansion = (test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE
+    expansion = abs(test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE
+    u = u_of_repeats(size.nominal, test.circumstances)
     lines = [
+        Line(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
+    ] if u == stated.u_repeat_um else [
         Line(say("temperature of the bar, twice"), stated.u_temperature_k, JUDGEMENT, unit=unit("K"),
              sensitivity=float(np.sqrt(2.0)) * expansion),
-        two(say("alignment of the bar, twice"), stated.u_alignment_um),
         two(say("fixturing of the bar, twice"), stated.u_fixturing_um),
-        Line(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
     ]  # fmt: skip
     what = say("range of the lengths of a bar of {length} mm", length=nominal(size.nominal))
     budget = Budget(what, lines, unit=unit("µm"))
     if budget.u > 0:
         return budget, say(
-            "u is the test uncertainty: what of the bar changed between its positions ([test_uncertainty]), {u:.3g} µm. "
+            "u is the test uncertainty: what of the bar changed between its positions, {u:.3g} µm. "
             "What its certificate leaves uncertain is common to all and cancels; the machine's own scatter is part of what "
             "is tested.",
             u=budget.u,
         )  # fmt: skip
+    if test.answered:
+        return budget, NOT_STATED
     if size.certified and size.sd > 0:
         bound = Budget(what, [two(say("certificate of the bar, twice"), size.sd / MICROMETRE, origin=CERTIFICATE)],
                        unit=unit("µm"))  # fmt: skip
         return bound, say(
-            "u is a bound of the test uncertainty, {u:.3g} µm: [test_uncertainty] does not say what of the bar changed "
-            "between its positions, and it is taken to be no more than its certificate leaves uncertain. The machine's own "
-            "scatter is part of what is tested.",
+            "u is a bound of the test uncertainty, {u:.3g} µm: it is not stated what of the bar changed between its "
+            "positions, and it is taken to be no more than its certificate leaves uncertain. The machine's own scatter is "
+            "part of what is tested.",
             u=bound.u,
         )  # fmt: skip
     return budget, say(
-        "Nothing is stated of what the bar leaves uncertain ([test_uncertainty], u_um): in its place u is the machine's own "
+        "Nothing is stated of what the bar leaves uncertain: in its place u is the machine's own "
         "scatter, by which the range would differ if the test were made again."
     )
 

@@ -113,7 +113,7 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
 def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = None) -> Statement:
     """Range of the first repeats of each length in each place, against the limit of repeatability.
 
-    What the artefact's certificate leaves uncertain is common to the repeats and cancels: u is what of it changes between them.
+    What the artefact's certificate leaves uncertain is common to the repeats and cancels: u is what of it changes between.
     """
     found = test.indications()
     rows = _of_this_test(test, found, chosen)
@@ -147,8 +147,8 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
             count=len(items),
         ),
         say(
-            "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge changes "
-            "between them."
+            "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge "
+            "changes between them."
         )
         if least > 0
         else NOT_STATED,

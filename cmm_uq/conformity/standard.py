@@ -214,13 +214,18 @@ class Test:
         """Lines of the test uncertainty that are neither stated nor declared."""
         return uncertainty_conditions(self.characteristic.lines, self.recorded, self.circumstances)
 
+    @property
+    def answered(self) -> bool:
+        """Whether an uncertainty of nought is one that somebody answers for, and not an unknown one."""
+        return bool(self.characteristic.lines) and not self.unstated
+
     def decide(self, value_um: float, u_um: float, limit_um: float, *, signed: bool) -> Decision:
         """One value by the rule and the prior of the job.
 
         Where all lines of the uncertainty are declared negligible every rule comes to simple acceptance. Where some are
         unknown, they are taken to be as large as the limit before anything is proved to be beyond it.
         """
-        if u_um <= 0 and not self.unstated and needs_uncertainty(self.facts.rule):
+        if u_um <= 0 and self.answered and needs_uncertainty(self.facts.rule):
             simple = decide(value_um, 0.0, limit_um, "simple", signed=signed)
             return replace(simple, rule=rule_words(self.facts.rule))
         unstated = float(np.hypot(limit_um, self._uncorrected_um)) if self.unstated else 0.0
@@ -279,7 +284,7 @@ class Test:
         ------
         CmmUqError : with the key and the fix.
         """
-        if u <= 0 and needs_uncertainty(self.facts.rule) and self.unstated:
+        if u <= 0 and needs_uncertainty(self.facts.rule) and not self.answered:
             problem, fix = needed(name, self.facts)
             raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cmm_uq.jobs.circumstances import Circumstances, Declared, NegligibleLines, RatedConditions, TestUncertainty
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
@@ -22,6 +23,12 @@ SEVEN = [*DIAGONALS, *np.eye(3)]
 BAR_U = 0.5 / np.sqrt(2.0)
 """Of a bar's certificate, µm: 0.5 µm of the difference of two of its lengths."""
 
+_BY = Declared(by="A. Muster", reason="put in by hand")
+NEGLIGIBLE = NegligibleLines(expansion=_BY, temperature=_BY, alignment=_BY, fixturing=_BY, form=_BY)
+RATED = RatedConditions(declared=_BY)
+STATED = Circumstances(TestUncertainty(negligible=NEGLIGIBLE, u_repeat_um=0.5), RATED, cte_per_k=11.5e-6)
+"""A test whose uncertainty is the calibration's alone, of ranges half a micrometre, and somebody answers for the rest."""
+
 Errors = Mapping[tuple[int, int, float], float]
 """Error, µm, of the length, mm, of a measurement and repeat."""
 
@@ -30,7 +37,10 @@ def gauge(
     directions: Sequence[Floats] = SEVEN, lengths: Sequence[Sequence[float]] | None = None, *, errors: Errors | None = None,
     repeats: int = 3, u_um: float | None = 0.4, length_mm: float = 800.0, machine: Machine = MACHINE,
 ) -> StepGauge:  # fmt: skip
-    """Each line through the middle of the volume, faces at 0 and at its lengths; repeats differ by 1 nm across the line."""
+    """Each line through the middle of the volume, faces at 0 and at its lengths; repeats differ by 1 nm across the line.
+
+    The first face is met along the line, the others against it.
+    """
     xyz, columns = [], []
     for number, direction in enumerate(directions, 1):
         u = np.asarray(direction) / np.linalg.norm(direction)
@@ -40,11 +50,13 @@ def gauge(
             added = np.array([(errors or {}).get((number, repeat, face), 0.0) for face in faces]) * 1e-3
             start = MIDDLE - 0.5 * faces[-1] * u + 1e-6 * repeat * aside
             xyz.append(start + np.outer(faces + added, u))
-            columns += [(number, i + 1, repeat, face) for i, face in enumerate(faces)]
-    measurement, point, repeated, reference = np.array(columns).T
+            columns += [(number, i + 1, repeat, face, *(u if i == 0 else -u)) for i, face in enumerate(faces)]
+    measurement, point, repeated, reference, *approach = np.array(columns).T
+    named = {f"approach_{a}": along for a, along in zip("xyz", approach, strict=True)}
     points = Points(
-        np.vstack(xyz), whole(measurement), whole(point), whole(repeated), machine, {"reference_mm": reference}
-    )
+        np.vstack(xyz), whole(measurement), whole(point), whole(repeated), machine,
+        {"reference_mm": reference, "temp_artefact_c": np.full(len(reference), 20.0), **named},
+    )  # fmt: skip
     return StepGauge(artefact_facts(kind="step_gauge", length_mm=length_mm, u_um=u_um), points)
 
 

@@ -15,7 +15,7 @@ from cmm_uq.conformity.as_recorded import LeftOut, numbered
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
+from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.jobs.job import RecordingFacts
 from cmm_uq.kinds import artefact_facts, kind_named
@@ -28,7 +28,7 @@ from tests.recordings import bar_facts, screened
 STEP_GAUGE = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
 SPHERE = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.2)
 ISO = {"standard": "ISO 10360-2:2009", "mpe": "2.5 + L/300"}
-UNDER = Circumstances(TestUncertainty(u_repeat_um=0.05))
+UNDER = replace(recorded.STATED, uncertainty=recorded.STATED.uncertainty.model_copy(update={"u_repeat_um": 0.05}))
 
 
 def decided(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.uncertainty.quantity import Quantity
-from tests.conformity.recorded import bars, gauge, sphere
+from tests.conformity.recorded import STATED, bars, gauge, sphere
 from tests.conftest import ROOT
 from tests.recordings import with_columns
 
@@ -30,7 +31,7 @@ E0 = "ISO 10360-2:2009"
 def judged(artefact: Artefact, under: Circumstances | None = None, standard: str = E0, **wish: object) -> Statement:
     facts = ConformityFacts(standard=standard, **({"limit_um": 60.0} | wish))
     span = {"b89_range_um": Quantity(5.0, 3.0, (0.0, 9.0), "µm")}
-    return statement(facts, artefact, span, "[[conformity]] 1", (BARS, FORMS, LENGTHS), None, under)
+    return statement(facts, artefact, span, "[[conformity]] 1", (BARS, FORMS, LENGTHS), None, under or STATED)
 
 
 # --- limits ----------------------------------------------------------------------------------------------------------
@@ -59,7 +60,7 @@ def test_half_a_formula_is_none(mpe: dict[str, float]) -> None:
     (E0, "optical"), ("ISO 10360-5:2010", "optical"), ("ISO 10360-8:2013", "contacting"), ("VDI/VDE 2617-2.1", "optical"),
 ])  # fmt: skip
 def test_a_standard_of_other_probes_is_refused(standard: str, sensing: str) -> None:
-    under = Circumstances(probe=ProbeFacts(sensing=sensing))
+    under = replace(STATED, probe=ProbeFacts(sensing=sensing))
     artefact = gauge() if standard.startswith(("ISO 10360-2", "VDI")) else sphere()
     with pytest.raises(
         CmmUqError, match=rf"{re.escape(standard)} is for (contacting|optical) probes.*ISO 10360-8:2013"
@@ -68,7 +69,7 @@ def test_a_standard_of_other_probes_is_refused(standard: str, sensing: str) -> N
 
 
 def test_b89_takes_any_probe() -> None:
-    assert judged(bars(), Circumstances(probe=ProbeFacts(sensing="optical")), "ASME B89.4.1-1997").scope == "complete"
+    assert judged(bars(), replace(STATED, probe=ProbeFacts(sensing="optical")), "ASME B89.4.1-1997").scope == "complete"
 
 
 def test_a_probe_of_unknown_sort_shows_no_optical_test() -> None:
@@ -112,7 +113,8 @@ def test_a_warm_gauge_of_unknown_expansion_is_remarked() -> None:
     """23 °C: 3 K of 11.5 µm/m are 34.5 µm in a metre."""
     warm = gauge()
     warm.points = with_columns(warm.points, temp_artefact_c=np.full(len(warm.points), 23.0))
-    assert any("up to 3 K from 20 °C" in text and "34 µm wrong in a metre" in text for text in judged(warm).remarks)
+    unknown = judged(warm, replace(STATED, cte_per_k=None))
+    assert any("up to 3 K from 20 °C" in text and "34 µm wrong in a metre" in text for text in unknown.remarks)
     assert not any("from 20 °C" in text for text in judged(warm, Circumstances(cte_per_k=11.5e-6)).remarks)
 
 
@@ -128,9 +130,7 @@ def test_a_test_sphere_has_ten_to_fifty_millimetres(diameter: float, enough: boo
 def test_rated_conditions_that_were_not_kept_make_no_pass() -> None:
     artefact = gauge()
     artefact.points = with_columns(artefact.points, temp_artefact_c=np.full(len(artefact.points), 17.0))
-    kept, broken = (
-        Circumstances(rated=RatedConditions(temperature_c=[low, 22.0]), cte_per_k=11.5e-6) for low in (16.0, 18.0)
-    )
+    kept, broken = (replace(STATED, rated=RatedConditions(temperature_c=[low, 22.0])) for low in (16.0, 18.0))
     assert judged(artefact, kept).outcome == "pass"
     found = judged(artefact, broken)
     assert (found.outcome, found.missing) == ("incomplete", ("rated temperature 18 to 22 °C (17 to 17 °C)",))

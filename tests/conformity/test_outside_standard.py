@@ -13,7 +13,7 @@ from cmm_uq.conformity.standards import BUILT_IN, names, standard_named, stateme
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.model.kind import FORMS, LENGTHS
-from tests.conformity.recorded import gauge, sphere
+from tests.conformity.recorded import STATED, gauge, sphere
 from tests.conftest import ROOT
 from tests.plugin.packages import OUTSIDE_STANDARDS, describe, install
 
@@ -58,7 +58,7 @@ def test_it_decides_by_its_own_code_and_is_held_to_its_own_plan(installed: None)
     artefact = gauge([np.eye(3)[0]], [[100.0, 800.0]], errors={(1, 1, 100.0): 3.0})
     for limit, outcome in ((1.1, "pass"), (0.9, "fail")):
         wish = ConformityFacts(standard=NAME, mpe={"a_um": limit, "k": 1e9})
-        found = statement(wish, artefact, {}, "[[conformity]] 1", [LENGTHS])
+        found = statement(wish, artefact, {}, "[[conformity]] 1", [LENGTHS], None, STATED)
         assert (found.outcome, found.characteristic, found.missing) == (outcome, "mean error", ())
         assert found.named.error_um == pytest.approx(1.0, abs=1e-6)
         assert found.named.u_um == pytest.approx(0.05)
@@ -75,7 +75,7 @@ def test_a_report_states_it_and_names_the_package(installed: None, bar: Path) ->
     assert list(found.conformity["standard"]) == ["ASME B89.4.1-1997", NAME]
     stated = found.results["conformity"][1]
     assert (stated["characteristic"], stated["scope"]) == ("mean error", "partial")
-    assert stated["missing"] == ["40 repeats of 20 lengths"]
+    assert stated["missing"][0] == "40 repeats of 20 lengths"
     assert found.results["software"]["plugins"] == {"outside-standards": "0.1.0"}
     assert "outside-standards 0.1.0" in found.outcome.document.produced_by
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.conformity.rated import rated_conditions
-from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions
+from cmm_uq.jobs.circumstances import Circumstances, Declared, ProbeFacts, RatedConditions
 from cmm_uq.points import Points
 
 
@@ -15,14 +15,20 @@ def lacking(rated: RatedConditions, probe: ProbeFacts | None = None, **columns: 
     number = np.ones(count, dtype=np.int64)
     points = Points(np.zeros((count, 3)), number, number, number, columns={k: np.array(v) for k, v in columns.items()})
     found = rated_conditions(Circumstances(rated=rated, probe=probe or ProbeFacts()), points)
-    return [text for condition in found for text in condition.missing]
+    return [text for condition in found for text in condition.missing if text != UNSTATED]
 
 
+UNSTATED = "rated conditions: the temperatures for which the limits hold are not stated"
 TEMPERATURE = RatedConditions(temperature_c=[18.0, 22.0])
 
 
-def test_nothing_stated_asks_for_nothing() -> None:
-    assert lacking(RatedConditions(), temp_x_c=[35.0]) == []
+def test_limits_hold_for_temperatures_that_are_stated_or_that_somebody_answers_for() -> None:
+    number = np.ones(1, dtype=np.int64)
+    points = Points(np.zeros((1, 3)), number, number, number, columns={"temp_x_c": np.array([20.0])})
+    declared = RatedConditions(declared=Declared(by="A. Muster", reason="by the data sheet any"))
+    for rated, missing in ((RatedConditions(), [UNSTATED]), (declared, []), (TEMPERATURE, [])):
+        found = rated_conditions(Circumstances(rated=rated), points)
+        assert [text for condition in found for text in condition.missing] == missing
 
 
 @pytest.mark.parametrize(("recorded", "met"), [([18.0, 22.0], True), ([17.99, 20.0], False), ([20.0, 22.01], False)])

@@ -14,7 +14,7 @@ from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model.kind import LENGTHS
 from cmm_uq.points import Points
-from tests.conformity.recorded import SEVEN, five, gauge
+from tests.conformity.recorded import SEVEN, STATED, five, gauge
 
 FACTS = ConformityFacts(standard="ISO 10360-2:2009", mpe=MaximumPermissibleError(a_um=2.5, k=300.0))
 SHORT = {i + 1: five(line)[0] for i, line in enumerate(SEVEN)}
@@ -31,14 +31,14 @@ def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 
         both = Points(
             np.vstack([points.xyz, more.xyz]), np.concatenate([points.measurement, more.measurement]),
             np.concatenate([points.point, more.point]), np.concatenate([points.repeat, more.repeat]), points.machine,
-            {"reference_mm": np.concatenate([points.columns["reference_mm"], more.columns["reference_mm"]])},
+            {name: np.concatenate([points.columns[name], more.columns[name]]) for name in points.columns},
         )  # fmt: skip
         artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), both)
     if shuffled is not None:
         rows = np.random.default_rng(shuffled).permutation(len(artefact.points))
         artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), artefact.points.select(rows))
     facts = FACTS.model_copy(update={"standard": standard})
-    return statement(facts, artefact, {}, "[[conformity]] 1", [LENGTHS])
+    return statement(facts, artefact, {}, "[[conformity]] 1", [LENGTHS], None, STATED)
 
 
 def outside(*where: tuple[int, int]) -> dict[tuple[int, int, float], float]:

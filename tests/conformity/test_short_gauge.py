@@ -12,7 +12,6 @@ import pytest
 from cmm_uq.conformity.short_gauge import supplemented
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
-from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.kinds import artefact_facts
@@ -20,7 +19,7 @@ from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model.kind import LENGTHS
 from cmm_uq.points import Floats, Points
-from tests.conformity.recorded import MACHINE, MIDDLE, SEVEN, Errors, bars, gauge
+from tests.conformity.recorded import MACHINE, MIDDLE, SEVEN, STATED, Errors, bars, gauge
 from tests.recordings import with_columns
 
 MPE = MaximumPermissibleError(a_um=2.5, k=300.0)
@@ -60,7 +59,7 @@ def short(
 
 def judged(artefact: StepGauge | Ballbar, beside: ShortGauge | None, **wish: Any) -> Statement:
     facts = ConformityFacts(standard="ISO 10360-2:2009", **({"mpe": MPE} | wish))
-    return statement(facts, artefact, {}, "[[conformity]] 1", (LENGTHS,), None, Circumstances(short_gauge=beside))
+    return statement(facts, artefact, {}, "[[conformity]] 1", (LENGTHS,), None, replace(STATED, short_gauge=beside))
 
 
 def test_lengths_met_from_one_side_pass_with_a_short_gauge_in_every_position_and_never_without() -> None:
@@ -179,5 +178,5 @@ def test_a_ballbar_takes_it_where_it_lies_and_keeps_its_other_bars() -> None:
 def test_other_standards_than_those_of_bidirectional_lengths_do_without_it() -> None:
     facts = ConformityFacts(standard="VDI/VDE 2617-2.1", characteristic="U1", mpe=MPE)
     found = statement(facts, one_sided(), {}, "[[conformity]] 1", (LENGTHS,), None,
-                      Circumstances(short_gauge=short((9.0, 9.0, 9.0))))  # fmt: skip
+                      replace(STATED, short_gauge=short((9.0, 9.0, 9.0))))  # fmt: skip
     assert found.outcome == "pass"

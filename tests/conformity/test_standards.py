@@ -20,7 +20,7 @@ from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.kind import BARS
 from cmm_uq.points import Machine, Points
 from cmm_uq.uncertainty.quantity import Quantity
-from tests.conformity.recorded import BAR_U, DIAGONALS, SEVEN, again, bars, copied_runs, gauge, sphere
+from tests.conformity.recorded import BAR_U, DIAGONALS, SEVEN, STATED, again, bars, copied_runs, gauge, sphere
 from tests.recordings import bar_facts
 
 ISO_2, ISO_5, B89 = "ISO 10360-2:2009", "ISO 10360-5:2010", "ASME B89.4.1-1997"
@@ -42,7 +42,7 @@ def judged(
     wish = ConformityFacts(standard=standard, rule=rule, **limit)
     kind = kind_named(artefact.kind)
     assert kind is not None
-    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.tested)
+    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.tested, None, STATED)
 
 
 def at(bar: Ballbar, machine: Machine) -> Ballbar:
@@ -338,8 +338,8 @@ def test_a_correction_makes_no_copy_a_measurement() -> None:
     """Corrected by an amount that depends on time, a copy is no longer one to the last digit."""
     recorded, wish = again(bars(), {18: 14}), ConformityFacts(standard=B89, limit_um=60.0)
     span = {"b89_range_um": Quantity(5.0, 0.5, (4.0, 6.0), "µm")}
-    assert statement(wish, bars(), span, "", [BARS]).outcome == "pass"
-    assert statement(wish, bars(), span, "", [BARS], recorded).outcome == "incomplete"
+    assert statement(wish, bars(), span, "", [BARS], None, STATED).outcome == "pass"
+    assert statement(wish, bars(), span, "", [BARS], recorded, STATED).outcome == "incomplete"
 
 
 # --- ISO 10360-5 -----------------------------------------------------------------------------------------------------

@@ -16,10 +16,17 @@ from cmm_uq.kinds.sphere.observe import Sphere
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats, Points
 from cmm_uq.uncertainty.quantity import Quantity
-from tests.conformity.recorded import BAR_U, DIAGONALS, MACHINE, SEVEN, bars, gauge, sphere
+from tests.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere
 from tests.recordings import bar_facts, with_columns
 
 X, Y, Z = np.eye(3)
+
+
+def changing(u_um: float) -> Circumstances:
+    """With so much that changes between repeated readings."""
+    return replace(STATED, uncertainty=TestUncertainty(negligible=NEGLIGIBLE, u_repeat_um=u_um))
+
+
 FACES = [np.array(d, dtype=float) for d in ((900, 550, 0), (900, -550, 0), (0, 550, 500), (0, 550, -500), (900, 0, 500),
                                             (900, 0, -500))]  # fmt: skip
 ERROR = 5.0
@@ -67,7 +74,7 @@ def lengths(
                 points, **{f"tip_{a}_mm": np.full(len(points), offset[i]) for i, a in enumerate("xyz")}
             )
         facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=None if how == "no u" else 0.4)
-        return Hand(StepGauge(facts, points), Circumstances(), {}, ERROR, 0.1 * every[0][1] / 200.0, True)
+        return Hand(StepGauge(facts, points), STATED, {}, ERROR, 0.1 * every[0][1] / 200.0, True)
 
     return made
 
@@ -92,12 +99,12 @@ def ranges(how: str) -> Hand:
         xyz[(points.measurement == 7) & (points.repeat == 3)] = xyz[(points.measurement == 7) & (points.repeat == 1)]
         points = points.at(xyz)
     facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
-    stated = Circumstances(TestUncertainty(u_repeat_um=0.0 if how == "no u" else 0.2))
+    stated = changing(0.0 if how == "no u" else 0.2)
     return Hand(StepGauge(facts, points), stated, {}, ERROR, 0.2, False)
 
 
 def volumetric(how: str) -> Hand:
-    """A range of 15 µm; a bar of 0.5/√2 µm in two positions: u = 0.5 µm."""
+    """A range of 15 µm; u = 0.5 µm is stated."""
     made = bars(lengths=[300.0] * 20)
     if how == "incomplete":
         made = bars([(1, 0, 0), (0, 1, 0), (0, 0, 1)])
@@ -105,7 +112,8 @@ def volumetric(how: str) -> Hand:
         xyz = made.points.xyz.copy()
         xyz[made.points.measurement == 18] = xyz[made.points.measurement == 14]
         made = Ballbar(bar_facts(300.0, BAR_U), made.points.at(xyz))
-    return Hand(made, Circumstances(), {"b89_range_um": Quantity(15.0, 3.0, (9.0, 21.0), "µm")}, 15.0, 0.5, False)
+    under = changing(0.0 if how == "no u" else 0.5)
+    return Hand(made, under, {"b89_range_um": Quantity(15.0, 3.0, (9.0, 21.0), "µm")}, 15.0, 0.5, False)
 
 
 def opposite_tips(how: str) -> Hand:
@@ -123,7 +131,7 @@ def opposite_tips(how: str) -> Hand:
         xyz = points.xyz.copy()
         xyz[points.measurement == 8] = xyz[points.measurement == 7]
         points = points.at(xyz)
-    stated = Circumstances(TestUncertainty(u_repeat_um=0.0 if how == "no u" else 0.2))
+    stated = changing(0.0 if how == "no u" else 0.2)
     return Hand(Ballbar(bar_facts(300.0, BAR_U), points), stated, {}, 10.0, 0.2, True)
 
 
@@ -138,7 +146,7 @@ def fixed_ball(how: str) -> Hand:
     repeat = np.repeat(np.arange(1, count + 1), len(one))
     points = Points(xyz, np.ones_like(repeat), np.tile(one.point, count), repeat, MACHINE)
     facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.2)
-    stated = Circumstances(TestUncertainty(u_repeat_um=0.0 if how == "no u" else 0.2))
+    stated = changing(0.0 if how == "no u" else 0.2)
     return Hand(Sphere(facts, points), stated, {}, ERROR, 0.2, False)
 
 
@@ -153,7 +161,10 @@ def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
         artefact = Sphere(facts, artefact.points)
         found = artefact.probed()
         value = float((found.size if size else found.form)[0]) * 1e3
-        return Hand(artefact, Circumstances(probe=ProbeFacts(sensing=sensing)), {}, value, 0.1, size)
+        under = replace(STATED, probe=ProbeFacts(sensing=sensing))
+        if not size:
+            under = replace(under, uncertainty=TestUncertainty(u_form_um=1e-6))
+        return Hand(artefact, under, {}, value, 0.1, size)
 
     return made
 
