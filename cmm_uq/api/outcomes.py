@@ -153,14 +153,15 @@ class Report(Found):
         return found
 
     def _said(self) -> str:
-        decided = [f"{each['standard']} {each['decision']}" for each in self.results.get("conformity", [])]
+        decided = [f"{one.by or one.name} {one.outcome}" for one in self.outcome.verdicts]
         return ", ".join([f"{len(self.estimates)} estimates", *decided, *filter(None, [self.diagnosis.get("verdict")])])
 
     def _tables(self) -> list[str]:
         decided = [
-            (each["standard"], f"{each['value_um']:.4g} µm", f"{each['limit_um']:.4g} µm", each["decision"])
-            for each in self.results.get("conformity", [])
-        ]
+            (one.by or str(one.title), *("–" if size is None else f"{size:.4g} {one.unit}" for size in (one.value, one.limit)),
+             one.outcome)
+            for one in self.outcome.verdicts
+        ]  # fmt: skip
         heads = ("Quantity", "Value ± U (95 %)", "Unit")
         return [
             html_table("Estimates", heads, shown(self.estimates)),

@@ -14,6 +14,7 @@ from cmm_uq.recertification.drift import history
 from cmm_uq.recertification.fleet import Fleet, Member, fit_fleet
 from cmm_uq.recertification.fleet_found import FleetFound, judged
 from cmm_uq.records import open_records
+from cmm_uq.records.listing import outcomes_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,12 +47,14 @@ def fleet(
             for machine in frame.drop_duplicates("name")["machine"]
             for name, series in records.series(machine).items()
         }
+        newest = frame.drop_duplicates(["machine", "name"], keep="last")
+        stated = outcomes_of(records, set(newest["entry"].tolist()))
     wanted = _wanted(frame, names, known)
     learnt = []
     for i, name in enumerate(wanted):
         rows = frame[frame["name"] == name]
         usable = rows[np.isfinite(rows["value"]) & np.isfinite(rows["u"]) & (rows["u"] > 0)]
-        members = tuple(_members(usable, adjusted))
+        members = tuple(_members(usable, adjusted, stated))
         quantity, unit = called.get(name, (name, ""))
 
         def told(part: float, i: int = i, quantity: str = quantity) -> None:
@@ -97,7 +100,9 @@ def _wanted(frame: pd.DataFrame, names: Collection[str], known: Collection[str])
     return sorted(limited or there)
 
 
-def _members(rows: pd.DataFrame, adjusted: Mapping[str, int]) -> Iterator[Member]:
+def _members(
+    rows: pd.DataFrame, adjusted: Mapping[str, int], stated: Mapping[int, Mapping[str, str]]
+) -> Iterator[Member]:
     """Machines with what their certificates say; the newest limit, model and place count, and the newest adjustment."""
     for machine, of in rows.groupby("machine", sort=True):
         last, known = of.iloc[-1], history(_Columns(of), adjusted.get(str(machine)))
@@ -105,6 +110,7 @@ def _members(rows: pd.DataFrame, adjusted: Mapping[str, int]) -> Iterator[Member
         yield Member(
             str(machine), str(last["model"] or ""), str(last["place"] or ""), known,
             float(limits.iloc[-1]) if len(limits) and limits.iloc[-1] > 0 else None,
+            stated.get(int(last["entry"]), {}).get(str(last["name"]), ""),
         )  # fmt: skip
 
 

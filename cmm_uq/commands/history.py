@@ -8,6 +8,7 @@ from pathlib import Path
 from cmm_uq.commands.fleet_file import read_fleet
 from cmm_uq.recertification.history import MachineHistory, machine_history
 from cmm_uq.records import open_records
+from cmm_uq.records.listing import outcomes_of
 
 FILES = ("history.html", "history.json")
 
@@ -33,7 +34,10 @@ def history_of(
     with open_records(where, read_only=True) as records:
         found = records.machine(machine)
         certificates = records.certificates(found.serial, values=False)
-        return machine_history(found, certificates, records.series(found.serial), day, learnt.of(found))
+        series = records.series(found.serial)
+        entries = (one.entry[one.day <= day.toordinal()] for one in series.values())
+        stated = outcomes_of(records, {int(until[-1]) for until in entries if len(until)})
+        return machine_history(found, certificates, series, day, learnt.of(found), stated)
 
 
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:

@@ -7,6 +7,7 @@ from cmm_uq.documents.document import Block, Column, Document, Facts, Overview, 
 from cmm_uq.documents.history_words import HEADINGS, STATE_WORDS, WORDS, meets, notes, value_row
 from cmm_uq.documents.trend_plot import trend_plot
 from cmm_uq.documents.wording import OUTCOME_WORDS
+from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.messages import DASH, Text, Verbatim, commas, day, plural, say
 from cmm_uq.recertification.history import MachineHistory
 from cmm_uq.records import Certificate
@@ -45,13 +46,18 @@ def overview_of(history: MachineHistory) -> Overview:
     beyond = [Verbatim(one.series.quantity) for one in history.values if one.beyond]
     probable = [Verbatim(one.series.quantity) for one in history.values if one.probably_beyond(history.on)]
     changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)]
-    standing: Standing = "bad" if beyond else "open" if probable or changed or not history.values else "good"
+    last = history.decision
+    fails, open_ = bool(beyond) or last in BEYOND, last not in (*BEYOND, "pass", NONE)
+    standing: Standing = "bad" if fails else "open" if open_ or probable or changed or not history.values else "good"
     verdicts = (
-        (not history.values, say("Nothing is recorded yet")), (bool(beyond), say("Beyond its limits")),
+        (not history.values, say("Nothing is recorded yet")), (fails, say("Beyond its limits")),
+        (open_, say("Its last certificate does not state that it conforms")),
         (bool(probable), say("Probably beyond a limit by now")), (bool(changed), say("Changed since the last time")),
     )  # fmt: skip
     verdict = next((text for holds, text in verdicts if holds), say("No change that stands out"))
     rows: list[tuple[Text, Text]] = []
+    if last != NONE:
+        rows.append((say("Last decision"), OUTCOME_WORDS.get(last, Verbatim(last))))
     if beyond:
         rows.append((say("Beyond a limit"), commas(beyond)))
     if changed:

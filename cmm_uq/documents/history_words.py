@@ -133,6 +133,7 @@ def history_data(history: MachineHistory) -> dict[str, Any]:
             "serial": machine.serial, "name": machine.name, "manufacturer": machine.manufacturer, "model": machine.model,
             "place": machine.place, "adjusted": [one.isoformat() for one in machine.adjusted],
         },
+        "decision": history.decision,
         "remarks": [str.__str__(text) for text in history.remarks],
         "certificates": [
             {"entry": one.entry, "job": one.job, "number": one.number, "date": one.day.isoformat(), "state": one.state,
@@ -152,6 +153,7 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
     )
     found: dict[str, Any] = {
         "quantity": series.quantity, "unit": series.unit, "limit": series.limit, "beyond_limit": one.beyond,
+        "outcome": one.outcome or None,
         "recorded": [
             {"date": date, "value": float(value), "u": float(u), "u_artefact": float(common), "artefact": str(artefact),
              "entry": int(entry), "interim": bool(interim)}

@@ -15,12 +15,13 @@ from decimal import Decimal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from cmm_uq.jobs.reported import Reported
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.units import UNITS, Unit, printed_unit
 
 SPACE = "http://qifstandards.org/xsd/qif3"
 VERSION = "3.0.0"
 
-_STATUS = {"pass": "PASS", "fail": "FAIL", "in": "PASS", "out": "FAIL"}
+_STATUS = {"pass": "PASS", "fail": "FAIL"}
 """Outcomes that QIF has a word for; others are said in their own."""
 
 _DOCUMENTS = uuid.UUID("6f1a7c60-3f0e-5e1b-9f7d-0b1c5d2f4a10")
@@ -95,11 +96,9 @@ def qif(results: Reported) -> bytes:
             "CharacteristicMeasurements",
             numbered.lists["Measurement"],
         )
-    decisions = [
-        *(one.decision for one in results.conformity),
-        *(one.outcome for one in _factors(results) if one.limit),
-    ]
-    _text(SubElement(measurement, "InspectionStatus"), "InspectionStatusEnum", _whole(decisions))
+    # of anything between, an incomplete test among them, QIF can only say that it is not known
+    whole = _STATUS.get(_verdicts(results).overall, "UNKNOWN")
+    _text(SubElement(measurement, "InspectionStatus"), "InspectionStatusEnum", whole)
     indent(root)
     content = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{content}\n'.encode()
@@ -127,13 +126,18 @@ def _tested(results: Reported) -> Iterator[Value]:
 def _factors(results: Reported) -> Iterator[Value]:
     """Every error factor that is determined."""
     free = {name for combination in results.identifiability.undetermined for name in combination}
+    limited = {one.name: one for one in _verdicts(results) if not one.by}
     for effect, parameters in results.estimates.items():
-        judged = results.tolerances.get(effect, {})
         for name, one in parameters.items():
-            unit, limit = printed_unit(name), judged.get(name)
+            unit, verdict = printed_unit(name), limited.get(f"{effect}.{name}")
             if f"{effect}.{name}" not in free and isinstance(unit, Unit):
-                held = limit if isinstance(limit, float) else None
-                yield Value(f"{effect}.{name}", effect, one.value, one.u, held, unit, str(judged.get("verdict", "")))
+                yield Value(f"{effect}.{name}", effect, one.value, one.u, verdict.limit if verdict else None, unit,
+                            verdict.outcome if verdict else "")  # fmt: skip
+
+
+def _verdicts(results: Reported) -> Verdicts:
+    """Every statement of conformity."""
+    return Verdicts.of_results(results.model_dump())
 
 
 def _characteristic(numbered: _Numbered, named: str, limit: float, unit: Unit, values: list[Value]) -> None:
@@ -173,13 +177,6 @@ def _status(parent: Element, what: str, outcome: str) -> None:
         _text(parent, f"Other{what}Status", outcome or "not decided")
 
 
-def _whole(decisions: Sequence[str]) -> str:
-    """All pass, or one fails; of anything between, an incomplete test among them, QIF can only say that it is not known."""
-    if any(_STATUS.get(one) == "FAIL" for one in decisions):
-        return "FAIL"
-    return "PASS" if decisions and all(_STATUS.get(one) == "PASS" for one in decisions) else "UNKNOWN"
-
-
 def _units(parent: Element, units: set[Unit]) -> None:
     primary = SubElement(parent, "PrimaryUnits")
     length = SubElement(primary, "LinearUnit")
@@ -197,8 +194,8 @@ def _units(parent: Element, units: set[Unit]) -> None:
 def _attributes(parent: Element, results: Reported, values: Sequence[Value]) -> None:
     """Origin and decisions in words, and error factors without a tolerance."""
     said = [("origin of the recording", results.job.origin)]
-    said += [(f"decision by {' '.join(filter(None, (one.standard, one.characteristic)))}", one.decision)
-             for one in results.conformity]  # fmt: skip
+    said += [(f"decision by {one.called}" if one.by else f"decision on {one.name} by its tolerance", one.outcome)
+             for one in _verdicts(results)]  # fmt: skip
     figures = [(f"{one.definition} ({one.unit.qif})", one.value) for one in values]
     figures += [(f"u of {one.definition} ({one.unit.qif})", one.u) for one in values if one.u is not None]
     held = SubElement(parent, "Attributes", {"n": str(len(said) + len(figures))})

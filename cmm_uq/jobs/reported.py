@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -63,4 +63,5 @@ class Reported(Part):
     conformity: list[Stated] = []
     estimates: dict[str, dict[str, Figure]] = {}
     tolerances: dict[str, dict[str, float | str]] = {}
+    verdicts: dict[str, Any] | None = None
     identifiability: _Identifiability = _Identifiability()

@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.recertification.change import Change, Stated, change, each_of
 from cmm_uq.recertification.normal import two_sided, two_sided_limit
 from cmm_uq.recertification.observed import is_of_machine, part_used
@@ -90,7 +91,7 @@ def _checked(check: Certificate, changes: dict[str, Change], before: dict[str, C
         for name, one in changes.items()
     )  # fmt: skip
     used = part_used(check)
-    beyond = used is not None and used > 1
+    beyond = (used is not None and used > 1) or check.decision in BEYOND
     standing: Standing = "in control" if changes else "nothing compared"
     if abs(furthest) > action or twice or beyond:
         standing = "action"

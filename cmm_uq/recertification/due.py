@@ -11,10 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.recertification.checks import Checked, check_standings
 from cmm_uq.recertification.interval import Interval, interval_by
-from cmm_uq.recertification.observed import BEYOND, Pool, calibrations
+from cmm_uq.recertification.observed import Pool, calibrations
 from cmm_uq.recertification.rule import Rule
 from cmm_uq.records import ArtefactRow, Certificate, Machine
 
@@ -38,6 +39,7 @@ class Due:
     remarks : what else is to be known, a sentence each.
     artefact : serial of the artefact that its last calibration was made with.
     blocked : why no certificate of it can be made as things stand; empty where nothing is in the way.
+    beyond : whether its last certificate finds it beyond its limits: it is overdue from that day on.
     """
 
     item: Literal["machine", "artefact"]
@@ -51,13 +53,14 @@ class Due:
     remarks: tuple[Text, ...] = ()
     artefact: str = ""
     blocked: Text | None = None
+    beyond: bool = False
 
     def state(self, on: dt.date, within: dt.timedelta) -> State:
-        """Overdue before a day, due within a time of it, later, or unknown."""
+        """Overdue before a day or beyond its limits, due within a time of it, later, or unknown."""
         if self.due is None:
             return "unknown"
         left = self.due - on  # and not on + within, which may lie beyond the calendar
-        return "overdue" if left.days < 0 else "due" if left <= within else "later"
+        return "overdue" if left.days < 0 or self.beyond else "due" if left <= within else "later"
 
 
 def after_months(start: dt.date, months: int) -> dt.date:
@@ -118,6 +121,10 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
         remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
     if not of.limited:
         remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
+    elif last.decision not in (*BEYOND, NONE, "pass"):
+        remarks.append(
+            say("Its last certificate does not state that it conforms: {decision}.", decision=Verbatim(last.decision))
+        )
     calibrated_again, reason = _machine_date(of, done, on, pool)
     used = artefacts.get(last.artefact)
     blocked = _blocked(used, on)
@@ -125,17 +132,15 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
         remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.",
                            artefact=Verbatim(used.serial), due=day(used.due)))  # fmt: skip
     return Due("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, reason,
-               tuple(remarks), last.artefact, blocked)  # fmt: skip
+               tuple(remarks), last.artefact, blocked, _is_beyond(of, last, on))  # fmt: skip
 
 
 def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Pool) -> tuple[dt.date, Text]:
     """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
     last, known, rule = done[-1], of.certificates, of.rule
-    since = (*of.machine.adjusted, *(one.adjusted_since for one in known))
-    adjusted = [one for one in since if one is not None and last.day < one <= on]
-    if adjusted:
+    if adjusted := _adjusted_after(of, last, on):
         return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
-    if last.decision in BEYOND:
+    if _is_beyond(of, last, on):
         return last.day, say("its last certificate finds it beyond its limits")
     # the drift model takes checks after the calibration too; other methods count what calibrations found
     seen = known if rule.method == "drift" else known[: known.index(last) + 1]
@@ -143,6 +148,16 @@ def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Poo
     planned = _ends(last.day, interval)
     checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
     return _checked(rule, last, planned, interval.why, checks)
+
+
+def _adjusted_after(of: Known, last: Certificate, on: dt.date) -> list[dt.date]:
+    since = (*of.machine.adjusted, *(one.adjusted_since for one in of.certificates))
+    return [one for one in since if one is not None and last.day < one <= on]
+
+
+def _is_beyond(of: Known, last: Certificate, on: dt.date) -> bool:
+    """Whether its last certificate finds it beyond its limits, and nobody has adjusted it since."""
+    return last.decision in BEYOND and not _adjusted_after(of, last, on)
 
 
 def _ends(start: dt.date, interval: Interval) -> dt.date:

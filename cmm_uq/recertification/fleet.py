@@ -46,13 +46,14 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """A machine of the fleet: its name or serial, its model, its place, and what its certificates say."""
+    """A machine of the fleet: its name or serial, its model, its place, its certificates, and what the last one decides."""
 
     machine: str
     model: str
     place: str
     history: History
     limit: float | None = None
+    outcome: str = ""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.points import Floats
 from cmm_uq.recertification.drift import YEAR
 from cmm_uq.recertification.fleet import Fleet, Member, belonging
@@ -57,8 +58,11 @@ class OfValue:
 
     @property
     def beyond(self) -> NDArray[np.bool_]:
-        """Whether a machine was beyond its limit at its last certificate, (N,)."""
-        return np.asarray(self.median == 0)
+        """Whether a machine was beyond its limit at its last certificate, (N,): as that says, or where it says nothing."""
+        probably = self.median == 0
+        return np.array(
+            [one.outcome in BEYOND if one.outcome else bool(probably[i]) for i, one in enumerate(self.members)]
+        )
 
     def crosses_by(self, day: float) -> NDArray[np.bool_]:
         """Whether a machine that was not crosses its limit by an ordinal, (N,)."""

@@ -9,11 +9,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.messages import Text, day, plural, say
 from cmm_uq.recertification.change import Change, Stated, change
 from cmm_uq.recertification.observed import is_of_machine
 from cmm_uq.recertification.trend import Line, trend
 from cmm_uq.records import Certificate, Machine, Series
+from cmm_uq.records.facts import STANDING
 
 if TYPE_CHECKING:
     from cmm_uq.recertification.crossing import Crossing
@@ -32,6 +34,7 @@ class ValueHistory:
     line : through the values since the last adjustment; ``None`` where they do not give one.
     adjusted_after : ordinal of the machine's newest adjustment; ``None`` where none is known.
     prior : what the machine's fleet taught of this value; ``None`` for the default one.
+    outcome : of the newest certificate's statement on it; empty where it states none.
     """
 
     series: Series
@@ -40,6 +43,7 @@ class ValueHistory:
     line: Line | None
     adjusted_after: int | None = None
     prior: Prior | None = None
+    outcome: str = ""
 
     @cached_property
     def crossing(self) -> Crossing | None:
@@ -59,7 +63,9 @@ class ValueHistory:
 
     @property
     def beyond(self) -> bool:
-        """Whether the last value is beyond its limit."""
+        """Whether the last certificate finds it so; where that states nothing, whether the last value is beyond its limit."""
+        if self.outcome:
+            return self.outcome in BEYOND
         return self.series.limit is not None and abs(float(self.series.value[-1])) > self.series.limit
 
     def probably_beyond(self, on: dt.date) -> bool:
@@ -85,6 +91,12 @@ class MachineHistory:
     values: tuple[ValueHistory, ...]
     remarks: tuple[Text, ...]
 
+    @property
+    def decision(self) -> str:
+        """Of the newest certificate that counts, the gravest of its statements of conformity; ``none`` without any."""
+        standing = [one for one in self.certificates if one.state in STANDING and not one.interim]
+        return standing[-1].decision if standing else NONE
+
     def significant(self, value: ValueHistory) -> bool:
         """Whether a value changed by more than chance among all that are compared."""
         compared = sum(one.change is not None and not one.adjusted for one in self.values)
@@ -97,6 +109,7 @@ def machine_history(
     series: Mapping[str, Series],
     on: dt.date,
     priors: Mapping[str, Prior] | None = None,
+    outcomes: Mapping[int, Mapping[str, str]] | None = None,
 ) -> MachineHistory:
     """The history up to a day.
 
@@ -107,6 +120,7 @@ def machine_history(
     series : its values, by name.
     on : the day; what is dated later does not count.
     priors : what its fleet taught of each value, by name.
+    outcomes : what certificates state of their values, by entry and name.
     """
     known = tuple(one for one in certificates if one.day <= on)
     remarks: list[Text] = []
@@ -123,7 +137,11 @@ def machine_history(
     cut = (_until(one, on) for one in series.values())
     adjusted = max((one.toordinal() for one in machine.adjusted if one <= on), default=None)
     values = tuple(
-        _value(one, adjusted, (priors or {}).get(one.name)) for one in cut if len(one.day) and is_of_machine(one.unit)
+        _value(
+            one, adjusted, (priors or {}).get(one.name), (outcomes or {}).get(int(one.entry[-1]), {}).get(one.name, "")
+        )
+        for one in cut
+        if len(one.day) and is_of_machine(one.unit)
     )
     if values and not any(one.series.limit is not None for one in values):
         remarks.append(say("No certificate has limits, so that none can be met."))
@@ -141,7 +159,7 @@ def _until(series: Series, on: dt.date) -> Series:
     return replace(series, **{name: getattr(series, name)[rows] for name in names})
 
 
-def _value(series: Series, adjusted_after: int | None, prior: Prior | None) -> ValueHistory:
+def _value(series: Series, adjusted_after: int | None, prior: Prior | None, outcome: str) -> ValueHistory:
     changed = None
     adjusted = False
     if len(series.day) > 1:
@@ -151,4 +169,4 @@ def _value(series: Series, adjusted_after: int | None, prior: Prior | None) -> V
         )
         changed = change(before, now)
         adjusted = bool(series.adjusted_since[-2] != series.adjusted_since[-1])
-    return ValueHistory(series, changed, adjusted, trend(series), adjusted_after, prior)
+    return ValueHistory(series, changed, adjusted, trend(series), adjusted_after, prior, outcome)

@@ -15,9 +15,6 @@ from cmm_uq.records import Certificate
 _DECIDED = {"pass": 0.0, "conditional pass": 1.0, "conditional fail": 2.0, "fail": 2.0}
 """Part of the limits where only a decision is known: well within, just within, or beyond."""
 
-BEYOND = frozenset({"fail", "conditional fail"})
-"""Decisions that find a machine beyond its limits."""
-
 
 @dataclass(frozen=True)
 class Ended:

@@ -13,6 +13,7 @@ import numpy as np
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.records.facts import PERFORMANCE
 from cmm_uq.units import UNITS
 
 Named = Callable[[str], str]
@@ -25,7 +26,7 @@ _UNIT_OF = (
 )  # fmt: skip
 """Ends of names in results.json, and their units."""
 
-FIGURE, PERFORMANCE, ARTEFACT = "accuracy.", "performance:", "artefact."
+FIGURE, ARTEFACT = "accuracy.", "artefact."
 
 
 def certificate_content(

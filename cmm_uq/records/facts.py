@@ -17,6 +17,9 @@ STATES = ("draft", "released", "withdrawn", "replaced")
 STANDING = ("draft", "released")
 """States of a certificate that counts: neither withdrawn nor replaced."""
 
+PERFORMANCE = "performance:"
+"""With which the name of a value begins that a standard decided on."""
+
 
 @dataclass(frozen=True, slots=True)
 class Machine:

@@ -6,15 +6,17 @@ Few columns, no values: a list of 10⁵ certificates is counted and paged by the
 from __future__ import annotations
 
 import datetime as dt
+import json
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, func, or_, select
 
+from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.records.entries import Entry
-from cmm_uq.records.facts import STANDING, Machine
-from cmm_uq.records.queries import adjusted_before
+from cmm_uq.records.facts import PERFORMANCE, STANDING, Machine
+from cmm_uq.records.queries import adjusted_before, blocks
 from cmm_uq.records.recognised import BY_NAME, spelled
 from cmm_uq.records.refusals import told
 from cmm_uq.records.store import Records
@@ -271,6 +273,33 @@ def courses(records: Records, machine: Machine, most: int) -> list[Course]:
     for course in found.values():
         course.stated.reverse()
     return list(found.values())
+
+
+def _outcomes(verdicts: Verdicts) -> dict[str, str]:
+    """What is stated of each value, by the name that the records gives it; the gravest, where several are."""
+    found: dict[str, str] = {}
+    for one in verdicts:
+        name = PERFORMANCE + (one.name or one.by) if one.by else one.name
+        if one.by and name in found:
+            name = f"{name} ({one.by})"
+        found[name] = gravest((one.outcome, found.get(name, one.outcome)))
+    return found
+
+
+def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[str, str]]:
+    """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    found = {}
+    with told(records.place), records.engine.connect() as connection:
+        for block in blocks(sorted(numbers)):
+            query = select(entries.c.number, entries.c.content).where(entries.c.number.in_(block))
+            for number, content in connection.execute(query):
+                found[int(number)] = _outcomes(Verdicts.of_results(json.loads(content)))
+    return found
 
 
 def entry_of(records: Records, number: int) -> Entry | None:

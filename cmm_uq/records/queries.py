@@ -179,7 +179,7 @@ def latest_of(
     found = connection.execute(select(of_machine).select_from(machines)).scalars()
     entries = sorted(entry for entry in found if entry is not None)
     rows: list[Certificate] = []
-    for block in _blocks(entries):
+    for block in blocks(entries):
         query = select(*_COLUMNS).select_from(_JOINED).where(certificates.c.entry.in_(block))
         rows += _certificates(connection, query, values=values, home=home)
     return sorted(rows, key=lambda one: (one.machine, one.entry))
@@ -197,7 +197,7 @@ def checks_of(connection: Connection, home: Path | None) -> list[Certificate]:
 def limited_of(connection: Connection, entries: Sequence[int]) -> set[int]:
     """Those with a limit; see :meth:`cmm_uq.records.store.Records.limited`."""
     f, found = figures.c, set[int]()
-    for block in _blocks(entries):
+    for block in blocks(entries):
         query = select(f.certificate).distinct().where(f.certificate.in_(block), f.at_most.is_not(None))
         found.update(connection.execute(query).scalars())
     return found
@@ -254,7 +254,7 @@ def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[Va
     f, q = figures.c, quantities.c
     names = {row[0]: row[1:] for row in connection.execute(select(q.id, q.name, q.quantity, q.unit)).all()}
     found: dict[int, list[Value]] = defaultdict(list)
-    for block in _blocks(entries):
+    for block in blocks(entries):
         query = select(f.certificate, f.quantity, f.value, f.u, f.lower, f.upper, f.u_artefact, f.at_most)
         query = query.where(f.certificate.in_(block)).order_by(f.certificate, f.place)
         for certificate, quantity, value, u, lower, upper, common, limit in connection.execute(query).all():
@@ -266,7 +266,7 @@ def _together(
     connection: Connection, entries: Sequence[int]
 ) -> dict[int, tuple[tuple[str, ...], tuple[float, ...]]]:  # fmt: skip
     c, found = covariances.c, {}
-    for block in _blocks(entries):
+    for block in blocks(entries):
         for row in connection.execute(select(covariances).where(c.certificate.in_(block))):
             found[row.certificate] = (tuple(json.loads(row.names)), tuple(json.loads(row.lower)))
     return found
@@ -276,7 +276,7 @@ def _adjusted(connection: Connection, of: Collection[int]) -> dict[int, list[str
     """Days on which machines were adjusted, sorted."""
     found: dict[int, list[str]] = defaultdict(list)
     a = adjustments.c
-    for block in _blocks(sorted(of)):
+    for block in blocks(sorted(of)):
         for row in connection.execute(select(a.machine, a.day).where(a.machine.in_(block)).order_by(a.day)):
             found[row.machine].append(row.day)
     return found
@@ -377,5 +377,6 @@ def _day(text: str | None) -> dt.date | None:
     return dt.date.fromisoformat(text) if text else None
 
 
-def _blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
+def blocks(numbers: Sequence[int]) -> Iterable[Sequence[int]]:
+    """So many at a time as a query takes."""
     return (numbers[i : i + _TOGETHER] for i in range(0, len(numbers), _TOGETHER))

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.verdicts import Verdict, Verdicts
 from cmm_uq.messages import Text, Verbatim, commas, day, say
 
 Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]
@@ -16,8 +17,8 @@ Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "
 
 EVENTS: tuple[Event, ...] = get_args(Event)
 
-_OF_DECISION: Mapping[str, Event] = {"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}
-"""Event of a decision of results.json; a pass is none, and every other word leaves it undecided."""
+_OF_OUTCOME: Mapping[str, Event] = {"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}
+"""Event of a statement of conformity; a pass is none, and every other word leaves it undecided."""
 
 _OF_VERDICT: Mapping[str, Text] = {
     "explained": say("the recording contradicts its model, and the diagnosis names what was left out"),
@@ -68,10 +69,9 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
     name, machine = Verbatim(str(job.get("id", ""))), Verbatim(str(job.get("machine") or ""))
     of = say("{machine} (job {name})", machine=machine, name=name) if machine else say("job {name}", name=name)
     told: dict[Event, list[Text]] = {}
-    for statement in results.get("conformity") or ():
-        decision = str(statement.get("decision"))
-        if decision != "pass":
-            told.setdefault(_OF_DECISION.get(decision, "undecided"), []).append(_statement(statement, decision))
+    for one in Verdicts.of_results(results):
+        if one.standing != "good":
+            told.setdefault(_OF_OUTCOME.get(one.outcome, "undecided"), []).append(_statement(one))
     verdict = str((results.get("diagnosis") or {}).get("verdict") or "consistent")
     if verdict != "consistent":
         told.setdefault("mismatch", []).append(_OF_VERDICT.get(verdict, _CONTRADICTS))
@@ -134,14 +134,13 @@ def of_drift(machine: str, changed: Sequence[Text], entry: int) -> Notice:
 
 def decisions(results: Mapping[str, Any]) -> list[str]:
     """Every decision of conformity on a certificate, in its order."""
-    return [str(statement.get("decision")) for statement in results.get("conformity") or ()]
+    return [one.outcome for one in Verdicts.of_results(results)]
 
 
-def _statement(statement: Mapping[str, Any], decision: str) -> Text:
-    standard, characteristic = (Verbatim(str(statement.get(key) or "")) for key in ("standard", "characteristic"))
-    said = Verbatim(decision)
-    if not characteristic:
+def _statement(one: Verdict) -> Text:
+    standard, name, said = Verbatim(one.by), Verbatim(one.name), Verbatim(one.outcome)
+    if not one.by:
+        return say("{name}, tolerance: {decision}", name=Verbatim(one.title or one.name), decision=said)
+    if not one.name:
         return say("{standard}: {decision}", standard=standard, decision=said)
-    return say(
-        "{standard} {characteristic}: {decision}", standard=standard, characteristic=characteristic, decision=said
-    )
+    return say("{standard} {characteristic}: {decision}", standard=standard, characteristic=name, decision=said)

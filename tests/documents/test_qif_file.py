@@ -104,6 +104,7 @@ def test_factors_without_a_tolerance_are_attributes_and_what_is_not_determined_i
     assert held == {
         "scale_x.ppm (ppm)": "12", "u of scale_x.ppm (ppm)": "0.5", "origin of the recording": "measured",
         "decision by ISO 10360-2:2009 E0": "incomplete",
+        "decision on squareness_xy.angle_arcsec by its tolerance": "pass",
     }  # fmt: skip
 
 

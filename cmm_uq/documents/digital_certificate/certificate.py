@@ -29,7 +29,7 @@ from cmm_uq.documents.digital_certificate.administration import (
     persons,
     ref_types,
 )
-from cmm_uq.documents.digital_certificate.conformity import evidence, statements
+from cmm_uq.documents.digital_certificate.conformity import evidence, of_tolerances, statements
 from cmm_uq.documents.digital_certificate.figures import Figures
 from cmm_uq.documents.digital_certificate.measurement import conditions, equipment, metadata, methods, software
 from cmm_uq.documents.digital_certificate.shapes import decimal, is_quantity, plain_name
@@ -38,6 +38,7 @@ from cmm_uq.documents.digital_certificate.units import dsi_of, product, without_
 from cmm_uq.documents.digital_certificate.words import NOT_STATED, SayIn, speaking, words_of
 from cmm_uq.documents.origin import file_name
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.languages.language import ENGLISH
 from cmm_uq.messages import Text, Verbatim, say
 
@@ -74,8 +75,8 @@ def digital_certificate(
     file : results.json itself, where it is at hand.
     """
     say_in = speaking(results["job"].get("language", ENGLISH))
-    figures = Figures(say_in, free(results))
     real, decided = certifies(job), results.get("conformity", ())
+    figures = Figures(say_in, free(results), of_tolerances(Verdicts.of_results(results), say_in, certifies=real))
     stated = statements(decided, say_in, figures, certifies=real)
     return Certificate(
         administrative=Administrative(

@@ -17,8 +17,9 @@ from cmm_uq.dcc.results import Data, Quantity, QuantityList, Result, Statement
 from cmm_uq.dcc.texts import Rich
 from cmm_uq.documents.digital_certificate.figures import Figures, Part
 from cmm_uq.documents.digital_certificate.shapes import decimal
-from cmm_uq.documents.digital_certificate.units import ONE, ratio
+from cmm_uq.documents.digital_certificate.units import ONE, dsi_of, ratio
 from cmm_uq.documents.digital_certificate.words import SayIn, english, one_line, rich_of, words_of
+from cmm_uq.jobs.verdicts import Verdict, Verdicts
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.units import UNITS
 
@@ -38,9 +39,40 @@ _WHY: Mapping[str, Text] = MappingProxyType({
     ),
 })  # fmt: skip
 
+TOLERANCE_RULE = "the whole 95 % interval within the tolerance: pass; beyond it: fail; otherwise undecided"
+"""By which parameters are held to their tolerances."""
+
 _MICROMETRE, _MILLIMETRE = UNITS["µm"].dsi, UNITS["mm"].dsi
 _P_TWICE = Decimal("0.9545")
 """Probability of a normal distribution within two standard deviations."""
+
+
+def of_tolerances(verdicts: Verdicts, say_in: SayIn, *, certifies: bool) -> Mapping[str, Statement]:
+    """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result.
+
+    Parameters
+    ----------
+    verdicts : of results.json.
+    certifies : whether anything is certified; otherwise no word of the schema is said.
+    """
+    return {one.name: _of_tolerance(one, say_in, certifies=certifies) for one in verdicts if not one.by}
+
+
+def _of_tolerance(one: Verdict, say_in: SayIn, *, certifies: bool) -> Statement:
+    limit, unit = decimal(one.limit or 0.0), dsi_of(one.unit)
+    bounds = ((say("Smallest permissible value"), -limit), (say("Largest permissible value"), limit))
+    return Statement(
+        name=words_of(say("Conformity with its tolerance"), say_in),
+        description=english([f"Missing: {what}" for what in one.missing]) if one.missing else None,
+        references=(TOLERANCE_RULE,),
+        declaration=rich_of((Verbatim(one.outcome), *((_WHY[one.outcome],) if one.outcome in _WHY else ())), say_in),
+        conformity=IN_THE_SCHEMA[one.outcome] if certifies else None,
+        data=Data(parts=tuple(
+            Quantity(name=words_of(name, say_in), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+            for name, bound in bounds
+        )),
+        ref_type=("basic_conformity", f"cmm_{one.outcome.replace(' ', '')}") if certifies else ("cmm_notCertified",),
+    )  # fmt: skip
 
 
 def statements(

@@ -8,12 +8,13 @@ interval is not symmetric, to the two digits that are printed of U, a second qua
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.dcc.administrative import Characters
 from cmm_uq.dcc.quantities import IntervalList, Real, RealList
-from cmm_uq.dcc.results import Quantity, QuantityList
+from cmm_uq.dcc.results import Quantity, QuantityList, Statement
 from cmm_uq.documents.digital_certificate.shapes import (
     are_numbers,
     decimal,
@@ -59,10 +60,13 @@ class Figures:
     ----------
     say_in : a text in the languages of the certificate.
     free : paths of estimates that the recording does not determine: what is known of them is no result.
+    stated : what is stated of estimates, ``scale_x.ppm``; it stands with each.
     """
 
-    def __init__(self, say_in: SayIn, free: Collection[str] = ()) -> None:
-        self.say_in, self.free = say_in, free
+    def __init__(
+        self, say_in: SayIn, free: Collection[str] = (), stated: Mapping[str, Statement] = MappingProxyType({})
+    ) -> None:
+        self.say_in, self.free, self.stated = say_in, free, stated
         self._ids: set[str] = set()
 
     def parts(self, path: Path, value: Any, above: Unit | None = None) -> Iterator[Part]:
@@ -111,7 +115,9 @@ class Figures:
 
     def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> Quantity:
         label = words_of(name or self.title(path), self.say_in)
-        return Quantity(id=self.id_of(path), name=label, value=value, ref_type=_ref_type(path, value))
+        of = self.stated.get(".".join(path[1:])) if path[0] == "estimates" else None
+        return Quantity(id=self.id_of(path), name=label, value=value, ref_type=_ref_type(path, value),
+                        metadata=() if of is None else (of,))  # fmt: skip
 
     def _with_uncertainty(self, path: Path, data: Mapping[str, Any], unit: Unit) -> Iterator[Part]:
         """A value with u, U, k and interval, and what else is said of it."""
