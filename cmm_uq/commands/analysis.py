@@ -9,7 +9,16 @@ from functools import partial
 from pathlib import Path
 
 from cmm_uq.commands.diagnosing import diagnosed, screened_model
-from cmm_uq.commands.estimation import accuracy, named_draws, noise, parameters, sizes, with_doubt, with_noise
+from cmm_uq.commands.estimation import (
+    accuracy,
+    contradictions,
+    named_draws,
+    noise,
+    parameters,
+    sizes,
+    with_doubt,
+    with_noise,
+)
 from cmm_uq.commands.reading import read_job
 from cmm_uq.commands.recipe import recipe_of
 from cmm_uq.commands.refusals import OVERFLOW_FIX
@@ -82,12 +91,13 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     found = diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None)
     averaged = found.diagnosis.remaining.draws
     values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
+    denied = () if averaged is None else contradictions(model, estimate, posterior, averaged)
     result = Result(
         job, model, findings, estimate, posterior, values,
         named_draws(model, components, posterior, values, mixture=averaged is not None),
         parameters(model, values), sizes(model, values),
         noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, tuple(statements),
-        found, causes=causes, doubt=doubt,
+        found, causes=causes, doubt=doubt, contradictions=denied,
     )  # fmt: skip
     for name, quantity in result.quantities():
         must_be_finite(

@@ -9,15 +9,19 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.conformity.accuracy import repeated_draws, with_uncertainty
-from cmm_uq.documents.result import LACK_OF_FIT, Component, Noise
+from cmm_uq.conformity.measurement_lines import ALIGNED
+from cmm_uq.documents.result import LACK_OF_FIT, Component, Contradiction, Noise
+from cmm_uq.inference.combinations import uncertainty_of_sum
 from cmm_uq.inference.doubt import Cause, Doubt, gain
 from cmm_uq.inference.draws import Draws, by_chain, by_ensemble, evenly
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.messages import say
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.model.display import of_last_digit
+from cmm_uq.model.doubt import growth
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.model.noise import noise_of
 from cmm_uq.points import Floats, Ints
@@ -25,8 +29,14 @@ from cmm_uq.screening.copies import counted_with
 from cmm_uq.screening.finding import finding
 from cmm_uq.screening.moved import moved_stretches, recurring_points, words_of_point, words_of_stretch
 from cmm_uq.screening.screened import Finding, gross_outliers
-from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE, unit
+from cmm_uq.uncertainty.quantity import Quantity, expanded_of
+from cmm_uq.units import MICROMETRE, PPM, unit
+
+_LINES = 2000
+"""Draws of the sizes of the noise, over which a line's uncertainty is taken."""
+
+_ON_LINE = 0.05
+"""Extent of points across a line over that along it."""
 
 
 def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
@@ -182,6 +192,61 @@ def with_doubt(
     weights = gain(estimate.linear, float(np.median(posterior.sigma)))
     doubt = Doubt.of([cause.at(model.used) for cause in causes], weights)
     return doubt.widened(draws, posterior.seed), doubt
+
+
+def contradictions(
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, averaged: Floats
+) -> tuple[Contradiction, ...]:  # fmt: skip
+    """Averaged scales of axes that lines along these deny: of each the line that does most.
+
+    An average may give to a scale what another explanation takes away from it again. Nobody may use the scale without that,
+    so what the lines along the axis alone say of it, all other named effects as they are on average, must agree with it: all
+    of them, within the joint 95 % uncertainty.
+
+    Parameters
+    ----------
+    averaged : (N, k) draws of the model's unknowns over all explanations that remain.
+    """
+    linear, along = estimate.linear, growth(model.artefact)
+    if along is None:
+        return ()
+    components, sizes, mean = (
+        noise_of(model),
+        posterior.sizes.at(evenly(len(posterior.draws), _LINES)),
+        averaged.mean(axis=0),
+    )
+    lines: dict[int, list[tuple[float, float, Contradiction]]] = {}
+    for number, weights in _lines(model, along[model.used], linear.freedoms):
+        slope = weights @ linear.design
+        left = float(weights @ linear.observed - slope @ mean)
+        expected = float(expanded_of(averaged @ slope, slope @ mean))
+        u, U = uncertainty_of_sum(components, sizes, weights)
+        for i in np.flatnonzero(np.abs(slope) >= (1 - 2 * ALIGNED**2) * PPM):
+            if (unknown := linear.unknowns[i]).unit == "ppm":
+                off, wide = left / slope[i], np.array([u, U]) / abs(slope[i])
+                value = float(mean[i] + off)
+                alone = Quantity(value, float(wide[0]), (value - float(wide[1]), value + float(wide[1])), unknown.unit)
+                own = float(np.hypot(expected / slope[i], wide[1]))
+                lines.setdefault(int(i), []).append((abs(off), own, Contradiction(unknown.key, number, alone)))
+    found = []
+    for each in lines.values():
+        factor = float(special.ndtri(0.5 + 0.5 * 0.95 ** (1 / len(each))) / special.ndtri(0.975))
+        off, own, line = max(each, key=lambda one: one[0] / one[1])
+        if off > factor * own:
+            found.append(line)
+    return tuple(found)
+
+
+def _lines(model: MeasurementModel, along: Floats, placings: Freedoms) -> Iterator[tuple[int, Floats]]:
+    """Each measurement of points on one line, and the weights (m,) of the used observations in its slope, mm/mm."""
+    measurement, points = model.artefact.measurement[model.used], model.artefact.points
+    for number in np.unique(measurement).tolist():
+        xyz = points.xyz[points.measurement == number]
+        extents = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
+        own = np.where(measurement == number, along, 0.0)
+        about = placings.without(own[:, None])[:, 0]
+        if extents[1] <= _ON_LINE * extents[0] and about @ about > 0:
+            yield number, about / (about @ about)
 
 
 def accuracy(

@@ -119,6 +119,22 @@ class Difference:
     quantity: Quantity
 
 
+@dataclass(frozen=True)
+class Contradiction:
+    """A line along a machine axis that says something else of the axis than an average over explanations does.
+
+    Parameters
+    ----------
+    key : of the parameter, effect and name.
+    measurement : number of the line.
+    alone : the parameter by this line alone, all others as they are on average.
+    """
+
+    key: tuple[str, str]
+    measurement: int
+    alone: Quantity
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """All that is known of a job after its analysis.
@@ -141,6 +157,7 @@ class Result:
     stating : how a certificate states it; ``None`` of a result as evaluated.
     causes : of what is stated to be in doubt about all observations together.
     doubt : what they make of the model's unknowns; it is in ``values``.
+    contradictions : what denies averaged estimates, which are then not given.
     """
 
     job: Job
@@ -159,6 +176,7 @@ class Result:
     stating: Stating | None = None
     causes: tuple[Cause, ...] = ()
     doubt: Doubt = field(default_factory=lambda: Doubt(()))
+    contradictions: tuple[Contradiction, ...] = ()
 
     def at_least(
         self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
@@ -206,8 +224,14 @@ class Result:
 
     @cached_property
     def free(self) -> frozenset[str]:
-        """Effects that the recording does not determine by themselves."""
-        return frozenset(effect for combination in self.undetermined for effect, _ in combination)
+        """Effects that the recording does not determine by themselves, or contradicts."""
+        return frozenset(effect for effect, _ in self.not_given)
+
+    @cached_property
+    def not_given(self) -> frozenset[tuple[str, str]]:
+        """Keys of parameters without a value: the recording leaves them free, or contradicts them."""
+        free = (key for combination in self.undetermined for key in combination)
+        return frozenset((*free, *(one.key for one in self.contradictions)))
 
     def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[Difference, ...]:
         """Differences, within a combination that the recording leaves free, of parameters in one unit.

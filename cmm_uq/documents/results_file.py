@@ -99,6 +99,7 @@ def results(result: Result) -> dict[str, Any]:
         },
         "sampling": _sampling(result),
         "least_squares": _least_squares(result),
+        **contradictions_data(result),
         "identifiability": _identifiability(result),
         "accuracy": {name: quantity.value for name, quantity in result.accuracy.items()},
         "accuracy_uncertainty": {name: quantity_data(quantity) for name, quantity in result.accuracy.items()},
@@ -199,6 +200,15 @@ def covariance_data(covariance: Covariance) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def contradictions_data(result: Result) -> dict[str, Any]:
+    """Averaged estimates that a line denies, and what it says; nothing where there are none."""
+    each = [
+        {"parameter": ".".join(one.key), "measurement": one.measurement, "alone": quantity_data(one.alone)}
+        for one in result.contradictions
+    ]
+    return {"contradicted": each} if each else {}
+
+
 def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
     return {name: quantity_data(quantity) for name, quantity in quantities.items()}
 
@@ -239,7 +249,8 @@ def _identifiability(result: Result) -> dict[str, Any]:
         "undetermined": [
             {f"{u.key[0]}.{u.key[1]}": float(part) for u, part in zip(ls.unknowns, column, strict=True) if part}
             for column in ls.null_space.T
-        ],
+        ]
+        + [{".".join(one.key): 1.0} for one in result.contradictions],
         "prior_share": {f"{u.key[0]}.{u.key[1]}": result.prior_share(u.key) for u in ls.unknowns},
     }
 

@@ -31,15 +31,16 @@ def performance(result: Result) -> Section:
 def error_factors(result: Result) -> Section:
     """Error factors: what is determined with its uncertainty, what is not with what is known of it instead."""
     ls = result.least_squares
-    free = {key for combination in result.undetermined for key in combination}
+    contradicted = {one.key for one in result.contradictions}
     fitted = {unknown.key: value for unknown, value in zip(ls.unknowns, ls.value, strict=True)}
     rows: list[tuple[Text, ...]] = []
     for effect in result.model.effects:
         for name, quantity in result.parameters[effect.name].items():
             key = (effect.name, name)
             value, U, k = expanded(quantity)
-            if key in free:
-                rows.append((title_of(key, result), say("not determined"), NOTHING, NOTHING, NOTHING, quantity.unit))
+            if key in result.not_given:
+                why = say("not given") if key in contradicted else say("not determined")
+                rows.append((title_of(key, result), why, NOTHING, NOTHING, NOTHING, quantity.unit))
                 continue
             least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
             rows.append((title_of(key, result), value, U, k, least, quantity.unit))

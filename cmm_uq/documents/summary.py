@@ -16,7 +16,7 @@ from cmm_uq.uncertainty.rounding import rounded, significant
 
 def summary(result: Result, warnings: Iterable[Text]) -> Summary:
     """What was measured, the decisions, the figures, the warnings."""
-    facts, free = result.job.facts, {key for combination in result.undetermined for key in combination}
+    facts = result.job.facts
     subject = say(
         "{machine}, {artefact:small}, {count} observations",
         machine=Verbatim(facts.machine.name), artefact=result.artefact.title, count=len(result.residuals),
@@ -28,7 +28,7 @@ def summary(result: Result, warnings: Iterable[Text]) -> Summary:
     for effect in result.model.effects:
         for name, quantity in result.parameters[effect.name].items():
             key = (effect.name, name)
-            figures.append(figure_row(title_of(key, result), quantity, known=key not in free))
+            figures.append(figure_row(title_of(key, result), quantity, known=key not in result.not_given))
     remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
     decided = tuple(
         Verdict(one.outcome.upper(), one.standing, subject_of(one), tuple(told))

@@ -7,7 +7,7 @@ from typing import Protocol
 from cmm_uq.conformity.lengths_decided import unknown_expansion
 from cmm_uq.documents.diagnosis.words import VERDICTS
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import title_of
+from cmm_uq.documents.wording import title_of, with_uncertainty
 from cmm_uq.messages import Text, listed, say, sentences
 from cmm_uq.uncertainty.rounding import figure, nominal, significant
 
@@ -29,6 +29,7 @@ def warnings(result: Result) -> tuple[Text, ...]:
             _expansion(result),
             _implausible(result),
             _undetermined(result),
+            _contradicted(result),
             _screening(result),
         )
         for text in texts
@@ -151,10 +152,9 @@ def _undetermined(result: Result) -> list[Text]:
         )
         for combination in result.undetermined
     ]
-    free = {key for combination in result.undetermined for key in combination}
     for unknown in result.posterior.unknowns:
         share = result.prior_share(unknown.key)
-        if share > ASSUMED and unknown.key not in free and not unknown.known:
+        if share > ASSUMED and unknown.key not in result.not_given and not unknown.known:
             texts.append(
                 say(
                     "{parameter} is hardly determined by this recording: {share:.0f} % of its variance is the "
@@ -166,6 +166,18 @@ def _undetermined(result: Result) -> list[Text]:
                 )
             )
     return texts
+
+
+def _contradicted(result: Result) -> list[Text]:
+    return [
+        say(
+            "{parameter} is not given: {averaged} {unit} on average over {rivals} explanations, while the line of measurement "
+            "{measurement} alone says {alone} {unit}.",
+            parameter=title_of(one.key, result), averaged=with_uncertainty(result.parameters[one.key[0]][one.key[1]]),
+            rivals=result.averaged, measurement=one.measurement, alone=with_uncertainty(one.alone), unit=one.alone.unit,
+        )
+        for one in result.contradictions
+    ]  # fmt: skip
 
 
 def _screening(result: Result) -> list[Text]:
