@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
-from pydantic import model_validator
+import numpy as np
+from pydantic import PrivateAttr, model_validator
 
 from cmm_uq.jobs.certified_value import LENGTH, CertifiedValue
-from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
+from cmm_uq.jobs.expanded import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.importing.keys import FileKeys
-from cmm_uq.jobs.table import AnyFloat, Length, Table, Uncertainty
+from cmm_uq.jobs.table import AnyFloat, Length, Table
 from cmm_uq.jobs.traceability import Traceability
+from cmm_uq.points import Floats, Ints
 
 
 class CertificateFile(FileKeys, Traceability):
@@ -24,7 +27,7 @@ class CertificateFile(FileKeys, Traceability):
 class ArtefactFacts(Table):
     """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
 
-    ``U_um`` with ``k`` may stand for ``u_um``.
+    ``U_um`` with ``k`` or ``degrees_of_freedom`` may stand for ``u_um``, which is then filled in.
     Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
 
     Attributes
@@ -35,10 +38,8 @@ class ArtefactFacts(Table):
     carries_probe : whether its recording itself says how far from the end of the ram each point was, as tip offsets do.
     form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
     certified_values : that the artefact's digital certificate may state, where they do not stand in the recording.
-    instead : tables whose keys may stand in place of others.
     """
 
-    instead: ClassVar[tuple[type[Table], ...]] = (ExpandedUncertainty,)
     with_references: ClassVar[bool] = False
     with_recording: ClassVar[bool] = True
     with_earlier: ClassVar[bool] = False
@@ -54,8 +55,16 @@ class ArtefactFacts(Table):
     """Serial number of the artefact."""
     length_mm: Length | None = None
     """Certified length at 20 °C, of a sphere its diameter; left out for an artefact that is not calibrated."""
-    u_um: Uncertainty | None = None
-    """Standard uncertainty (k = 1) of what is certified of the artefact; `U_um` with `k` may stand for it."""
+    u_um: LengthUncertainty | None = None
+    """Standard uncertainty (k = 1) of every certified length of the artefact, a number or a formula of the length as
+    `"0.1 + 0.25·L/1000"`; `U_um` with `k` may stand for it."""
+    U_um: LengthUncertainty | None = None
+    """Expanded uncertainty as the artefact's certificate states it, in place of `u_um`: a number, or a formula of the length as
+    `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
+    k: Factor | None = None
+    """Coverage factor of `U_um`, or of a column `reference_U_um`."""
+    degrees_of_freedom: Freedom | None = None
+    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
     cte_per_k: AnyFloat = 0.0
     """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
     by it."""
@@ -65,10 +74,12 @@ class ArtefactFacts(Table):
     @model_validator(mode="before")
     @classmethod
     def _expanded(cls, data: Any) -> Any:
-        return with_standard_uncertainty(data)
+        return with_standard_uncertainty(data, columns=cls.with_references)
 
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:
+        if self.degrees_of_freedom is not None and self.u_um is None and not self.with_references:
+            raise ValueError("degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out")
         if self.u_um is not None and self.length_mm is None and not self.with_references:
             raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
         if abs(self.cte_per_k) > 1e-3:
@@ -77,10 +88,21 @@ class ArtefactFacts(Table):
             )
         return self
 
+    def u_of(self, lengths_mm: Floats | float) -> Floats:
+        """Standard uncertainty of certified lengths, µm, as stated for them; 0 where nothing is."""
+        if isinstance(self.u_um, Growing):
+            return self.u_um.at(lengths_mm)
+        return np.full(np.shape(lengths_mm), self.u_um or 0.0)
+
     @property
     def certified(self) -> bool:
         """Whether lengths can be compared with it."""
         return self.length_mm is not None
+
+    @property
+    def nominal_only(self) -> bool:
+        """Whether the job says that nothing of it is certified."""
+        return False
 
     @property
     def traced(self) -> bool:
@@ -99,6 +121,28 @@ class ReferencedFacts(ArtefactFacts):
     nominal: bool = False
     """Whether the references in the recording are nominal only: their common scale then stays free."""
 
+    _covariances: tuple[tuple[int, ...], tuple[Floats, ...]] = PrivateAttr(default=((), ()))
+
+    def with_covariances(self, numbers: Sequence[int], covariances: Sequence[Floats]) -> Self:
+        """The same with the covariances that a digital certificate gives of its points.
+
+        Parameters
+        ----------
+        numbers : of the f points.
+        covariances : (f, f) µm², for the distances, or for each coordinate.
+        """
+        found = self.model_copy()
+        found._covariances = tuple(numbers), tuple(covariances)
+        return found
+
+    def covariances_at(self, numbers: Ints) -> tuple[Floats, ...]:
+        """Covariances of points by their numbers (n,), each (n, n) µm²; none where they are not given of all of these."""
+        places = {number: i for i, number in enumerate(self._covariances[0])}
+        if not places or not set(numbers.tolist()) <= places.keys():
+            return ()
+        index = np.array([places[number] for number in numbers.tolist()], dtype=np.int64)
+        return tuple(covariance[np.ix_(index, index)] for covariance in self._covariances[1])
+
     @model_validator(mode="after")
     def _nominal_or_certified(self) -> Self:
         if self.nominal and (self.u_um is not None or self.length_mm is not None):
@@ -111,3 +155,8 @@ class ReferencedFacts(ArtefactFacts):
     def certified(self) -> bool:
         """Whether lengths can be compared with it."""
         return not self.nominal
+
+    @property
+    def nominal_only(self) -> bool:
+        """See :attr:`ArtefactFacts.nominal_only`."""
+        return self.nominal

@@ -10,25 +10,26 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from cmm_uq.dcc import Certificate, read
 from cmm_uq.dcc.figures import Figures, figures
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.artefact import ArtefactFacts, CertificateFile
+from cmm_uq.jobs.artefact import ArtefactFacts, CertificateFile, ReferencedFacts
 from cmm_uq.jobs.certified_value import CertifiedValue
-from cmm_uq.jobs.expanded import with_standard_uncertainty
+from cmm_uq.jobs.expanded import Growing, growing_of, with_standard_uncertainty
 from cmm_uq.jobs.importing.dcc import Dcc, heading
 from cmm_uq.jobs.importing.imported import imported_references
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.importing.sheet import Fact
 from cmm_uq.messages import Verbatim, say
-from cmm_uq.points import AXES
+from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import UNITS
 
 _METRES = {unit.dsi: Decimal(str(unit.si)) for unit in UNITS.values() if unit.dsi.endswith(r"\metre")}
@@ -42,6 +43,30 @@ SAME = 1e-9
 """Relative difference of two numbers that say the same."""
 
 
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Uncertainties of certified points.
+
+    Parameters
+    ----------
+    numbers : of the points.
+    u : (f,) standard uncertainty of each, µm, by column of the recording.
+    covariances : (f, f) µm², in the order of ``u``; none where the certificate gives none.
+    """
+
+    numbers: tuple[int, ...]
+    u: Mapping[str, Floats]
+    covariances: tuple[Floats, ...] = ()
+
+    def beside(self, points: Points, artefact: ArtefactFacts) -> tuple[Points, ArtefactFacts]:
+        """A recording of some of these points with their uncertainties, and the artefact with their covariances."""
+        index = np.array([self.numbers.index(number) for number in points.point.tolist()], dtype=np.int64)
+        columns = {**points.columns, **{name: values[index] for name, values in self.u.items()}}
+        if self.covariances and isinstance(artefact, ReferencedFacts):
+            artefact = artefact.with_covariances(self.numbers, self.covariances)
+        return replace(points, columns=columns), artefact
+
+
 @dataclass(frozen=True)
 class Read:
     """What a digital certificate says.
@@ -50,10 +75,12 @@ class Read:
     ----------
     table : keys of ``[artefact]``, those of its certificate in a table of their own.
     recognised : how values that stand alone were read; ``None`` where points are joined to the recording.
+    places : uncertainties of such points; ``None`` where the certificate states none of them.
     """
 
     table: Mapping[str, Any]
     recognised: Recognised | None = None
+    places: Places | None = None
 
     def beside(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """``[artefact]`` as job.toml has it, with what the certificate says."""
@@ -81,7 +108,8 @@ def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[
     table: dict[str, Any] = {"certificate": _chain(certificate, _table(given, "certificate"), where)}
     table |= _identity(certificate, given, where)
     if facts.with_references:
-        return Read(table | _longest(certificate, content, where, given))
+        further, places = _longest(certificate, content, where, given)
+        return Read(table | further, places=places)
     found = [
         (wanted, one)
         for wanted in facts.certified_values
@@ -168,7 +196,8 @@ def _valued(wanted: CertifiedValue, one: Figures, given: Mapping[str, Any], wher
         raise _contradicted(f"[artefact] {wanted.key}", own[key], value, where)
     if wanted.u_key:
         u_key = wanted.u_key.rpartition(".")[2]
-        table |= _uncertain(u_key, _u_um(one), own, where, f"[artefact] {wanted.u_key}", one.shown)
+        longest = max(values) if not wanted.micrometres else 0.0
+        table |= _uncertain(u_key, _u_um(one), own, where, f"[artefact] {wanted.u_key}", one.shown, longest)
     return {outer: table} if outer else table
 
 
@@ -181,29 +210,33 @@ def _u_um(one: Figures) -> float | None:
 
 
 def _uncertain(
-    key: str, u_um: float | None, given: Mapping[str, Any], where: str, shown: str, what: str
+    key: str, u_um: float | None, given: Mapping[str, Any], where: str, shown: str, what: str, length_mm: float = 0.0
 ) -> dict[str, float]:  # fmt: skip
     """The uncertainty, where the job has none; what it has must not be smaller."""
     try:
         own = with_standard_uncertainty(dict(given)).get(key)
+        own = growing_of(own) if isinstance(own, str) else own
     except ValueError:
         return {}  # what is wrong with it is said where the table is checked
     if own is None:
         if u_um is None:
             raise CmmUqError(f"states no uncertainty of {what}", where=where, fix=f"Give {shown}")
         return {key: u_um}
+    own = float(own.at(length_mm)) if isinstance(own, Growing) else own
     if u_um is not None and isinstance(own, (int, float)) and own < u_um * (1 - SAME):
         raise CmmUqError(f"{shown} = {own:g} is smaller than the standard uncertainty {u_um:g} µm of {what}", where=where,
                          fix="Leave it out: the certificate says it")  # fmt: skip
     return {}
 
 
-def _longest(certificate: Certificate, content: bytes, where: str, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Longest certified distance and its uncertainty, of points that are joined to the recording by their numbers."""
+def _longest(
+    certificate: Certificate, content: bytes, where: str, given: Mapping[str, Any]
+) -> tuple[dict[str, Any], Places | None]:  # fmt: skip
+    """Longest certified distance of points that are joined to the recording by their numbers, and their uncertainties."""
     try:
         keys = CertificateFile.model_validate(dict(_table(given, "certificate")))
     except ValidationError:
-        return {}  # what is wrong with it is said where the table is checked
+        return {}, None  # what is wrong with it is said where the table is checked
     found = imported_references(content, where, FileKeys.model_validate(
         {name: getattr(keys, name) for name in FileKeys.model_fields}
     ))  # fmt: skip
@@ -216,14 +249,38 @@ def _longest(certificate: Certificate, content: bytes, where: str, given: Mappin
         for one in held
         for stated, unit in zip(one.uncertainties, one.units, strict=True)
     )
-    if given.get("nominal") or "length_mm" in given or not known:
-        return {}  # what is stated of another length cannot be compared
+    if given.get("nominal") or not known:
+        return {}, None
+    places = _places(found.columns.get("point"), wanted, held)
+    if "length_mm" in given:
+        return {}, places  # what is stated of another length cannot be compared
     if all(len(set(one.values)) == 1 for one in held):
         raise CmmUqError(
             "certifies no distance: all its points are in one place", where=where, fix="Is it the right file?"
         )
     length, u_um = _farthest(held)
-    return {"length_mm": length, **_uncertain("u_um", u_um, given, where, "[artefact] u_um", "its longest distance")}
+    _uncertain("u_um", u_um, given, where, "[artefact] u_um", "its longest distance", length)
+    return {"length_mm": length}, places
+
+
+def _places(point: Floats | None, wanted: Sequence[str], held: Sequence[Figures]) -> Places | None:
+    """What the certificate says of its points, which the recording numbers in the same way."""
+    if point is None or any(len(one.values) != len(point) for one in held):
+        return None
+    scales = [np.array([float(_METRES[unit]) * 1e6 for unit in one.units]) for one in held]
+    names = ["reference_u_um" if name == "reference_mm" else name.replace("reference_", "reference_u_").replace("_mm", "_um")
+             for name in wanted]  # fmt: skip
+    u = {
+        name: scale * np.array([float(stated.u or 0) for stated in one.uncertainties])
+        for name, one, scale in zip(names, held, scales, strict=True)
+    }
+    whole = all(one.covariance is not None and len(one.covariance[0]) == len(point) for one in held)
+    covariances = tuple(
+        np.outer(scale, scale) * np.array([[float(value) for value in row] for row in one.covariance[0]])
+        for one, scale in zip(held, scales, strict=True)
+        if whole and one.covariance is not None
+    )
+    return Places(tuple(int(number) for number in point), u, covariances)
 
 
 def _farthest(columns: Sequence[Figures]) -> tuple[float, float]:

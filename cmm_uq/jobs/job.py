@@ -200,7 +200,9 @@ class JobFile(Table):
         for wish in wishes:
             if artefact is None or "test_uncertainty" not in info.data:
                 continue  # what is wrong with these is said instead
-            key = uncertainty_missing(wish, artefact, info.data["test_uncertainty"], standards_in(info))
+            by_points = artefact.with_references and artefact.u_um is None  # which the recording may state of each
+            whole = artefact.model_copy(update={"u_um": 1.0}) if by_points else artefact
+            key = uncertainty_missing(wish, whole, info.data["test_uncertainty"], standards_in(info))
             if key is not None:
                 raise ValueError(". ".join(needed(key, wish)))
         return wishes

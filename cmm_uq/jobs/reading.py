@@ -16,7 +16,7 @@ from cmm_uq.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, L
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
-from cmm_uq.jobs.conformity import Standards
+from cmm_uq.jobs.conformity import Standards, needed, uncertainty_missing
 from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.earlier_noise import noise_file
@@ -31,7 +31,7 @@ from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.predicted import files_of, prediction_of
 from cmm_uq.jobs.recording_file import read_recording_file
-from cmm_uq.jobs.reference_file import reference_file, with_references
+from cmm_uq.jobs.reference_file import EXPANDED, OF_POINTS, reference_file, with_references, with_uncertainties
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
@@ -145,6 +145,16 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     if certificate and facts.artefact.with_references:
         points, recognised = with_references(points, facts.artefact, inputs, folder, where)
         told.append(recognised)
+    if facts.artefact.with_references:
+        if says is not None and says.places is not None:
+            points, artefact = says.places.beside(points, facts.artefact)
+            facts = facts.model_copy(update={"artefact": artefact})
+        named = str(folder / certificate[0]) if certificate else where
+        points = with_uncertainties(points, facts.artefact, named, [head for one in told if one for head in one.unused])
+        _refuse_unstated(facts, points, nameable.standards, path)
+    elif any(name in points.columns for name in (*OF_POINTS, EXPANDED)):
+        raise CmmUqError(f"has uncertainties of certified points, which a job of kind {facts.artefact.kind!r} has not",
+                         where=where, fix="Give U_um and k in [artefact], and leave the column out")  # fmt: skip
     planned = is_planned(inputs[facts.recording.file])
     if not planned:  # a plan has no times yet
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
@@ -166,6 +176,17 @@ def _pictures(source: Source, names: Sequence[str]) -> dict[str, bytes]:
     for name, content in found.items():
         checked_logo(content, str(source.toml.parent / name))
     return found
+
+
+def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path: Path) -> None:
+    """That a rule needs an uncertainty which neither the job nor its certified values state."""
+    if facts.artefact.u_um is not None or any(name in points.columns for name in OF_POINTS):
+        return
+    for wish in facts.conformity:
+        key = uncertainty_missing(wish, facts.artefact, facts.test_uncertainty, standards)
+        if key is not None:
+            problem, fix = needed(key, wish)
+            raise CmmUqError(problem, where=f"{path}: [[conformity]]", fix=fix)
 
 
 def _acquired(facts: JobFile, source: Source, inputs: dict[str, bytes]) -> Provenance | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +11,25 @@ import numpy as np
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.expanded import factor_of
 from cmm_uq.jobs.importing.recognised import Recognised
-from cmm_uq.jobs.recording import LARGEST_NUMBER, largest
+from cmm_uq.jobs.importing.vocabulary import COVERAGE
+from cmm_uq.jobs.recording import LARGEST_NUMBER, OPTIONAL, largest
 from cmm_uq.points import AXES, Points
 
-REFERENCES = ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES))
+EXPANDED = "reference_U_um"
+STANDARD = "reference_u_um"
+OF_POINTS = (STANDARD, *(f"reference_u_{axis}_um" for axis in AXES))
+"""Columns of the standard uncertainty of certified distances or places."""
+
+REFERENCES = ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES), *OF_POINTS, EXPANDED)
+
+_ANOTHER_U = re.compile(
+    r"(?!radius|fit|noise).*(?:^|[ _])(?:u|u95|uncertainty|unsicherheit|messunsicherheit|incertitude|incertezza|incertidumbre)"
+    r"(?:[ _](?:um|mm|nm|reference|ref|certified|certificate))*(?:\s*[\[(].*)?",
+    re.IGNORECASE,
+)
+"""Name of a column that can only be an uncertainty."""
 
 
 def reference_file(artefact: ArtefactFacts) -> list[str]:
@@ -61,10 +76,58 @@ def with_references(
                          fix="Number points as the certificate does, or leave the point out")  # fmt: skip
     index = np.array([rows[number] for number in points.point.tolist()], dtype=np.int64)
     columns = {name: values[index] for name, values in found.columns.items() if name in REFERENCES}
+    if EXPANDED in columns and (stated := COVERAGE.search(found.recognised.columns[EXPANDED])):
+        k = float(stated[1].replace(",", "."))
+        if artefact.k not in (None, k) or not 1 <= k <= 10:
+            raise CmmUqError(f"says k = {k:g} in a heading", where=place, fix="Mend it, or [artefact] k")
+        columns[STANDARD] = columns.pop(EXPANDED) / k
     for name, values in columns.items():
         if np.any(np.abs(values) > largest(name)):
             raise CmmUqError(f"{name} is more than anything that is measured", where=place, fix="Check its unit")
     return replace(points, columns={**points.columns, **columns}), found.recognised
+
+
+def with_uncertainties(points: Points, artefact: ArtefactFacts, where: str, unread: Sequence[str] = ()) -> Points:
+    """A recording with the standard uncertainty of its certified values in place of the expanded one.
+
+    Parameters
+    ----------
+    points : with certified values.
+    artefact : whose ``k`` belongs to a column of expanded uncertainties.
+    where : the file that has them, for messages.
+    unread : headings of its columns that are not used.
+
+    Raises
+    ------
+    CmmUqError : an uncertainty without its coverage factor, twice, below 0, or in a column that is not read.
+    """
+    columns, factor = points.columns, factor_of(artefact.k, artefact.degrees_of_freedom)
+    unread = [*unread, *(name for name in columns if name not in OPTIONAL)]
+    if (other := next((name for name in unread if _ANOTHER_U.fullmatch(name)), None)) is not None:
+        raise CmmUqError(f"the column {other!r} looks like an uncertainty, and is none that is read", where=where,
+                         fix=f"Name it {EXPANDED} (with [artefact] k) or {STANDARD}, or leave it out")  # fmt: skip
+    here = [name for name in (*OF_POINTS, EXPANDED) if name in columns]
+    if EXPANDED in here:
+        if len(here) > 1:
+            raise CmmUqError(f"has {EXPANDED} and {here[0]}", where=where, fix="Leave one of them out")
+        if factor is None or artefact.U_um is not None:
+            fix = "Give k = 2.0 in [artefact], as the certificate states it"
+            raise CmmUqError(f"{EXPANDED} needs a coverage factor of its own", where=where,
+                             fix=fix if factor is None else "Leave U_um out of [artefact]: the column says it")  # fmt: skip
+        columns = {**columns, STANDARD: columns[EXPANDED] / factor}
+        columns = {name: values for name, values in columns.items() if name != EXPANDED}
+        here = [STANDARD]
+    elif artefact.k is not None and artefact.U_um is None and not here:
+        raise CmmUqError("k is given without U_um, and no column has expanded uncertainties", where="job.toml [artefact] k",
+                         fix=f"Give U_um, or a column {EXPANDED} beside the certified values; or leave k out")  # fmt: skip
+    for name in here:
+        if np.any(columns[name] < 0):
+            line = points.lines[int(np.argmin(columns[name]))] if len(points.lines) else 0
+            raise CmmUqError(f"{name} is below 0", where=f"{where} line {line}", fix="Give uncertainties in µm, 0 or more")
+    if here and artefact.nominal_only:
+        raise CmmUqError(f"has {here[0]}, and nominal = true says that nothing is certified", where=where,
+                         fix="Leave nominal or the column out")  # fmt: skip
+    return points if columns is points.columns else replace(points, columns=columns)
 
 
 def _rows_by_point(numbers: list[float], lines: list[int], place: str) -> dict[int, int]:

@@ -37,8 +37,6 @@ class _Described(GenerateJsonSchema):
         told = sentences(table)
         for name, key in found.get("properties", {}).items():
             key["description"] = told.get(name, "")
-        for other in getattr(table, "instead", ()):
-            found["properties"] |= schema_of(other)["properties"]
         found["description"] = re.sub(r"\s+", " ", (table.__doc__ or "").split("\n\n")[0]).replace("``", "`").strip()
         return found
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import field_validator, model_validator
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.expanded import ExpandedUncertainty, with_standard_uncertainty
+from cmm_uq.jobs.expanded import Factor, Freedom, with_standard_uncertainty
 from cmm_uq.jobs.recording import read_recording
 from cmm_uq.jobs.table import AnyFloat, Length, Limit, Table
 from cmm_uq.jobs.traceability import Traceability
@@ -33,8 +33,6 @@ class ShortGaugeFacts(Table):
     cte_per_k : of its expansion.
     """
 
-    instead: ClassVar[tuple[type[Table], ...]] = (ExpandedUncertainty,)
-
     file: str
     """Its recording: points 1 and 2, the middles of its two faces, in every measurement and repeat."""
     length_mm: Length
@@ -42,6 +40,12 @@ class ShortGaugeFacts(Table):
     u_um: Limit
     """Standard uncertainty (k = 1) of that length as it was met: of the certificate and of the gauge's temperature;
     `U_um` with `k` may stand for it."""
+    U_um: Limit | None = None
+    """Expanded uncertainty, as a certificate states it, in place of `u_um`; needs `k` or `degrees_of_freedom`."""
+    k: Factor | None = None
+    """Coverage factor of `U_um`."""
+    degrees_of_freedom: Freedom | None = None
+    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
     cte_per_k: AnyFloat = 0.0
     """Coefficient of thermal expansion of the gauge, 1/K."""
     name: str = ""

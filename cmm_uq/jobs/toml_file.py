@@ -196,11 +196,7 @@ def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | Non
 
 
 def _known_keys(table: type[BaseModel] | None) -> list[str]:
-    """Keys of a table, and those that may stand in place of some of them."""
-    if table is None:
-        return []
-    tables = (table, *getattr(table, "instead", ()))
-    return [field.alias or name for one in tables for name, field in one.model_fields.items()]
+    return [] if table is None else [field.alias or name for name, field in table.model_fields.items()]
 
 
 def _model_inside(annotation: object) -> object:

@@ -15,9 +15,9 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import Text
 from cmm_uq.model.artefact import Artefact, Size
 from cmm_uq.model.placings import Placings
-from cmm_uq.model.recorded import check_length, place
+from cmm_uq.model.recorded import check_length, place, stated_sd
 from cmm_uq.points import Floats, Points
-from cmm_uq.units import MICROMETRE, unit
+from cmm_uq.units import unit
 
 LEAST_POINTS = 4
 """Points that a centre and a distance need, not all in one plane."""
@@ -63,7 +63,7 @@ class Radial(Artefact):
                     self.size_title,
                     unit("mm"),
                     facts.length_mm,
-                    (facts.u_um or 0.0) * MICROMETRE,
+                    stated_sd(facts, facts.length_mm),
                     self.size_what,
                 ),
             )

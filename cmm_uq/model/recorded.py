@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
+from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.points import Floats, Points
 from cmm_uq.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
 
@@ -25,9 +25,9 @@ def expansion(facts: ArtefactFacts, points: Points) -> Floats:
     return np.asarray(1 + facts.cte_per_k * (points.columns["temp_artefact_c"] - REFERENCE_TEMPERATURE))
 
 
-def certified_sd(facts: ReferencedFacts) -> float:
-    """Standard uncertainty, mm, of a size that the recording's references carry; infinite when they are nominal."""
-    return np.inf if facts.nominal else (facts.u_um or 0.0) * MICROMETRE
+def stated_sd(facts: ArtefactFacts, length_mm: float) -> float:
+    """Standard uncertainty, mm, of a length of the artefact as the job states it; 0 where it states none."""
+    return float(facts.u_of(length_mm)) * MICROMETRE
 
 
 def columns_needed(points: Points, names: tuple[str, ...], of: str, where: str | None) -> Floats:

@@ -7,6 +7,7 @@ import math
 import tomllib
 from typing import Any
 
+import numpy as np
 import pytest
 import tomlkit
 
@@ -15,6 +16,8 @@ from cmm_uq.commands.simulate import simulated_job
 from cmm_uq.dcc import Certificate, written
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.kinds import kind_named
+from cmm_uq.model.artefact import Artefact
 from tests.conftest import ROOT
 from tests.dcc.artefacts import BALL_BAR, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, listed, value
 from tests.jobs.test_reference_file import GAUGE
@@ -60,6 +63,12 @@ def gauge(
     return job_of({
         "job.toml": tomlkit.dumps(data).encode(), "recording.csv": recording.encode(), "artefact.xml": written(certificate),
     })  # fmt: skip
+
+
+def artefact_of(found: Job) -> Artefact:
+    kind = kind_named(found.facts.artefact.kind)
+    assert kind is not None
+    return kind.observing("reported")(found.facts.artefact, found.points)
 
 
 def test_a_ball_bar_has_its_length_and_the_uncertainty_of_the_certificate() -> None:
@@ -116,17 +125,22 @@ def test_a_shifted_artefact_has_its_known_length_between_the_points_that_the_job
 def test_a_step_gauge_has_its_faces_and_the_uncertainty_of_the_longest() -> None:
     found = gauge(STEP_GAUGE)
     assert found.points.columns["reference_mm"].tolist() == [0, 20.00013, 40.00008, 60.00031] * 2
-    assert (found.facts.artefact.length_mm, found.facts.artefact.u_um) == (60.00031, 0.2)
-    blocks = gauge(STEP_GAUGE, kind="gauge_blocks").facts.artefact
-    assert (blocks.length_mm, blocks.u_um) == (60.00031, 0.2)
+    assert found.facts.artefact.length_mm == 60.00031
+    assert artefact_of(found).sizes[0].sd == pytest.approx(0.2e-3, rel=1e-12)
+    blocks = gauge(STEP_GAUGE, kind="gauge_blocks")
+    assert artefact_of(blocks).sizes[0].sd == pytest.approx(0.2e-3, rel=1e-12)
 
 
 def test_what_two_faces_have_in_common_drops_out_of_their_distance() -> None:
     """u² = u₁² + u₄² − 2 cov: with 0.3 and 0.2 µm and 0.03 µm² in common 0.265 µm, by hand 0.2645751."""
     rows = [["9e-8", "0", "0", "3e-8"], ["0", "4e-8", "0", "0"], ["0", "0", "4e-8", "0"], ["3e-8", "0", "0", "4e-8"]]
     certified = listed("Certified length", "0 20 40 60", "0.0006 0.0004 0.0004 0.0004", covariance=rows)
-    artefact = gauge(issued(listed("Face", "1 2 3 4", unit=r"\one"), certified, table=True)).facts.artefact
-    assert artefact.u_um == pytest.approx(math.sqrt(0.3**2 + 0.2**2 - 2 * 0.03), rel=1e-12)
+    found = artefact_of(gauge(issued(listed("Face", "1 2 3 4", unit=r"\one"), certified, table=True)))
+    assert found.sizes[0].sd == pytest.approx(1e-3 * math.sqrt(0.3**2 + 0.2**2 - 2 * 0.03), rel=1e-12)
+    lengths = found.indications()
+    assert lengths is not None
+    u = [math.sqrt(0.3**2 + 0.2**2), math.sqrt(0.3**2 + 0.2**2), math.sqrt(0.3**2 + 0.2**2 - 2 * 0.03)]
+    assert lengths.u == pytest.approx(1e-3 * np.array(u * 2), rel=1e-12)
 
 
 def test_a_plate_has_its_places_and_the_uncertainty_of_the_farthest_along_its_direction() -> None:
@@ -134,7 +148,7 @@ def test_a_plate_has_its_places_and_the_uncertainty_of_the_farthest_along_its_di
     found = gauge(PLATE, PLATE_RECORDING, "plate")
     assert found.points.columns["reference_y_mm"].tolist() == [0, 0, 83.00034, 83.00051] * 2
     assert found.facts.artefact.length_mm == pytest.approx(math.hypot(83.00043, 83.00051, 0.00007), rel=1e-12)
-    assert found.facts.artefact.u_um == pytest.approx(0.5, rel=1e-6)
+    assert artefact_of(found).sizes[0].sd == pytest.approx(0.5e-3, rel=1e-6)
 
 
 def test_lists_without_uncertainty_leave_it_to_the_job() -> None:

@@ -53,7 +53,34 @@ def test_distances_of_a_step_gauge_come_from_its_certificate() -> None:
     found = job(GAUGE, "certificate.csv", CERTIFICATE)
     assert found.points.columns["reference_mm"].tolist() == [0, 20.00013, 40.00008, 60.00031] * 2
     assert "certificate.csv" in found.inputs
-    assert found.imported[0].data["columns"] == {"point": "Face", "reference_mm": "Certified length (mm)"}
+    assert found.imported[0].data["columns"] == {
+        "point": "Face", "reference_mm": "Certified length (mm)", "reference_U_um": "U (um) k=2",
+    }  # fmt: skip
+
+
+def test_the_uncertainty_of_every_face_is_u_over_the_factor_that_the_heading_says() -> None:
+    """0.10, 0.12, 0.14 and 0.16 µm, k = 2."""
+    found = job(GAUGE, "certificate.csv", CERTIFICATE)
+    assert found.points.columns["reference_u_um"].tolist() == [0.05, 0.06, 0.07, 0.08] * 2
+    assert "reference_U_um" not in found.points.columns
+    other = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "Expanded uncertainty [nm]; k = 2.5"))
+    assert other.points.columns["reference_u_um"][3] == pytest.approx(0.16e-3 / 2.5, rel=1e-12)
+    small = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "u (µm)"))
+    assert small.points.columns["reference_u_um"].tolist() == [0.10, 0.12, 0.14, 0.16] * 2
+
+
+@pytest.mark.parametrize(
+    ("heading", "message"),
+    [
+        ("U (um)", r"certificate\.csv: reference_U_um needs a coverage factor of its own\. Give k = 2\.0 in \[artefact\]"),
+        ("Expanded uncertainty", "reference_U_um needs a coverage factor"),
+        ("U", "the column 'U' looks like an uncertainty, and is none that is read. Name it reference_U_um"),
+        ("U (um) k=20", r"certificate\.csv: says k = 20 in a heading"),
+    ],
+)
+def test_an_uncertainty_that_cannot_be_used_is_refused_and_never_left_out(heading: str, message: str) -> None:
+    with pytest.raises(CmmUqError, match=message):
+        job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", heading))
 
 
 def test_places_of_a_plate_come_from_a_digital_certificate() -> None:

@@ -32,6 +32,13 @@ class Recognised:
     points: int
 
     @property
+    def unused(self) -> tuple[str, ...]:
+        """Headings of columns that are not used, the first of them."""
+        return tuple(
+            name for fact in self.facts if fact.key == "not_used" for name in str.__str__(fact.value).split(", ")
+        )
+
+    @property
     def rows(self) -> list[tuple[Text, Text]]:
         """Everything, for a table."""
         head = [(say("File"), Verbatim(self.file)), (say("Format"), self.title)]

@@ -36,6 +36,10 @@ _PHRASES: Mapping[str, str] = {
                     "|zertifizierte lange|longueur de reference|longueur certifiee|longueur etalonnee|valeur certifiee"
                     "|riferimento|lunghezza di riferimento|lunghezza certificata|valore certificato|referencia"
                     "|longitud de referencia|longitud certificada|valor certificado",
+    "reference_u_um": "standard uncertainty|standardunsicherheit|standardmessunsicherheit|incertitude type|incertezza tipo"
+                      "|incertidumbre tipica",
+    "reference_U_um": "expanded uncertainty|uncertainty|measurement uncertainty|messunsicherheit|erweiterte messunsicherheit"
+                      "|incertitude|incertitude elargie|incertezza|incertezza estesa|incertidumbre|incertidumbre expandida",
     "time_s": "time|elapsed|elapsed time|zeit|temps|tempo|tiempo",
     "temp_artefact_c": "temperature artefact|artefact temperature|part temperature|werkstucktemperatur|artefakttemperatur"
                        "|temperature de la piece|temperature piece|temperatura pezzo|temperatura del pezzo|temperatura pieza"
@@ -74,6 +78,12 @@ _SMALL = _set("no nr n number nummer numero num")
 _LONGEST = 120
 """Characters of a heading; longer text is none."""
 
+COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
+"""Coverage factor in a heading, as ``U (µm), k = 2``."""
+
+_SYMBOLS: Mapping[str, str] = {"U": "reference_U_um", "U95": "reference_U_um", "u": "reference_u_um"}
+"""What certificates print above a column, beside its unit or its coverage factor."""
+
 _FIGURES = frozenset("0123456789+-−.,")
 _OWN = frozenset((*REQUIRED, *OPTIONAL))
 _IN_BRACKETS = re.compile(r"\s*[\[(<{]\s*([^\])>}]*?)\s*[\])>}]\s*$")
@@ -107,7 +117,10 @@ def understood(heading: str) -> Heading:
         return Heading(heading)
     if heading[:1] in _FIGURES or len(heading) > _LONGEST:
         return Heading()
-    text, unit, odd = _without_unit(heading)
+    without = COVERAGE.sub(" ", heading)
+    text, unit, odd = _without_unit(without)
+    if text.strip() in _SYMBOLS and (unit is not None or without != heading):
+        return Heading(_SYMBOLS[text.strip()], None, unit, odd)
     words = _words(text)
     indices = [int(word) for word in words if word.isdigit()]
     named = tuple(word for word in words if not word.isdigit())

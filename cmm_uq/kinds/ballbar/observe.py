@@ -16,10 +16,10 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.messages import Text, say
 from cmm_uq.model.artefact import Artefact, Indications, Size
 from cmm_uq.model.own_faults import temperature_of
-from cmm_uq.model.recorded import check_length, expansion
+from cmm_uq.model.recorded import check_length, expansion, stated_sd
 from cmm_uq.physics.effect import Effect
 from cmm_uq.points import Floats, Ints, Points
-from cmm_uq.units import MICROMETRE, unit
+from cmm_uq.units import unit
 
 
 class Ballbar(Artefact):
@@ -63,7 +63,7 @@ class Ballbar(Artefact):
                     say("Length of the bar"),
                     unit("mm"),
                     facts.length_mm,
-                    (facts.u_um or 0.0) * MICROMETRE,
+                    stated_sd(facts, facts.length_mm),
                     say("length"),
                 ),
             )

@@ -4,8 +4,9 @@ Every face is an observation: how far along the line it was found, against its c
 first to the farthest face as recorded, so its two directions across cost nothing, and its position is free in each
 measurement. What lies across the line (where on a face the probe touched) says nothing and is left as it is.
 
-The certificate's uncertainty is taken as common to all distances and proportional to them (one scale of the gauge), since
-that is the part that no number of faces averages out.
+What the certificate leaves open is its uncertainty of every length by itself (``u_between``). Where several lengths are taken
+together it is one error of the gauge that all have in common, in proportion to the lengths where a number is stated, since that
+is the part that no number of faces averages out.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Artefact, Indications, Size
+from cmm_uq.model.certified_places import CertifiedPlaces
 from cmm_uq.model.own_faults import by_certificate, faults
 from cmm_uq.model.placings import Placings
-from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
+from cmm_uq.model.recorded import check_length, columns_needed, expansion, place
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.own_body import Body
 from cmm_uq.physics.own_errors import ALONG_A_LINE
@@ -60,7 +62,7 @@ class StepGauge(Artefact):
 
     Parameters
     ----------
-    facts : what the job says of the gauge; ``u_um`` belongs to ``length_mm``, or to the longest distance recorded.
+    facts : what the job says of the gauge; ``length_mm`` is its longest distance, by default of those recorded.
     points : the recording, with ``reference_mm``.
 
     Raises
@@ -82,18 +84,24 @@ class StepGauge(Artefact):
         self.rows = np.arange(len(points))[:, None]
         self.noise_scale = np.ones(len(points))
         self.expansion = expansion(facts, points)
-        longest = float(self._lines.sums(self._ends * self.reference).max())
-        length = facts.length_mm or longest
+        spans = self._lines.sums(self._ends * self.reference)
+        length = facts.length_mm or float(spans.max())
+        self.certificate = CertifiedPlaces.of(facts, points, self.reference[:, None])
+        longest = np.flatnonzero(self._lines.index == np.argmax(spans))
+        first, last = (longest[pick(self.reference[longest])] for pick in (np.argmin, np.argmax))
         self.sizes = (
             Size(
                 "length_mm",
                 say("Length of the {title:small}", title=self.title),
                 unit("mm"),
                 length,
-                certified_sd(facts),
+                self.certificate.sd(length, int(first), int(last)),
                 say("length"),
             ),
         )
+        self._together = self.reference / length
+        if not self.certificate.plain and self.sizes[0].certified:
+            self._together = self.certificate.together(self.reference[:, None], self.sizes[0].sd, int(last))[:, 0]
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: every point moved along its line to its certified distance."""
@@ -109,12 +117,14 @@ class StepGauge(Artefact):
         """See :meth:`Artefact.own_faults`: along its line."""
         places = np.column_stack([self.reference, np.zeros((len(self.reference), 2))])
         body = Body.of(self.points, places, ("reference_mm",))
-        known = by_certificate(self._facts.u_um, _LAPPED_UM)
+        known = by_certificate(self.certificate.u_um(self.sizes[0].sd), _LAPPED_UM)
         return faults(self._facts, self.points, body, known, axes=1, geometry=ALONG_A_LINE)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`: in proportion to the distance."""
-        return np.asarray((self.reference * self.expansion / self.sizes[0].nominal)[:, None], dtype=np.float64)
+        """See :meth:`Artefact.size_change`: in proportion to the distance, or as its uncertainty grows with it."""
+        if self.certificate.plain:
+            return np.asarray((self.reference * self.expansion / self.sizes[0].nominal)[:, None], dtype=np.float64)
+        return np.asarray((self._together * self.expansion)[:, None], dtype=np.float64)
 
     def placing(self, xyz: Floats) -> Freedoms:
         """See :meth:`Artefact.placing`: the position along each line."""
@@ -134,8 +144,8 @@ class StepGauge(Artefact):
         chosen = np.abs(lengths) > _SAME_FACE
         errors = (np.sign(lengths) * (found - certified) / self.expansion)[chosen]
         lengths = np.abs(lengths)[chosen]
-        u = self.sizes[0].sd * lengths / self.sizes[0].nominal
-        return Indications(errors, lengths, u, np.column_stack([first, np.arange(len(first))])[chosen])
+        rows = np.column_stack([first, np.arange(len(first))])[chosen]
+        return Indications(errors, lengths, self.certificate.u_between(rows[:, 0], rows[:, 1]), rows)
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
         """See :meth:`Artefact.lines_of`.
@@ -192,7 +202,10 @@ class StepGauge(Artefact):
                          (means[0] - means[1])[both], weights)  # fmt: skip
 
     def _distances(self, length: float) -> Floats:
-        return np.asarray(self.reference * self.expansion * (length / self.sizes[0].nominal), dtype=np.float64)
+        if self.certificate.plain:
+            return np.asarray(self.reference * self.expansion * (length / self.sizes[0].nominal), dtype=np.float64)
+        longer = (length - self.sizes[0].nominal) * self._together
+        return np.asarray((self.reference + longer) * self.expansion, dtype=np.float64)
 
     def _refuse_what_is_no_gauge(self, where: str | None) -> None:
         points, lines, what = self.points, self._lines, self.title.lower()

@@ -17,9 +17,10 @@ from cmm_uq.jobs.earlier import NOISE_RATIO
 from cmm_uq.kinds.plate.facts import PlateFacts
 from cmm_uq.messages import say
 from cmm_uq.model.artefact import Indications, Size
+from cmm_uq.model.certified_places import CertifiedPlaces
 from cmm_uq.model.own_faults import by_certificate, faults, since_earlier
 from cmm_uq.model.placings import Placings
-from cmm_uq.model.recorded import certified_sd, check_length, columns_needed, expansion, place
+from cmm_uq.model.recorded import check_length, columns_needed, expansion, place
 from cmm_uq.model.rigid import Rigid
 from cmm_uq.physics.effect import Effect
 from cmm_uq.physics.own_body import Body
@@ -60,8 +61,10 @@ class Plate(Rigid):
             self.noise_scale = points.columns[NOISE_RATIO][self.rows[:, 0]]
         self.reference = columns_needed(points, REFERENCES, self.kind, where)
         self.expansion = expansion(facts, points)
-        first = self.reference[np.argmin(points.point)]
-        longest = float(np.linalg.norm(self.reference - first, axis=1).max())
+        self.certificate = CertifiedPlaces.of(facts, points, self.reference)
+        from_first = int(np.argmin(points.point))
+        away = np.linalg.norm(self.reference - self.reference[from_first], axis=1)
+        farthest, longest = int(np.argmax(away)), float(away.max())
         body = self.reference * self.expansion[:, None]
         self.body = body - self.placings.means(body)
         self.sizes = (
@@ -70,26 +73,33 @@ class Plate(Rigid):
                 say("Length of the plate"),
                 unit("mm"),
                 facts.length_mm or longest,
-                certified_sd(facts),
+                self.certificate.sd(facts.length_mm or longest, from_first, farthest),
                 say("length"),
             ),
         )
+        self._together = self.body / self.sizes[0].nominal
+        if not self.certificate.plain and self.sizes[0].certified:
+            about = self.reference - self.placings.means(self.reference)
+            together = self.certificate.together(about, self.sizes[0].sd, farthest) * self.expansion[:, None]
+            self._together = together - self.placings.means(together)
         self._refuse_another_plate(where)
 
     def shape(self, sizes: Floats) -> Floats:
         """See :meth:`Rigid.shape`: all positions in proportion."""
-        return np.asarray(self.body * (sizes[0] / self.sizes[0].nominal), dtype=np.float64)
+        if self.certificate.plain:
+            return np.asarray(self.body * (sizes[0] / self.sizes[0].nominal), dtype=np.float64)
+        return np.asarray(self.body + (sizes[0] - self.sizes[0].nominal) * self._together, dtype=np.float64)
 
     def own_faults(self) -> Iterable[Effect]:
         """See :meth:`Artefact.own_faults`: by its certificate; without one as holes are drilled."""
         earlier = NOISE_RATIO in self.points.columns
         body = Body.of(self.points, self.reference, () if earlier else REFERENCES)
-        known = since_earlier(CHANGED_UM) if earlier else by_certificate(self._facts.u_um, DRILLED_UM)
+        known = since_earlier(CHANGED_UM) if earlier else by_certificate(self.certificate.u_um(self.sizes[0].sd), DRILLED_UM)
         return faults(self._facts, self.points, body, known)
 
     def size_change(self) -> Floats:
         """See :meth:`Artefact.size_change`: away from the middle of each placing, in proportion."""
-        return self.body.reshape(-1, 1) / self.sizes[0].nominal
+        return self._together.reshape(-1, 1)
 
     def unread(self) -> NDArray[np.bool_]:
         """See :meth:`Artefact.unread`; of two dates, what stood still on the earlier one is no difference either."""
@@ -112,8 +122,9 @@ class Plate(Rigid):
             found.append(np.linalg.norm(self.points.xyz[b] - self.points.xyz[a], axis=1) / ratio)
             certified.append(np.linalg.norm(self.reference[b] - self.reference[a], axis=1))
         lengths = np.concatenate(certified)
-        return Indications(np.concatenate(found) - lengths, lengths, size.sd * lengths / size.nominal,
-                           np.concatenate(ends))  # fmt: skip
+        rows = np.concatenate(ends)
+        u = self.certificate.u_between(rows[:, 0], rows[:, 1])
+        return Indications(np.concatenate(found) - lengths, lengths, u, rows)
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
         """See :meth:`Artefact.bidirectional`: distances of centres never are."""
