@@ -59,8 +59,8 @@ class ArtefactFacts(Table):
     """Standard uncertainty (k = 1) of every certified length of the artefact, a number or a formula of the length as
     `"0.1 + 0.25·L/1000"`; `U_um` with `k` may stand for it."""
     U_um: LengthUncertainty | None = None
-    """Expanded uncertainty as the artefact's certificate states it, in place of `u_um`: a number, or a formula of the length as
-    `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
+    """Expanded uncertainty as the artefact's certificate states it, in place of `u_um`: a number, or a formula of the length
+    as `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
     k: Factor | None = None
     """Coverage factor of `U_um`, or of a column `reference_U_um`."""
     degrees_of_freedom: Freedom | None = None
@@ -79,7 +79,9 @@ class ArtefactFacts(Table):
     @model_validator(mode="after")
     def _uncertainty_of_something(self) -> Self:
         if self.degrees_of_freedom is not None and self.u_um is None and not self.with_references:
-            raise ValueError("degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out")
+            raise ValueError(
+                "degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out"
+            )
         if self.u_um is not None and self.length_mm is None and not self.with_references:
             raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
         if abs(self.cte_per_k) > 1e-3:

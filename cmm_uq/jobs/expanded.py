@@ -1,7 +1,7 @@
 """The uncertainty of a calibrated length as its certificate states it: U or u, a number or a formula of the length.
 
-Certificates print ``U = 0.2 µm + 0.5·10⁻⁶·L, k = 2`` or ``Q[0.2; 0.5·L/1000]``, the root of the sum of both squares. L is in mm
-and the result in µm; what may be read in two ways is refused.
+Certificates print ``U = 0.2 µm + 0.5·10⁻⁶·L, k = 2`` or ``Q[0.2; 0.5·L/1000]``, the root of the sum of both squares. L is
+in mm and the result in µm; what may be read in two ways is refused.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ HOW = (
 _LEVEL = 0.95
 """Probability of the interval that a certificate with degrees of freedom and without k states (JCGM 100:2008, table G.2)."""
 
-_MINUS = str.maketrans({"⁻": "-", "−": "-", "–": "-", **{raised: str(digit) for digit, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}})
-_NUMBER = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)"
-_IN_A_METRE = re.compile(
-    rf"(?P<slope>{_NUMBER})?(?:[*·×]?10\^?\(?-6\)?|(?<=\d)[eE]-0?6|(?:µm|μm|um)/m)[*·×]?L(?!/)"
+_MINUS = str.maketrans(
+    {"⁻": "-", "−": "-", "–": "-", **{raised: str(digit) for digit, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}}
 )
+_NUMBER = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)"
+_IN_A_METRE = re.compile(rf"(?P<slope>{_NUMBER})?(?:[*·×]?10\^?\(?-6\)?|(?<=\d)[eE]-0?6|(?:µm|μm|um)/m)[*·×]?L(?!/)")
 """0.5·10⁻⁶·L, both in one unit, 0.5e-6·L, and 0.5 µm/m·L."""
 
 _BARE = re.compile(r"L(?!/)")
@@ -75,10 +75,12 @@ def growing_of(text: str) -> Growing | float:
     plain = _LEADING_ZERO.sub("0.", plain)
     terms = _QUADRATIC.fullmatch(plain) or _QUADRATIC_BY_COMMA.fullmatch(plain)
     parts = [_term(terms["first"]), _term(terms["second"])] if terms else [_term(plain)]
-    if terms and sorted(bool(slope) for _, slope in parts) != [False, True] or any(a and b for a, b in parts if terms):
+    if (terms and sorted(bool(slope) for _, slope in parts) != [False, True]) or any(
+        a and b for a, b in parts if terms
+    ):
         raise ValueError(HOW)
     fixed, per_mm = (sum(column) for column in zip(*parts, strict=True))
-    if not 0 < fixed + per_mm * LONGEST_MM or fixed > LARGEST_UM or per_mm * 1000 > LARGEST_UM:
+    if not fixed + per_mm * LONGEST_MM > 0 or fixed > LARGEST_UM or per_mm * 1000 > LARGEST_UM:
         raise ValueError(HOW)
     return Growing(fixed, per_mm, bool(terms)) if per_mm else fixed
 

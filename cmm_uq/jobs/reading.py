@@ -23,6 +23,7 @@ from cmm_uq.jobs.earlier_noise import noise_file
 from cmm_uq.jobs.file_names import check_distinct
 from cmm_uq.jobs.importing.dcc import ROOT as DCC
 from cmm_uq.jobs.importing.format import HEAD
+from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.importing.xml_files import begins_with
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
 from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
@@ -142,19 +143,9 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         inputs[facts.recording.file], where, machine, facts.recording, acquired.without if acquired else ()
     )
     told = [recognised, None if says is None else says.recognised]
-    if certificate and facts.artefact.with_references:
-        points, recognised = with_references(points, facts.artefact, inputs, folder, where)
-        told.append(recognised)
-    if facts.artefact.with_references:
-        if says is not None and says.places is not None:
-            points, artefact = says.places.beside(points, facts.artefact)
-            facts = facts.model_copy(update={"artefact": artefact})
-        named = str(folder / certificate[0]) if certificate else where
-        points = with_uncertainties(points, facts.artefact, named, [head for one in told if one for head in one.unused])
-        _refuse_unstated(facts, points, nameable.standards, path)
-    elif any(name in points.columns for name in (*OF_POINTS, EXPANDED)):
-        raise CmmUqError(f"has uncertainties of certified points, which a job of kind {facts.artefact.kind!r} has not",
-                         where=where, fix="Give U_um and k in [artefact], and leave the column out")  # fmt: skip
+    facts, points, further = _certified_points(facts, points, inputs, source, says, told)
+    told.append(further)
+    _refuse_unstated(facts, points, nameable.standards, path)
     planned = is_planned(inputs[facts.recording.file])
     if not planned:  # a plan has no times yet
         points = with_logged(points, log_of(facts.machine, inputs, folder), path, where)
@@ -178,9 +169,36 @@ def _pictures(source: Source, names: Sequence[str]) -> dict[str, bytes]:
     return found
 
 
+def _certified_points(
+    facts: JobFile, points: Points, inputs: Mapping[str, bytes], source: Source, says: Read | None,
+    told: Sequence[Recognised | None],
+) -> tuple[JobFile, Points, Recognised | None]:  # fmt: skip
+    """A recording with certified values and their uncertainties, the job with covariances, how their file was read."""
+    folder, recognised, artefact = source.toml.parent, None, facts.artefact
+    where = str(folder / facts.recording.file)
+    if not artefact.with_references:
+        if any(name in points.columns for name in (*OF_POINTS, EXPANDED)):
+            raise CmmUqError(f"has uncertainties of certified points, which a job of kind {artefact.kind!r} has not",
+                             where=where, fix="Give U_um and k in [artefact], and leave the column out")  # fmt: skip
+        return facts, points, None
+    if reference_file(artefact):
+        points, recognised = with_references(points, artefact, inputs, folder, where)
+    if says is not None and says.places is not None:
+        points, artefact = says.places.beside(points, artefact)
+        facts = facts.model_copy(update={"artefact": artefact})
+    if recognised is not None:
+        where = str(folder / recognised.file)
+    unread = [heading for one in (*told, recognised) if one is not None for heading in one.unused]
+    return facts, with_uncertainties(points, artefact, where, unread), recognised
+
+
 def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path: Path) -> None:
     """That a rule needs an uncertainty which neither the job nor its certified values state."""
-    if facts.artefact.u_um is not None or any(name in points.columns for name in OF_POINTS):
+    if (
+        not facts.artefact.with_references
+        or facts.artefact.u_um is not None
+        or any(name in points.columns for name in OF_POINTS)
+    ):
         return
     for wish in facts.conformity:
         key = uncertainty_missing(wish, facts.artefact, facts.test_uncertainty, standards)

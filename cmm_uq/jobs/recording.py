@@ -25,7 +25,8 @@ REQUIRED = ("measurement", "point", *COORDINATES)
 OPTIONAL = (
     "repeat", "reference_mm", "reference_u_um", "reference_U_um", "approach_x", "approach_y", "approach_z",
     "reference_x_mm", "reference_y_mm", "reference_z_mm", "reference_u_x_um", "reference_u_y_um", "reference_u_z_um",
-    "nx", "ny", "nz", "time_s", "temp_x_c", "temp_y_c", "temp_z_c", "temp_artefact_c", "temp_table_top_c", "temp_table_bottom_c", "temp_air_c", "pressure_hpa", "humidity_pct", "speed_mm_s", "gamma_deg",
+    "nx", "ny", "nz", "time_s", "temp_x_c", "temp_y_c", "temp_z_c", "temp_artefact_c",
+    "temp_table_top_c", "temp_table_bottom_c", "temp_air_c", "pressure_hpa", "humidity_pct", "speed_mm_s", "gamma_deg",
     "tip_x_mm", "tip_y_mm", "tip_z_mm", "radius_mm", "fit_rms_um", "n_points",
 )  # fmt: skip
 WHOLE = ("measurement", "point", "repeat")

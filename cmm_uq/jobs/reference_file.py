@@ -123,7 +123,9 @@ def with_uncertainties(points: Points, artefact: ArtefactFacts, where: str, unre
     for name in here:
         if np.any(columns[name] < 0):
             line = points.lines[int(np.argmin(columns[name]))] if len(points.lines) else 0
-            raise CmmUqError(f"{name} is below 0", where=f"{where} line {line}", fix="Give uncertainties in µm, 0 or more")
+            raise CmmUqError(
+                f"{name} is below 0", where=f"{where} line {line}", fix="Give uncertainties in µm, 0 or more"
+            )
     if here and artefact.nominal_only:
         raise CmmUqError(f"has {here[0]}, and nominal = true says that nothing is certified", where=where,
                          fix="Leave nominal or the column out")  # fmt: skip

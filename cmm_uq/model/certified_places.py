@@ -57,7 +57,11 @@ class CertifiedPlaces:
     @property
     def plain(self) -> bool:
         """Whether a number, or nothing, is stated of all lengths alike."""
-        return self.u is None and self.covariance is None and (self.facts.u_um is None or isinstance(self.facts.u_um, float))
+        return (
+            self.u is None
+            and self.covariance is None
+            and (self.facts.u_um is None or isinstance(self.facts.u_um, float))
+        )
 
     def u_um(self, sd_mm: float) -> float | None:
         """Standard uncertainty of the longest length, µm, as stated; ``None`` where nothing is.
@@ -73,7 +77,7 @@ class CertifiedPlaces:
     def u_between(self, first: Ints, last: Ints) -> Floats:
         """Standard uncertainty of the certified distance between two places, (m,) mm.
 
-        By the covariance; else the larger of what is stated of such a length and of the places by themselves, each independent.
+        By the covariance; else the larger of what is stated of such a length and of the places, each independent.
         """
         apart = self.places[last] - self.places[first]
         lengths = np.sqrt(np.sum(apart**2, axis=1))
@@ -81,11 +85,12 @@ class CertifiedPlaces:
         stated = self.facts.u_of(lengths) * MICROMETRE
         if self.covariance is not None:
             each = [c[first, first] + c[last, last] - 2 * c[first, last] for c in self.covariance]
-            return np.maximum(stated, np.sqrt(np.maximum(np.sum(along**2 * np.column_stack(each), axis=1), 0.0)))
+            own = np.sqrt(np.maximum(np.sum(along**2 * np.column_stack(each), axis=1), 0.0))
+            return np.asarray(np.maximum(stated, own), dtype=np.float64)
         if self.u is None:
             return np.asarray(stated, dtype=np.float64)
         own = np.sqrt(np.sum(along**2 * (self.u[first] ** 2 + self.u[last] ** 2), axis=1))
-        return np.maximum(stated, own)
+        return np.asarray(np.maximum(stated, own), dtype=np.float64)
 
     def sd(self, length_mm: float, first: int, last: int) -> float:
         """Standard uncertainty of the artefact's length, mm; infinite where its places are nominal.

@@ -35,7 +35,7 @@ Errors = Mapping[tuple[int, int, float], float]
 
 def gauge(
     directions: Sequence[Floats] = SEVEN, lengths: Sequence[Sequence[float]] | None = None, *, errors: Errors | None = None,
-    repeats: int = 3, u_um: float | None = 0.4, length_mm: float = 800.0, machine: Machine = MACHINE,
+    repeats: int = 3, u_um: float | str | None = "L/2000", length_mm: float = 800.0, machine: Machine = MACHINE,
 ) -> StepGauge:  # fmt: skip
     """Each line through the middle of the volume, faces at 0 and at its lengths; repeats differ by 1 nm across the line.
 
@@ -80,7 +80,7 @@ def copied_runs(artefact: StepGauge, runs: Mapping[tuple[int, int], tuple[int, i
             (points.measurement == measurement) & (points.repeat == repeat) for measurement, repeat in (to, of)
         )
         xyz[at] = xyz[source]
-    facts = artefact_facts(kind="step_gauge", length_mm=artefact.sizes[0].nominal, u_um=artefact.sizes[0].sd * 1e3)
+    facts = artefact_facts(kind="step_gauge", length_mm=artefact.sizes[0].nominal, u_um=artefact.certificate.facts.u_um)
     return StepGauge(facts, points.at(xyz))
 
 

@@ -25,7 +25,7 @@ from cmm_uq.uncertainty.quantity import Quantity
 from tests.conformity import recorded
 from tests.recordings import bar_facts, screened
 
-STEP_GAUGE = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+STEP_GAUGE = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
 SPHERE = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.2)
 ISO = {"standard": "ISO 10360-2:2009", "mpe": "2.5 + L/300"}
 UNDER = replace(recorded.STATED, uncertainty=recorded.STATED.uncertainty.model_copy(update={"u_repeat_um": 0.05}))

@@ -30,7 +30,7 @@ def judged(
     return statement(facts, artefact, span, "[[conformity]] 1", (LENGTHS, BARS, FORMS), None, under)
 
 
-def line(u_um: float | None = 0.4) -> Artefact:
+def line(u_um: float | str | None = "L/2000") -> Artefact:
     return gauge([np.eye(3)[0]], [[20.0, 800.0]], errors={(1, 1, 800.0): 4.0}, u_um=u_um)
 
 

@@ -87,7 +87,7 @@ def there_and_back(senses: tuple[float, float]) -> StepGauge:
         np.where(abs(direction) > 1e-9, direction, 0.0)
     )
     columns = {f"approach_{a}": sense[:, i] for i, a in enumerate("xyz")}
-    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
     return StepGauge(facts, with_columns(artefact.points, **columns))
 
 
@@ -141,7 +141,7 @@ def test_rated_conditions_that_were_not_kept_make_no_pass() -> None:
 
 def test_the_whole_budget_decides_and_not_the_calibration_alone() -> None:
     """820 mm, 1 K off, u(α) 1.2e-6, u(t) 0.04 K, fixturing 0.1: √(0.4² + 0.984² + 0.3772² + 0.1²) = 1.1308 µm, not 0.40."""
-    artefact = gauge([np.eye(3)[0]], [[20.0, 820.0]], length_mm=820.0)
+    artefact = gauge([np.eye(3)[0]], [[20.0, 820.0]], length_mm=820.0, u_um=0.4)
     artefact.points = with_columns(artefact.points, temp_artefact_c=np.full(len(artefact.points), 21.0))
     stated = TestUncertainty(u_cte_per_k=1.2e-6, u_temperature_k=0.04, u_fixturing_um=0.1)
     found = judged(artefact, Circumstances(stated, cte_per_k=11.5e-6))
@@ -184,10 +184,17 @@ def test_an_expanded_uncertainty_stands_for_a_standard_one(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(
-    "keys", ["U_um = 0.8", "u_um = 0.4\nU_um = 0.8\nk = 2.0", "U_um = 0.8\nk = 0.5", 'U_um = "x"\nk = 2.0']
+    "keys",
+    [
+        "U_um = 0.8",
+        "u_um = 0.4\nU_um = 0.8\nk = 2.0",
+        "U_um = 0.8\nk = 0.5",
+        'U_um = "x"\nk = 2.0',
+        "U_um = true\nk = 2.0",
+    ],
 )
 def test_half_an_expanded_uncertainty_is_refused(tmp_path: Path, keys: str) -> None:
-    with pytest.raises(CmmUqError, match="U_um"):
+    with pytest.raises(CmmUqError, match=r"U_um|is no uncertainty of a length: write it as"):
         read_job(job(tmp_path, {"u_um = 0.4": keys}))
 
 

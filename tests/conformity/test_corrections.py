@@ -30,7 +30,7 @@ def told(
 ) -> Consequences | None:
     """Twenty bars, or seven lines, with a squareness; the model is known, and 1 µm of noise is said to be in each reading."""
     ideal = gauge() if lines else with_bars()
-    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4) if lines else bar_facts(300.0, 0.01)
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000") if lines else bar_facts(300.0, 0.01)
     kind = StepGauge if lines else Ballbar
     acting = MeasurementModel(ideal, effects(("squareness_xy",)))
     nominal = np.array([size.nominal for size in ideal.sizes])

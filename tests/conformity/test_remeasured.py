@@ -33,10 +33,12 @@ def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 
             np.concatenate([points.point, more.point]), np.concatenate([points.repeat, more.repeat]), points.machine,
             {name: np.concatenate([points.columns[name], more.columns[name]]) for name in points.columns},
         )  # fmt: skip
-        artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), both)
+        artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000"), both)
     if shuffled is not None:
         rows = np.random.default_rng(shuffled).permutation(len(artefact.points))
-        artefact = StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), artefact.points.select(rows))
+        artefact = StepGauge(
+            artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000"), artefact.points.select(rows)
+        )
     facts = FACTS.model_copy(update={"standard": standard})
     return statement(facts, artefact, {}, "[[conformity]] 1", [LENGTHS], None, STATED)
 

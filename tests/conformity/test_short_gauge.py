@@ -31,7 +31,7 @@ def one_sided(errors: Errors | None = None, **how: Any) -> StepGauge:
     made = gauge(errors=errors, **how)
     along = np.sign(np.array([SEVEN[m - 1] for m in made.points.measurement]))
     points = with_columns(made.points, **{f"approach_{a}": along[:, i] for i, a in enumerate("xyz")})
-    return StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4), points)
+    return StepGauge(artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000"), points)
 
 
 def short(
@@ -150,7 +150,7 @@ def test_to_lengths_met_from_both_sides_nothing_is_added() -> None:
         np.array([SEVEN[m - 1] for m in made.points.measurement])
     )
     both = StepGauge(
-        artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4),
+        artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000"),
         with_columns(made.points, **{f"approach_{a}": sense[:, i] for i, a in enumerate("xyz")}),
     )
     found = judged(both, short((9.0, 9.0, 9.0)))

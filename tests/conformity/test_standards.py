@@ -215,7 +215,7 @@ def test_where_a_face_is_touched_does_not_move_its_length_to_another_line() -> N
     """Faces touched up to 4 mm aside: that turns a length of 20 mm by 11°, and a line of hundreds of mm hardly."""
     line = gauge()
     aside = np.where(np.arange(len(line.points)) % 2, 4.0, 0.0)[:, None] * np.array([[0.6, -0.64, 0.48]])
-    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
     across = aside - np.einsum("ni,ni->n", aside, line.directions())[:, None] * line.directions()
     found = judged(StepGauge(facts, line.points.at(line.points.xyz + across)), limit_um=200.0)
     assert found.missing == ()
@@ -421,13 +421,13 @@ UNCERTAINTY_IGNORED = (
 
 
 def test_a_guarded_statement_on_lengths_remarks_their_uncertainty_and_the_worst() -> None:
-    """u at the worst length is 0.41236 · 612.3456/800 = 0.31563; 2.5 of 4.541 there, 0.1 of 2.567 at 20 mm."""
+    """u of every length is the 0.41236 that is stated; 2.5 of 4.541 there, 0.1 of 2.567 at 20 mm."""
     errors = {(1, 1, 20.0): 0.1, (1, 1, 612.3456): 2.5}
     found = judged(gauge([np.eye(3)[0]], [[20.0, 612.3456]], errors=errors, repeats=1, u_um=0.41236))
     assert found.remarks == (
-        "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, 0.316 µm for the length "
+        "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, 0.412 µm for the length "
         "named; nothing else is stated ([test_uncertainty]).",
-        "2 lengths decided, each by its own u and limit; least favourable: measurement 1, repeat 1, 612.35 mm.",
+        "2 lengths decided, each by its own u and limit; least favourable: measurement 1, repeat 1, 612.3456 mm.",
         UNKNOWN_SIDES,
         BY_MEASUREMENT_ALONE,
     )

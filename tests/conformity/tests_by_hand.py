@@ -62,7 +62,7 @@ def lengths(
         every = [list(five_with_200(direction, count, longest)) for direction in chosen]
         off = (1, 2) if how != "one repeat out" else (2,)
         artefact = gauge(chosen, every, errors={(1, repeat, every[0][1]): -ERROR for repeat in off},
-                         u_um=None if how == "no u" else 0.4)  # fmt: skip
+                         u_um=None if how == "no u" else "L/2000")  # fmt: skip
         points = artefact.points
         if how == "copied":
             xyz = points.xyz.copy()
@@ -73,7 +73,7 @@ def lengths(
             points = with_columns(
                 points, **{f"tip_{a}_mm": np.full(len(points), offset[i]) for i, a in enumerate("xyz")}
             )
-        facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=None if how == "no u" else 0.4)
+        facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=None if how == "no u" else "L/2000")
         return Hand(StepGauge(facts, points), STATED, {}, ERROR, 0.1 * every[0][1] / 200.0, True)
 
     return made
@@ -98,7 +98,7 @@ def ranges(how: str) -> Hand:
         xyz = points.xyz.copy()
         xyz[(points.measurement == 7) & (points.repeat == 3)] = xyz[(points.measurement == 7) & (points.repeat == 1)]
         points = points.at(xyz)
-    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
     stated = changing(0.0 if how == "no u" else 0.2)
     return Hand(StepGauge(facts, points), stated, {}, ERROR, 0.2, False)
 

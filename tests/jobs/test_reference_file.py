@@ -72,7 +72,10 @@ def test_the_uncertainty_of_every_face_is_u_over_the_factor_that_the_heading_say
 @pytest.mark.parametrize(
     ("heading", "message"),
     [
-        ("U (um)", r"certificate\.csv: reference_U_um needs a coverage factor of its own\. Give k = 2\.0 in \[artefact\]"),
+        (
+            "U (um)",
+            r"certificate\.csv: reference_U_um needs a coverage factor of its own\. Give k = 2\.0 in \[artefact\]",
+        ),
         ("Expanded uncertainty", "reference_U_um needs a coverage factor"),
         ("U", "the column 'U' looks like an uncertainty, and is none that is read. Name it reference_U_um"),
         ("U (um) k=20", r"certificate\.csv: says k = 20 in a heading"),

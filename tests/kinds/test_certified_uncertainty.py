@@ -1,4 +1,4 @@
-"""Every calibrated length has the uncertainty that its certificate states of it: of a formula, a number, a column, a covariance."""
+"""Every calibrated length has the uncertainty that its certificate states: by a formula, a number, a column, a covariance."""
 
 from __future__ import annotations
 
@@ -124,7 +124,9 @@ def test_distances_of_balls_are_propagated_along_their_direction() -> None:
 @given(st.floats(0.05, 2), st.floats(0, 3), st.floats(1.01, 3))
 def test_a_less_certain_certificate_never_makes_a_length_more_certain(a: float, b: float, more: float) -> None:
     for form in ("{a} + {b}·L/1000", "Q[{a}; {b}·L/1000]"):
-        text, larger = (form.format(a=f"{x:.6f}", b=f"{y:.6f}") for x, y in ((a, b + 0.01), (a * more, (b + 0.01) * more)))
+        text, larger = (
+            form.format(a=f"{x:.6f}", b=f"{y:.6f}") for x, y in ((a, b + 0.01), (a * more, (b + 0.01) * more))
+        )
         less, greater = (u_um(StepGauge(facts(U_um=one, k=2.0), line(FACES))) for one in (text, larger))
         assert np.all(greater > less)
 

@@ -57,10 +57,11 @@ def software(results: Mapping[str, Any], say_in: SayIn) -> tuple[Software, ...]:
 def equipment(job: Job, say_in: SayIn) -> Equipments:
     """The artefact, the short gauge, and instruments of a recording that was taken live."""
     facts, gauge = job.facts.artefact, job.facts.short_gauge
+    u_um = float(facts.u_of(facts.length_mm or 0.0))
     found = [
         _reference(
             job, facts.name or facts.kind, facts.serial, facts.certificate, say_in,
-            tuple(_certified("certified", say("Certified length"), facts.length_mm, facts.u_um, facts.cte_per_k, say_in)),
+            tuple(_certified("certified", say("Certified length"), facts.length_mm, u_um, facts.cte_per_k, say_in)),
         )
     ]  # fmt: skip
     if gauge is not None:

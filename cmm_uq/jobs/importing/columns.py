@@ -144,7 +144,9 @@ class _Table:
         CmmUqError : a unit that is not known, or one of another quantity.
         """
         named = {}
-        leading = [name for name in COORDINATES if name in written] or [name for name in written if not name.endswith("_um")]
+        leading = [name for name in COORDINATES if name in written] or [
+            name for name in written if not name.endswith("_um")
+        ]
         for name, parts in written.items():
             sort = sort_of(name)
             for _, unit, i in parts:

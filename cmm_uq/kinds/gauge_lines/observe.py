@@ -5,8 +5,8 @@ first to the farthest face as recorded, so its two directions across cost nothin
 measurement. What lies across the line (where on a face the probe touched) says nothing and is left as it is.
 
 What the certificate leaves open is its uncertainty of every length by itself (``u_between``). Where several lengths are taken
-together it is one error of the gauge that all have in common, in proportion to the lengths where a number is stated, since that
-is the part that no number of faces averages out.
+together it is one error of the gauge that all have in common, in proportion to the lengths where a number is stated, since
+that is the part that no number of faces averages out.
 """
 
 from __future__ import annotations

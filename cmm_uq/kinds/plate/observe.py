@@ -94,7 +94,11 @@ class Plate(Rigid):
         """See :meth:`Artefact.own_faults`: by its certificate; without one as holes are drilled."""
         earlier = NOISE_RATIO in self.points.columns
         body = Body.of(self.points, self.reference, () if earlier else REFERENCES)
-        known = since_earlier(CHANGED_UM) if earlier else by_certificate(self.certificate.u_um(self.sizes[0].sd), DRILLED_UM)
+        known = (
+            since_earlier(CHANGED_UM)
+            if earlier
+            else by_certificate(self.certificate.u_um(self.sizes[0].sd), DRILLED_UM)
+        )
         return faults(self._facts, self.points, body, known)
 
     def size_change(self) -> Floats:
