@@ -10,13 +10,17 @@ from numpy.typing import NDArray
 
 from cmm_uq.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
 from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
-from cmm_uq.messages import Text, commas, say
+from cmm_uq.messages import Text, Verbatim, commas, number, say, semicolons
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.uncertainty.rounding import nominal
 
 SAME_LENGTH_MM = 1.0
 """Lengths no farther from each other than this are one nominal length."""
+
+SPACING = 0.75
+"""Of the distance between equally spaced lengths, how far each may lie from its place: gauges have the lengths that they have.
+This project's figure."""
 
 
 def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
@@ -29,6 +33,7 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
         Condition(_positions(plan, absent), absent),
         _long_enough(plan, artefact.points.machine, measured),
         _different(plan, measured),
+        _spread(plan, measured),
         _shortest(plan, measured),
         _repeated(plan, measured),
         *_both_sides(plan, artefact, measured),
@@ -81,9 +86,10 @@ def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[
     if not plan.bidirectional or not places:
         return ()
     known = [one for found in places.values() for one in found if one.bidirectional is not None]
-    if not known:
-        return ()
     what = say("ends of each length reached from opposite sides")
+    if not known:
+        unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
+        return (Condition(what, (unknown,), Verbatim("columns approach_x, approach_y, approach_z")),)
     if not any(one.bidirectional for one in known):
         short = say(
             "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
@@ -189,6 +195,43 @@ def _different(plan: LengthPlan, places: _Places) -> Condition:
     return Condition(
         say("{lengths} lengths on each line: {span}", lengths=plan.lengths, span=_span(list(counts.values()))), missing
     )
+
+
+def _spread(plan: LengthPlan, places: _Places) -> Condition:
+    """That lengths of each line are spaced equally as nearly as their gauge allows; fewer of them are missing otherwise."""
+    missing = tuple(
+        say(
+            "lengths spread over the range ({line}: {lengths} mm)",
+            line=line,
+            lengths=semicolons(number(one.length, ".4g") for one in sorted(found, key=lambda m: m.length)),
+        )
+        for line, found in places.items()
+        if len(found) >= plan.lengths and not _any_spread(plan, found)
+    )
+    return Condition(say("{lengths} lengths spread over the range on each line", lengths=plan.lengths), missing)
+
+
+def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
+    """Whether any choice of so many lengths is: more of them never hinder."""
+    lengths = np.sort([one.length for one in found])
+    starts = lengths[lengths <= plan.shortest_mm]
+    ends = np.array([one.length for one in found if one.share is not None and one.share >= plan.least_share])
+    starts, ends = (starts if len(starts) else lengths[:1]), (ends if len(ends) else lengths[-1:])
+    return any(
+        _spaced(lengths, np.linspace(start, end, plan.lengths)) for start in starts for end in ends if end > start
+    )
+
+
+def _spaced(lengths: Floats, equally: Floats) -> bool:
+    """Whether each of some equally spaced lengths has one of its own (sorted) near it."""
+    reach = SPACING * float(equally[1] - equally[0])
+    at = -1
+    for wanted in equally:
+        near = np.flatnonzero((np.abs(lengths - wanted) <= reach) & (np.arange(len(lengths)) > at))
+        if not len(near):
+            return False
+        at = int(near[0])
+    return True
 
 
 def _shortest(plan: LengthPlan, places: _Places) -> Condition:

@@ -205,7 +205,7 @@ def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
     if worst.u_um > 0:
         return say(
             "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
-            "the length named; nothing else is stated ([test_uncertainty]).",
+            "the length named; nothing else is stated.",
             u_um=worst.u_um,
         )  # fmt: skip
     return NOT_STATED
@@ -253,7 +253,7 @@ def _unshown(test: Test, found: Indications) -> list[Text]:
     under = test.circumstances
     told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
     if test.artefact.bidirectional(found.rows) is None:
-        told.append(say("Whether the lengths are bidirectional is not recorded (approach_x, approach_y, approach_z)."))
+        told.append(say("Whether the lengths are bidirectional is not recorded."))
     if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
         told.append(
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")

@@ -6,7 +6,7 @@ import numpy as np
 
 from cmm_uq.conformity.lengths_decided import short
 from cmm_uq.conformity.plans import Condition, ShortLengthPlan
-from cmm_uq.messages import say
+from cmm_uq.messages import Verbatim, say
 from cmm_uq.model.artefact import Artefact
 
 
@@ -38,4 +38,10 @@ def orientations(plan: ShortLengthPlan, artefact: Artefact, *, recorded: bool) -
     repeats = say("{repeats} repetitions in each orientation", repeats=plan.repeats)
     least = min(few, default=0)
     lacks = say("{what} ({least})", what=repeats, least=least)
-    return (Condition(what, told), Condition(repeats, () if least >= plan.repeats else (lacks,)))
+    unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
+    sides = Condition(
+        say("ends of each length reached from opposite sides"),
+        (unknown,) if len(rows) and artefact.bidirectional(found.rows) is None else (),
+        Verbatim("columns approach_x, approach_y, approach_z"),
+    )
+    return (Condition(what, told), Condition(repeats, () if least >= plan.repeats else (lacks,)), sides)

@@ -81,7 +81,7 @@ class SpherePlan:
 
     Parameters
     ----------
-    points : on each sphere, neither more nor fewer, all different.
+    points : different ones on each sphere, or more.
     reach_deg : no direction of the hemisphere is farther than this from the nearest point.
     diameter_mm : least and largest of the sphere.
     """

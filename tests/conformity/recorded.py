@@ -132,6 +132,7 @@ def sphere(
     every = np.vstack([xyz + np.array([30.0 * k, 0, 0]) for k in range(spheres)])
     number = np.repeat(np.arange(1, spheres + 1), points)
     facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=form_um)
+    columns = {"temp_artefact_c": np.full(len(number), 20.0)}
     return Sphere(
-        facts, Points(every, number, np.tile(np.arange(1, points + 1), spheres), np.ones_like(number), MACHINE)
+        facts, Points(every, number, np.tile(np.arange(1, points + 1), spheres), np.ones_like(number), MACHINE, columns)
     )

@@ -30,8 +30,16 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     text = (job / "job.toml").read_text(encoding="utf-8")
     text = re.sub(r"(?m)^effects = .*$", 'effects = ["scale_x", "scale_y", "scale_z"]', text)
     text = re.sub(r"(?m)^limit_um = .*$", f"limit_um = {LIMIT_UM}", text)
-    (job / "job.toml").write_text(text, encoding="utf-8")
+    (job / "job.toml").write_text(text + STATED, encoding="utf-8")
     return diagnose_job(job)
+
+
+STATED = """
+[test_uncertainty]
+u_repeat_um = 7.0
+[rated_conditions]
+declared = { by = "A. Muster", reason = "as the thesis has it" }
+"""
 
 
 def lengths(file: Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

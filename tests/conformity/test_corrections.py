@@ -12,14 +12,13 @@ import pytest
 from cmm_uq.conformity.consequences import Consequences, consequences
 from cmm_uq.errors import CmmUqError
 from cmm_uq.inference.noise import Sizes
-from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.kinds.ballbar.observe import Ballbar
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from cmm_uq.model import MeasurementModel, Noise
 from cmm_uq.physics.catalogue import effects
-from tests.conformity.recorded import bars, gauge
+from tests.conformity.recorded import STATED, bars, gauge
 from tests.recordings import bar_facts
 
 SCALES = ("scale_x", "scale_y", "scale_z")
@@ -46,7 +45,7 @@ def told(
     )  # fmt: skip
     described = kind_named(after.artefact.kind)
     assert described is not None
-    job: Any = SimpleNamespace(facts=SimpleNamespace(conformity=wishes), circumstances=Circumstances())
+    job: Any = SimpleNamespace(facts=SimpleNamespace(conformity=wishes), circumstances=STATED)
     return consequences(job, diagnosis, partial(kind, facts), described.tested, 0)
 
 

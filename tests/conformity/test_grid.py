@@ -103,7 +103,9 @@ def test_without_an_uncertainty_only_simple_acceptance_decides(standard: str, ch
         return
     for room in (10.0, 0.01, -0.01, -8.0):
         found = judged(hand, standard, characteristic, rule, room)
-        assert found.outcome == ("pass" if room > 0 else "fail")
+        assert found.finding == ("pass" if room > 0 else "fail")
+        assert found.outcome == ("incomplete" if room > 0 else "fail")
+        assert any(text.startswith("uncertainty: ") for text in found.missing)
         assert (found.decision.probability_conforming, found.joint) == (None, None)
 
 

@@ -38,6 +38,7 @@ def test_a_plan_that_is_kept_says_how_amply() -> None:
             "parallel to X, parallel to Y",
             "longest length at least 66 % of the travel along each line: 66 % to 80 %",
             "2 lengths on each line: 2 to 2",
+            "2 lengths spread over the range on each line",
             "shortest length at most 30 mm: 28.126 mm",
             "2 repetitions of each, 8 lengths in all: 8",
         ],
@@ -52,6 +53,7 @@ def test_a_plan_that_is_not_kept_says_what_is_missing() -> None:
             "parallel to X, parallel to Y; missing: parallel to X",
             "longest length at least 66 % of the travel along each line: 15 % to 15 %",
             "2 lengths on each line: 2 to 2",
+            "2 lengths spread over the range on each line",
             "shortest length at most 30 mm: 30.126 mm",
             "2 repetitions of each, 8 lengths in all: 2",
         ],
@@ -67,9 +69,10 @@ def test_a_plan_that_is_not_kept_says_what_is_missing() -> None:
 
 def test_of_an_artefact_without_calibrated_lengths_nothing_is_there() -> None:
     what, missing = said(Ballbar(bar_facts(None), bars().points))
-    assert what[1:4] == [
+    assert what[1:5] == [
         "longest length at least 66 % of the travel along each line: none",
         "2 lengths on each line: none",
+        "2 lengths spread over the range on each line",
         "shortest length at most 30 mm: none",
     ]
     assert missing == ["parallel to X", "parallel to Y", "8 of 8 lengths"]

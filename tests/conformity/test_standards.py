@@ -11,6 +11,7 @@ from cmm_uq.conformity.standard import BY_MEASUREMENT_ALONE
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.circumstances import Circumstances
 from cmm_uq.jobs.conformity import ConformityFacts, FalseAccept, GuardBand, MaximumPermissibleError, Rule
 from cmm_uq.kinds import artefact_facts, kind_named
 from cmm_uq.kinds.ballbar.observe import Ballbar
@@ -35,6 +36,7 @@ def judged(
     *,
     rule: Rule = "ISO 14253-1",
     range_um: float = 5.0,
+    under: Circumstances = STATED,
     **limit: object,
 ) -> Statement:
     limit = limit or {"mpe": MPE}
@@ -42,7 +44,7 @@ def judged(
     wish = ConformityFacts(standard=standard, rule=rule, **limit)
     kind = kind_named(artefact.kind)
     assert kind is not None
-    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.tested, None, STATED)
+    return statement(wish, artefact, {"b89_range_um": span}, "[[conformity]] 1", kind.tested, None, under)
 
 
 def at(bar: Ballbar, machine: Machine) -> Ballbar:
@@ -85,9 +87,9 @@ def test_a_complete_test_turns_at_the_limits_of_its_rule(
 
     def outcome(error_um: float) -> str:
         lengths = (
-            [[20.0, 100.0, 200.0, 300.0, 850.0]] * 4
-            + [[20.0, 100.0, 200.0, 300.0, 600.0]]
-            + [[20.0, 100.0, 200.0, 300.0, 400.0]] * 2
+            [[20.0, 230.0, 440.0, 650.0, 850.0]] * 4
+            + [[20.0, 165.0, 310.0, 455.0, 600.0]]
+            + [[20.0, 115.0, 210.0, 305.0, 400.0]] * 2
         )
         found = judged(gauge(SEVEN, lengths, errors={(5, r, 600.0): sign * error_um for r in (2, 3)}), rule=rule)
         assert found.scope == "complete"
@@ -358,9 +360,8 @@ def test_twenty_five_points_of_a_sphere_are_decided_with_half_the_form_of_the_ba
     ("of", "missing"),
     [
         ({"points": 24}, "25 points on the sphere of measurement 1 (24 recorded, 24 different)"),
-        ({"points": 26}, "25 points on the sphere of measurement 1 (26 recorded, 26 different)"),
         ({"copied": 1}, "25 points on the sphere of measurement 1 (25 recorded, 24 different)"),
-        ({"points": 26, "copied": 1}, "25 points on the sphere of measurement 1 (26 recorded, 25 different)"),
+        ({"points": 26, "copied": 2}, "25 points on the sphere of measurement 1 (26 recorded, 24 different)"),
         ({"cap_deg": 42.0}, "points over a hemisphere on the sphere of measurement 1"),
     ],
 )
@@ -398,14 +399,16 @@ def test_a_rule_that_needs_an_uncertainty_refuses_without(rule: Rule) -> None:
     with pytest.raises(CmmUqError, match=r"\[\[conformity\]\] 1 rule: .*states no u_um above 0\. Give u_um.*simple"):
         judged(gauge(u_um=None), rule=rule)
     with pytest.raises(CmmUqError, match=r"states no form_um above 0\. Give form_um"):
-        judged(sphere(form_um=None), ISO_5, rule=rule, limit_um=5.0)
+        judged(sphere(form_um=None), ISO_5, rule=rule, under=Circumstances(), limit_um=5.0)
 
 
 def test_simple_acceptance_does_without_an_uncertainty_and_says_so() -> None:
     found = judged(gauge(u_um=None, errors={(5, 1, 20.0): 2.5, (6, 1, 20.0): 2.4}), rule="simple")
-    assert (found.outcome, found.decision.probability_conforming) == ("pass", None)
+    assert (found.finding, found.decision.probability_conforming) == ("pass", None)
+    assert found.outcome == "incomplete"
+    assert found.missing == ("uncertainty: calibration of the artefact is neither stated nor declared negligible",)
     assert found.named.measurement == 5
-    assert any("u_um is not stated" in text for text in found.remarks)
+    assert any("No uncertainty is stated above zero" in text for text in found.remarks)
     assert any("takes no account of the uncertainty" in text for text in judged(gauge(), rule="simple").remarks)
     assert any(
         "form_um) is not given" in t for t in judged(sphere(form_um=None), ISO_5, rule="simple", limit_um=5.0).remarks
@@ -414,7 +417,12 @@ def test_simple_acceptance_does_without_an_uncertainty_and_says_so() -> None:
 
 # --- what a statement remarks ----------------------------------------------------------------------------------------
 
-UNKNOWN_SIDES = "Whether the lengths are bidirectional is not recorded (approach_x, approach_y, approach_z)."
+DECLARED = tuple(
+    f"{line}: declared negligible by A. Muster: put in by hand."
+    for line in ("Expansion coefficient of the artefact", "Temperature of the artefact", "Alignment of the artefact",
+                 "Fixturing of the artefact")
+)  # fmt: skip
+RATED = "Rated conditions: declared to be met by A. Muster: put in by hand."
 UNCERTAINTY_IGNORED = (
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
 )
@@ -426,10 +434,11 @@ def test_a_guarded_statement_on_lengths_remarks_their_uncertainty_and_the_worst(
     found = judged(gauge([np.eye(3)[0]], [[20.0, 612.3456]], errors=errors, repeats=1, u_um=0.41236))
     assert found.remarks == (
         "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, 0.412 µm for the length "
-        "named; nothing else is stated ([test_uncertainty]).",
+        "named; nothing else is stated.",
         "2 lengths decided, each by its own u and limit; least favourable: measurement 1, repeat 1, 612.3456 mm.",
-        UNKNOWN_SIDES,
         BY_MEASUREMENT_ALONE,
+        *DECLARED,
+        RATED,
     )
 
 
@@ -442,9 +451,9 @@ def test_simple_acceptance_of_a_length_remarks_what_it_ignores_once_there_is_an_
     stated, unstated = (
         judged(gauge([np.eye(3)[0]], [[400.0]], repeats=1, u_um=u), rule="simple").remarks for u in (0.4, None)
     )
-    assert stated[2:] == (UNKNOWN_SIDES, UNCERTAINTY_IGNORED, BY_MEASUREMENT_ALONE)
-    assert unstated[0] == "u_um is not stated: no uncertainty is considered, and no probability can be given."
-    assert unstated[2:] == (UNKNOWN_SIDES,)
+    assert stated[2:] == (UNCERTAINTY_IGNORED, BY_MEASUREMENT_ALONE, *DECLARED, RATED)
+    assert unstated[0] == "No uncertainty is stated above zero: none is considered, and no probability can be given."
+    assert unstated[2:] == (*DECLARED, RATED)
 
 
 def test_a_statement_on_spheres_remarks_the_ball_and_of_several_the_largest() -> None:
@@ -452,14 +461,21 @@ def test_a_statement_on_spheres_remarks_the_ball_and_of_several_the_largest() ->
     one = judged(sphere(form_um=0.2345), ISO_5, limit_um=20.0)
     ball = "u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, 0.12 µm."
     superseded = "This edition is superseded by ISO 10360-5:2020."
-    assert one.remarks == (ball, BY_MEASUREMENT_ALONE, superseded)
+    declared = ("Calibration of the form: declared negligible by A. Muster: put in by hand.", RATED)
+    assert one.remarks == (ball, BY_MEASUREMENT_ALONE, superseded, *declared)
     assert (one.named.measurement, one.named.repeat, one.named.length_mm) == (1, 1, 25.0)
     two = sphere(form_um=0.2345, spheres=2)
     xyz = two.points.xyz.copy()
     xyz[26] += 1e-3 * (xyz[26] - [30.0, 0.0, 0.0]) / 12.5
     found = judged(Sphere(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2345), two.points.at(xyz)), ISO_5,
                    limit_um=20.0)  # fmt: skip
-    assert found.remarks == (ball, "The largest of 2 spheres: measurement 2.", BY_MEASUREMENT_ALONE, superseded)
+    assert found.remarks == (
+        ball,
+        "The largest of 2 spheres: measurement 2.",
+        BY_MEASUREMENT_ALONE,
+        superseded,
+        *declared,
+    )
     assert found.named.measurement == 2
     assert found.value_um > one.value_um + 0.5
 

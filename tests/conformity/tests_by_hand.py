@@ -55,11 +55,11 @@ class Hand:
 def lengths(
     directions: list[Floats], count: int = 5, offset: Floats | None = None, longest: float = 0.7
 ) -> Callable[..., Hand]:
-    """Errors of lengths: 5 µm at 200 mm, where the gauge of 0.4 µm in 800 mm has u = 0.1 µm."""
+    """Errors of lengths: 5 µm of the second, where the gauge of 0.4 µm in 800 mm has u = 0.1 µm in 200 mm."""
 
     def made(how: str) -> Hand:
         chosen = directions[:-1] if how == "incomplete" else directions
-        every = [list(five_with_200(direction, count, longest)) for direction in chosen]
+        every = [list(equally_spaced(direction, count, longest)) for direction in chosen]
         off = (1, 2) if how != "one repeat out" else (2,)
         artefact = gauge(chosen, every, errors={(1, repeat, every[0][1]): -ERROR for repeat in off},
                          u_um=None if how == "no u" else "L/2000")  # fmt: skip
@@ -79,19 +79,19 @@ def lengths(
     return made
 
 
-def five_with_200(direction: Floats, count: int, longest: float) -> Floats:
-    """20 mm, 200 mm, and others up to so much of the travel along a line; for one length 20 mm alone."""
+def equally_spaced(direction: Floats, count: int, longest: float) -> Floats:
+    """20 mm, and others equally spaced up to so much of the travel along a line; for one length 20 mm alone."""
     u = np.abs(direction) / np.linalg.norm(direction)
     travel = min(size / part for size, part in zip((900.0, 550.0, 500.0), u, strict=True) if part > 1e-9)
     if count == 1:
         return np.array([20.0, 40.0])
-    return np.array([20.0, 200.0, *np.round(np.linspace(220.0, longest * travel, count - 2))])
+    return np.round(np.linspace(20.0, longest * travel, count))
 
 
 def ranges(how: str) -> Hand:
     """The range of three repeats, one of which is 5 µm off; u = 0.2 µm is stated."""
     lines = SEVEN[:-1] if how == "incomplete" else SEVEN
-    every = [list(five_with_200(direction, 5, 0.7)) for direction in lines]
+    every = [list(equally_spaced(direction, 5, 0.7)) for direction in lines]
     artefact = gauge(lines, every, errors={(1, 2, every[0][1]): ERROR})
     points = artefact.points
     if how == "copied":
@@ -163,7 +163,7 @@ def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
         value = float((found.size if size else found.form)[0]) * 1e3
         under = replace(STATED, probe=ProbeFacts(sensing=sensing))
         if not size:
-            under = replace(under, uncertainty=TestUncertainty(u_form_um=1e-6))
+            under = replace(under, uncertainty=TestUncertainty(u_form_um=0.0 if how == "no u" else 1e-6))
         return Hand(artefact, under, {}, value, 0.1, size)
 
     return made
