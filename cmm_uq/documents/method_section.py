@@ -9,6 +9,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import title_of
 from cmm_uq.inference.posterior import Posterior
 from cmm_uq.messages import NOTHING, Text, Verbatim, listed, number, say
+from cmm_uq.model.certified_places import CALIBRATION
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.uncertainty.rounding import alike
 
@@ -75,6 +76,7 @@ def method(result: Result) -> Section:
         (say("Convergence"), _convergence(posterior)),
         (say("Averaged"), _averaged(result)),
         (say("Stated of the artefact"), _stated(result)),
+        (say("Calibrated lengths together"), _calibration(result)),
     )
     text = Paragraph(
         say(
@@ -102,16 +104,30 @@ def _averaged(result: Result) -> Text:
 
 def _stated(result: Result) -> Text:
     """What is stated of the artefact's temperature, expansion, alignment and fixturing, and which figures it reaches."""
-    if result.causes:
+    causes = [cause.name for cause in result.causes if cause.name != CALIBRATION]
+    if causes:
         return say(
             "the uncertainty stated of {causes} is in U of all estimates, of figures of lengths and of the slopes of lines, "
             "as of an error that all set-ups share and as of one that each has by itself, whichever is larger; it is not in "
             "residuals, noise, least squares and the diagnosis",
-            causes=listed([cause.name for cause in result.causes]),
+            causes=listed(causes),
         )  # fmt: skip
     if not result.job.circumstances.uncertainty.of_artefact:
         return NOTHING
     return say("what is stated of temperature, expansion, alignment and fixturing changes none of the estimates here")
+
+
+def _calibration(result: Result) -> Text:
+    """How errors of several calibrated lengths are taken together."""
+    found = next((cause for cause in result.causes if cause.name == CALIBRATION), None)
+    if found is None:
+        return NOTHING
+    if found.apart is None:
+        return say("errors of the calibrated lengths are taken with the covariance that their certificate states")
+    return say(
+        "errors of the calibrated lengths are taken as of one cause and as of each place by itself; in every figure the "
+        "larger U stands"
+    )
 
 
 def _convergence(posterior: Posterior) -> Text:

@@ -32,11 +32,14 @@ class Cause:
     name : in words.
     common : (m, r) change of each observation, mm, for one standard uncertainty of each of r independent parts.
     apart : the same where each block of observations errs by itself; ``None`` where all are known to err together.
+    included : (m,) change for one standard uncertainty of what is in the draws already, as that of a certified size is: it
+        stands for ``common``, which is then zero, and of ``apart`` only what is more counts.
     """
 
     name: Text
     common: Floats
     apart: Freedoms | None = None
+    included: Floats | None = None
 
     @classmethod
     def of_blocks(cls, name: Text, changes: Floats, block: Ints) -> Cause:
@@ -47,7 +50,10 @@ class Cause:
 
     def at(self, rows: NDArray[np.bool_]) -> Cause:
         """Of some of the observations."""
-        return Cause(self.name, self.common[rows], None if self.apart is None else self.apart.at(rows))
+        return Cause(
+            self.name, self.common[rows], None if self.apart is None else self.apart.at(rows),
+            None if self.included is None else self.included[rows],
+        )  # fmt: skip
 
     def drawn(self, shape: tuple[int, ...], random: np.random.Generator, *, apart: bool) -> Floats:
         """Errors (*shape, m), mm, of the observations."""
@@ -61,8 +67,12 @@ class Cause:
         common = weights @ self.common
         if self.apart is None:
             return common, common
-        each = [self.apart.sums(weights.T * column[:, None]) for column in self.apart.columns.T]
-        return common, np.vstack(each).T
+        each = np.vstack([self.apart.sums(weights.T * column[:, None]) for column in self.apart.columns.T]).T
+        if self.included is not None:
+            whole, known = np.sum(each**2, axis=1), (weights @ self.included) ** 2
+            more = np.divide(whole - known, whole, out=np.zeros_like(whole), where=whole > known)
+            each = each * np.sqrt(more)[:, None]
+        return common, each
 
 
 @dataclass(frozen=True, eq=False)

@@ -137,13 +137,13 @@ class ReferencedFacts(ArtefactFacts):
         found._covariances = tuple(numbers), tuple(covariances)
         return found
 
-    def covariances_at(self, numbers: Ints) -> tuple[Floats, ...]:
-        """Covariances of points by their numbers (n,), each (n, n) µm²; none where they are not given of all of these."""
+    def covariances_at(self, numbers: Ints) -> tuple[Ints, tuple[Floats, ...]]:
+        """Which certified points those of some numbers (n,) are, and covariances (f, f) µm²; none where one is another."""
         places = {number: i for i, number in enumerate(self._covariances[0])}
         if not places or not set(numbers.tolist()) <= places.keys():
-            return ()
+            return np.zeros(0, dtype=np.int64), ()
         index = np.array([places[number] for number in numbers.tolist()], dtype=np.int64)
-        return tuple(covariance[np.ix_(index, index)] for covariance in self._covariances[1])
+        return index, self._covariances[1]
 
     @model_validator(mode="after")
     def _nominal_or_certified(self) -> Self:

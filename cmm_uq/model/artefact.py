@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.doubt import Cause
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.messages import NOTHING, Text, foreign, say
 from cmm_uq.physics.effect import Effect
@@ -192,6 +193,10 @@ class Artefact(ABC):
 
     def indications(self) -> Indications | None:
         """Errors of indication of calibrated lengths; ``None`` without a calibration."""
+        return None
+
+    def calibration(self) -> Cause | None:
+        """What its certificate leaves open of several lengths beyond its sizes; ``None`` of an artefact of one length."""
         return None
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:

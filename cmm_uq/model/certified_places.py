@@ -7,14 +7,21 @@ with either, and the larger uncertainty stands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from cmm_uq.inference.doubt import Cause
+from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.messages import say
+from cmm_uq.model.artefact import Size
 from cmm_uq.model.recorded import stated_sd
 from cmm_uq.points import AXES, Floats, Ints, Points
 from cmm_uq.units import MICROMETRE
+
+CALIBRATION = say("calibration of the artefact")
+"""Name of this cause."""
 
 _SAME_MM = 1e-6
 """Certified distances closer than this are of one place."""
@@ -32,13 +39,15 @@ class CertifiedPlaces:
     facts : what the job says of the artefact.
     places : (n, j) certified, mm: distances from the first face, or coordinates.
     u : (n, j) standard uncertainty of each by itself, mm; ``None`` where none is stated of single places.
-    covariance : (n, n) for each of the j coordinates, mm²; ``None`` where none is stated.
+    covariance : (f, f) of all certified places for each of the j coordinates, mm²; ``None`` where none is stated.
+    index : (n,) which of these each place is.
     """
 
     facts: ReferencedFacts
     places: Floats
     u: Floats | None = None
     covariance: tuple[Floats, ...] | None = None
+    index: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @classmethod
     def of(cls, facts: ReferencedFacts, points: Points, places: Floats) -> CertifiedPlaces:
@@ -51,8 +60,10 @@ class CertifiedPlaces:
         u = np.column_stack(stated) * MICROMETRE if len(stated) == count else None
         if u is not None and count == 1:
             u = np.where(np.abs(places) <= _SAME_MM, 0.0, u)  # distances count from there
-        found = tuple(MICROMETRE**2 * covariance for covariance in facts.covariances_at(points.point))
-        return cls(facts, places, u, found if len(found) == count else None)
+        rows, covariances = facts.covariances_at(points.point)
+        if len(covariances) != count:
+            return cls(facts, places, u)
+        return cls(facts, places, u, tuple(MICROMETRE**2 * covariance for covariance in covariances), rows)
 
     @property
     def plain(self) -> bool:
@@ -84,7 +95,8 @@ class CertifiedPlaces:
         along = np.divide(apart, lengths[:, None], out=np.zeros_like(apart), where=lengths[:, None] > 0)
         stated = self.facts.u_of(lengths) * MICROMETRE
         if self.covariance is not None:
-            each = [c[first, first] + c[last, last] - 2 * c[first, last] for c in self.covariance]
+            a, b = self.index[first], self.index[last]
+            each = [c[a, a] + c[b, b] - 2 * c[a, b] for c in self.covariance]
             own = np.sqrt(np.maximum(np.sum(along**2 * np.column_stack(each), axis=1), 0.0))
             return np.asarray(np.maximum(stated, own), dtype=np.float64)
         if self.u is None:
@@ -107,23 +119,72 @@ class CertifiedPlaces:
         found = float(self.u_between(np.array([first]), np.array([last]))[0])
         return max(found, stated_sd(self.facts, length_mm))
 
-    def together(self, about: Floats, sd_mm: float, last: int) -> Floats:
+    def together(self, about: Floats, sd_mm: float, first: int, last: int) -> Floats:
         """Errors of the places, (n, j) mm, for one mm of the error of the longest length, if all have one cause.
+
+        With a covariance those that go with that error; what it has beside them is in :meth:`beyond`.
 
         Parameters
         ----------
         about : (n, j) places from where distances count, mm: the first face, or the middle of the balls.
         sd_mm : standard uncertainty of the longest length.
-        last : place at its end.
+        first, last : places at its ends.
         """
+        if self.covariance is not None:
+            return self._with_the_longest(sd_mm, first, last)[self.index]
         away = np.linalg.norm(about, axis=1)
         along = np.divide(about, away[:, None], out=np.zeros_like(about), where=away[:, None] > _SAME_MM)
-        if self.covariance is not None and about.shape[1] == 1 and sd_mm > 0:
-            first = int(np.argmin(away))
-            c = self.covariance[0]
-            return np.asarray((c[:, last] - c[:, first] - c[first, last] + c[first, first])[:, None] / sd_mm**2)
         ends = 1.0 if about.shape[1] == 1 else 2.0  # of a length through the middle, half belongs to either end
         u = self.facts.u_of(ends * away) * MICROMETRE / ends
         if self.u is not None:
             u = np.maximum(u, np.linalg.norm(along * self.u, axis=1))
         return np.asarray(along * u[:, None] / max(sd_mm, _LEAST_MM), dtype=np.float64)
+
+    def beyond(self, size: Size, first: int, last: int, change: Floats, expansion: Floats) -> Cause | None:
+        """What the certificate leaves open of the places beyond one common error; ``None`` where nothing is stated.
+
+        Parameters
+        ----------
+        size : the artefact's length, which has the common error.
+        first, last : places at its ends.
+        change : (n·j,) of the observations for one mm of that length.
+        expansion : (n,) size of the artefact at each place over that at 20 °C.
+        """
+        if not size.certified or size.sd <= 0:
+            return None
+        count = self.places.shape[1]
+        if self.covariance is not None:
+            known = self._with_the_longest(size.sd, first, last).ravel() * size.sd
+            whole = np.zeros((len(known), len(known)))
+            for axis, covariance in enumerate(self.covariance):
+                whole[axis::count, axis::count] = covariance
+            values, vectors = np.linalg.eigh(whole - np.outer(known, known))
+            root = (vectors * np.sqrt(np.maximum(values, 0.0))).reshape(-1, count, len(known))[self.index]
+            return Cause(CALIBRATION, (root * expansion[:, None, None]).reshape(-1, len(known)))
+        u = self._each_its_own() * expansion[:, None]
+        columns = (u[:, :, None] * np.eye(count)).reshape(-1, count)
+        _, place = np.unique(np.round(self.places / _SAME_MM), axis=0, return_inverse=True)
+        index = np.repeat(place.ravel(), count)
+        own = Freedoms(columns, index, int(index.max()) + 1)
+        return Cause(CALIBRATION, np.zeros((len(columns), 1)), own, change * size.sd)
+
+    def _each_its_own(self) -> Floats:
+        """Standard uncertainty of each coordinate, (n, j) mm, if none has to do with another."""
+        if self.places.shape[1] == 1:
+            away = np.abs(self.places)
+            stated = np.where(away > _SAME_MM, self.facts.u_of(away) * MICROMETRE, 0.0)
+        else:
+            there = np.unique(self.places, axis=0)
+            farthest = np.array([np.linalg.norm(there - place, axis=1).max() for place in self.places])
+            stated = np.repeat(
+                self.facts.u_of(farthest)[:, None] * MICROMETRE / np.sqrt(2.0), self.places.shape[1], axis=1
+            )
+        return np.asarray(stated if self.u is None else np.maximum(stated, self.u), dtype=np.float64)
+
+    def _with_the_longest(self, sd_mm: float, first: int, last: int) -> Floats:
+        """Covariance of all certified places with the longest length, over its variance, (f, j)."""
+        along = self.places[last] - self.places[first]
+        along = along / np.linalg.norm(along)
+        a, b = self.index[first], self.index[last]
+        columns = [part * (c[:, b] - c[:, a]) for part, c in zip(along, self.covariance or (), strict=True)]
+        return np.asarray(np.column_stack(columns) / max(sd_mm, _LEAST_MM) ** 2, dtype=np.float64)

@@ -20,7 +20,8 @@ from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 def causes_of(artefact: Artefact, circumstances: Circumstances) -> tuple[Cause, ...]:
     """Causes that the observations (m,) of an artefact err by; none where nothing is stated, or it has no dimension.
 
-    The coefficient of expansion is one; whether the others err alike in all set-ups is not known.
+    The coefficient of expansion is one; whether the others err alike in all set-ups is not known. Of the calibration a size of
+    the artefact has what all its lengths have in common; here is what is more where each has an error of its own.
     """
     stated, along = circumstances.uncertainty, growth(artefact)
     if along is None:
@@ -35,8 +36,10 @@ def causes_of(artefact: Artefact, circumstances: Circumstances) -> tuple[Cause, 
         (say("fixturing of the artefact"), stated.u_fixturing_um * part),
     )
     expansion = Cause(say("expansion coefficient of the artefact"), (stated.u_cte_per_k * excess * along)[:, None])
+    calibration = artefact.calibration()
     every = (expansion, *(Cause.of_blocks(name, change, set_up) for name, change in changes))
-    return tuple(cause for cause in every if np.any(cause.common))
+    stated_causes = tuple(cause for cause in every if np.any(cause.common))
+    return stated_causes if calibration is None else (calibration, *stated_causes)
 
 
 def growth(artefact: Artefact) -> Floats | None:

@@ -9,10 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cmm_uq.inference.doubt import Doubt, gain
 from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.gauge_lines.observe import GaugeBlocks, StepGauge
 from cmm_uq.kinds.plate.observe import Plate
+from cmm_uq.model import MeasurementModel
+from cmm_uq.physics.catalogue import effects as effects_of
 from cmm_uq.points import Floats, Machine, Points
 
 FACES = np.array([0.0, 20.0, 120.0, 420.0, 720.0, 1020.0])
@@ -152,3 +155,94 @@ def test_degrees_of_freedom_give_the_factor_where_none_is_stated() -> None:
 def test_half_a_statement_is_refused(stated: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"U_um|in which unit|greater than"):
         facts(**stated)
+
+
+def several(artefact: StepGauge | Plate, effects: list[str]) -> tuple[Floats, Floats, Floats]:
+    """Of every estimate: its variance, that of dense propagation of one common error, of errors of each place.
+
+    The estimator is written down here by numpy: least squares with an observation of the certified size, and dummy columns for
+    what each set-up is free in.
+    """
+    sigma = 1e-3
+    model = MeasurementModel(artefact, effects_of(effects), sigma)
+    linear, size = model.estimate().linear, artefact.sizes[0]
+    free = linear.freedoms.dense()
+    rows = np.hstack([linear.design, free])
+    priors = [(i, u.prior_sd) for i, u in enumerate(linear.unknowns) if np.isfinite(u.prior_sd)]
+    known = np.array([np.eye(rows.shape[1])[i] * sigma / sd for i, sd in priors])
+    inverse = np.linalg.pinv(np.vstack([rows, known]), rcond=1e-12)
+    G = inverse[: linear.design.shape[1], : len(rows)]
+    base = sigma**2 * np.diag(np.linalg.pinv(rows.T @ rows + known.T @ known, rcond=1e-14))[: len(G)]
+    cause = artefact.calibration()
+    assert cause is not None
+    doubt = Doubt.of([cause], gain(linear, sigma))
+    found = base + np.array([doubt.variance(np.eye(len(G))[i]) for i in range(len(G))])
+    h = artefact.size_change()[:, 0] * size.sd
+    own = np.zeros_like(base) if cause.apart is None else np.sum((G @ cause.apart.dense()) ** 2, axis=1)
+    return found, base, base - (G @ h) ** 2 + own
+
+
+def lines_along(directions: list[list[float]]) -> Points:
+    faces = np.array([0.0, 30.0, 100.0, 200.0, 300.0, 400.0])
+    xyz = [np.outer(faces, np.array(d) / np.linalg.norm(d)) + 10.0 * i for i, d in enumerate(directions)]
+    count = len(directions)
+    number = np.repeat(np.arange(1, count + 1), 6)
+    return Points(np.vstack(xyz), number, np.tile(np.arange(1, 7), count), np.ones(6 * count, dtype=np.int64), Machine(),
+                  {"reference_mm": np.tile(faces, count)})  # fmt: skip
+
+
+SIX_LINES = [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0], [1.0, 1.0, 0], [1.0, -1.0, 0], [0, 1.0, 1.0]]
+
+
+@pytest.mark.parametrize("stated", [{"U_um": "0.2 + 0.5·L/1000", "k": 2.0}, {"u_um": 0.5}, {"u_um": "Q[0.3; L/1000]"}])
+@pytest.mark.parametrize("effects", [["scale_x", "scale_y", "scale_z"], ["scale_x", "squareness_xy", "squareness_yz"]])
+def test_of_every_estimate_the_larger_of_common_and_independent_errors_stands(
+    stated: dict[str, Any], effects: list[str]
+) -> None:
+    gauge = StepGauge(facts(**stated), lines_along(SIX_LINES))
+    found, common, independent = several(gauge, effects)
+    chosen = slice(0, len(effects))
+    assert found[chosen] == pytest.approx(np.maximum(common, independent)[chosen], rel=1e-4)
+
+
+def test_the_scale_of_one_line_has_the_slope_of_u_of_its_faces() -> None:
+    """By hand: slope of errors e_i = u(L_i) over L_i by least squares, all together and each by itself, in ppm."""
+    gauge = StepGauge(facts(U_um="0.2 + 0.5·L/1000", k=2.0), lines_along([[1.0, 0, 0]]))
+    L = gauge.reference - gauge.reference.mean()
+    weights = L / (L @ L)
+    u = np.where(gauge.reference > 0, 0.1 + 0.25 * gauge.reference / 1000, 0.0)
+    together, each = abs(weights @ u) * 1e3, float(np.sqrt(weights**2 @ u**2)) * 1e3
+    found, _, _ = several(gauge, ["scale_x"])
+    noise = 1e3 * 1.0 / np.sqrt(L @ L)
+    assert np.sqrt(found[0]) == pytest.approx(np.hypot(max(together, each), noise), rel=1e-3)
+
+
+def test_with_a_covariance_every_estimate_is_dense_gum_propagation() -> None:
+    """G V Gᵀ with V of the six faces, each met in every line; noise beside it."""
+    root = np.random.default_rng(8).normal(0, 0.2, (6, 9))
+    covariance = root @ root.T
+    gauge = StepGauge(facts().with_covariances((1, 2, 3, 4, 5, 6), (covariance,)), lines_along(SIX_LINES))
+    sigma, effects = 1e-3, ["scale_x", "scale_y", "scale_z", "squareness_xy"]
+    model = MeasurementModel(gauge, effects_of(effects), sigma)
+    linear = model.estimate().linear
+    known = np.zeros((1, linear.design.shape[1] + 6))
+    known[0, len(effects)] = sigma / gauge.sizes[0].sd
+    rows = np.hstack([linear.design, linear.freedoms.dense()])
+    priors = [[*(np.eye(4)[i] * sigma / linear.unknowns[i].prior_sd), *np.zeros(7)] for i in range(4)]
+    G = np.linalg.pinv(np.vstack([rows, known, priors]), rcond=1e-12)[:4, : len(rows)]
+    met = np.tile(np.eye(6), (6, 1)) * 1e-3
+    cause = gauge.calibration()
+    assert cause is not None
+    h = gauge.size_change()[:, 0] * gauge.sizes[0].sd
+    doubt = Doubt.of([cause], gain(linear, sigma))
+    for i in range(4):
+        dense = G[i] @ met @ covariance @ met.T @ G[i]
+        assert (G[i] @ h) ** 2 + doubt.variance(np.eye(5)[i]) == pytest.approx(dense, rel=1e-3)
+
+
+def test_balls_of_a_plate_err_together_or_each_by_itself() -> None:
+    own = {f"reference_u_{axis}_um": np.array([0.1, 0.3, 0.2, 0.4, 0.1, 0.2]) for axis in "xyz"}
+    effects = ["scale_x", "scale_y", "squareness_xy"]
+    found, common, independent = several(Plate(facts("plate"), plate_of(**own)), effects)
+    assert found[:3] == pytest.approx(np.maximum(common, independent)[:3], rel=1e-4)
+    assert np.all(independent[:3] > 0)

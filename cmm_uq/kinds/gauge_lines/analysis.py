@@ -117,6 +117,8 @@ def figures(result: Result) -> GaugeFigures:
     for line in lines_of(gauge):
         weights = np.stack([line.scale_weights, line.gap_weights / MICROMETRE])
         doubt = Doubt.of(result.causes, weights)
+        if not gauge.certificate.plain:
+            relative = abs(float(line.scale_weights @ gauge.size_change()[:, 0])) * size.sd * PPM
         beside = float(np.hypot(relative / PPM, np.sqrt(doubt.variance(np.array([1.0, 0.0])))))
         scale_u, scale_expanded = uncertainty_of_sum(components, sizes, line.scale_weights, beside)
         gap_u, gap_expanded = uncertainty_of_sum(

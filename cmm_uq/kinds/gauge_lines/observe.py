@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.doubt import Cause
 from cmm_uq.inference.freedoms import Freedoms
 from cmm_uq.jobs.artefact import ReferencedFacts
 from cmm_uq.messages import say
@@ -88,20 +89,23 @@ class StepGauge(Artefact):
         length = facts.length_mm or float(spans.max())
         self.certificate = CertifiedPlaces.of(facts, points, self.reference[:, None])
         longest = np.flatnonzero(self._lines.index == np.argmax(spans))
-        first, last = (longest[pick(self.reference[longest])] for pick in (np.argmin, np.argmax))
+        first, last = (int(longest[pick(self.reference[longest])]) for pick in (np.argmin, np.argmax))
+        self._ends_of_longest = first, last
         self.sizes = (
             Size(
                 "length_mm",
                 say("Length of the {title:small}", title=self.title),
                 unit("mm"),
                 length,
-                self.certificate.sd(length, int(first), int(last)),
+                self.certificate.sd(length, first, last),
                 say("length"),
             ),
         )
         self._together = self.reference / length
         if not self.certificate.plain and self.sizes[0].certified:
-            self._together = self.certificate.together(self.reference[:, None], self.sizes[0].sd, int(last))[:, 0]
+            self._together = self.certificate.together(
+                self.reference[:, None], self.sizes[0].sd, *self._ends_of_longest
+            )[:, 0]
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
         """See :meth:`Artefact.fit`: every point moved along its line to its certified distance."""
@@ -129,6 +133,11 @@ class StepGauge(Artefact):
     def placing(self, xyz: Floats) -> Freedoms:
         """See :meth:`Artefact.placing`: the position along each line."""
         return self._lines.columns(np.ones((len(xyz), 1)))
+
+    def calibration(self) -> Cause | None:
+        """See :meth:`Artefact.calibration`: of each face."""
+        change = self.size_change()[:, 0]
+        return self.certificate.beyond(self.sizes[0], *self._ends_of_longest, change, self.expansion)
 
     def indications(self) -> Indications | None:
         """Distances from the first recorded face of each (measurement, repeat), against the certified ones."""

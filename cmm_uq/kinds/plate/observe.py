@@ -1,8 +1,8 @@
 """Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
 
-All three coordinates of every ball are observations; the six freedoms of each placing are projected out exactly. The
-certificate's uncertainty is taken as common to all positions and proportional to them (one scale of the plate). Nominal
-positions leave that scale free.
+All three coordinates of every ball are observations; the six freedoms of each placing are projected out exactly. What the
+certificate leaves open is in the length of the plate as far as all positions have it in common, and an error of each ball where
+that is more. Nominal positions leave that scale free.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.errors import CmmUqError
+from cmm_uq.inference.doubt import Cause
 from cmm_uq.jobs.earlier import NOISE_RATIO
 from cmm_uq.kinds.plate.facts import PlateFacts
 from cmm_uq.messages import say
@@ -41,8 +42,8 @@ class Plate(Rigid):
 
     Parameters
     ----------
-    facts : what the job says of the plate; ``u_um`` belongs to ``length_mm``, or to the farthest ball from the first by its
-        number.
+    facts : what the job says of the plate; ``length_mm`` is that of the farthest ball from the first by its number where it
+        is not stated.
     points : the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
         An earlier recording in place of references (:mod:`cmm_uq.jobs.earlier`) adds its own noise.
 
@@ -65,6 +66,7 @@ class Plate(Rigid):
         from_first = int(np.argmin(points.point))
         away = np.linalg.norm(self.reference - self.reference[from_first], axis=1)
         farthest, longest = int(np.argmax(away)), float(away.max())
+        self._ends = from_first, farthest
         body = self.reference * self.expansion[:, None]
         self.body = body - self.placings.means(body)
         self.sizes = (
@@ -80,7 +82,7 @@ class Plate(Rigid):
         self._together = self.body / self.sizes[0].nominal
         if not self.certificate.plain and self.sizes[0].certified:
             about = self.reference - self.placings.means(self.reference)
-            together = self.certificate.together(about, self.sizes[0].sd, farthest) * self.expansion[:, None]
+            together = self.certificate.together(about, self.sizes[0].sd, *self._ends) * self.expansion[:, None]
             self._together = together - self.placings.means(together)
         self._refuse_another_plate(where)
 
@@ -111,6 +113,12 @@ class Plate(Rigid):
         if NOISE_RATIO in self.points.columns:
             found |= self.placings.still(self.reference).ravel()
         return found
+
+    def calibration(self) -> Cause | None:
+        """See :meth:`Artefact.calibration`: of each ball; of two dates nothing is certified that both do not have."""
+        if NOISE_RATIO in self.points.columns:
+            return None
+        return self.certificate.beyond(self.sizes[0], *self._ends, self.size_change()[:, 0], self.expansion)
 
     def indications(self) -> Indications | None:
         """Distances between every two balls of a (measurement, repeat), against the certified ones."""
