@@ -6,6 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from cmm_uq.commands.reissue import refuse_denial, refuse_unlike
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.records.facts import STANDING, Certificate
 from cmm_uq.records.recognised import spelled
@@ -89,6 +90,7 @@ def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed
     if missing := content.get("missing"):
         raise CmmUqError(f"{certificate.number} says DRAFT on every page: it does not state {', '.join(missing)}",
                          where=records.shown, fix="State it in job.toml and report again")  # fmt: skip
+    refuse_unlike(records, certificate)
     needed = FOUR_EYES if content.get("four_eyes") else TWO_EYES
     maker = str(content.get("operator") or "")
     if needed == FOUR_EYES and spelled(maker) == spelled(person):
@@ -136,6 +138,7 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
         raise CmmUqError(
             f"{other.number} {why}", where="--replaced-by", fix="Name a released certificate of this machine"
         )
+    refuse_denial(records, certificate, other, reason)
     _sign(records, "replacement", certificate, person, reason, replaced_by=other.entry)
     return Signed(records.certificate(certificate.entry))
 

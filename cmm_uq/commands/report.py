@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cmm_uq.commands import analysis, diagnosing
 from cmm_uq.commands.reading import compared_with, in_language, read_job
+from cmm_uq.commands.reissue import reissued, with_replaced
 from cmm_uq.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.documents.diagnosis.next import TO_FILL_IN
@@ -46,7 +47,7 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
         job, seed=seed, progress=lambda part: stage(_sampled("Sampling the posterior", part), 0.1 + 0.4 * part)
     )
     stage("Composing the certificate", 0.5)
-    outcome = analysis.outcome_of(found, seed)
+    outcome = reissued(analysis.outcome_of(found, seed))
     if composed:
         outcome.document  # noqa: B018 - composed when it is first asked for
     return outcome
@@ -81,7 +82,7 @@ def write_report(
     """
     tell = stage or silent
     tell("Reading the job", 0.0)
-    read = in_language(read_job(job), language)
+    read = with_replaced(in_language(read_job(job), language), records, out)
     analysis.report_recipe(read)  # refused before anything is made
     if told is not None:
         told(read)

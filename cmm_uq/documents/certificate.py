@@ -10,6 +10,7 @@ from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.document import Document, Facts, Section, Signature
 from cmm_uq.documents.origin import CERTIFICATE, DIGITAL, came_about, file_name
 from cmm_uq.documents.provenance import FILE as PROVENANCE
+from cmm_uq.documents.reissue import CHANGED
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
@@ -154,7 +155,7 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     return (
         (say("Replaces certificate"), replaced_certificate(replaced)),
         (say("Reason for the replacement"), replaced.reason),
-        (say("Changed against it"), replaced.changed),
+        (CHANGED, replaced.changed),
     )
 
 

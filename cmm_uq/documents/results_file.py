@@ -57,7 +57,7 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
             "machine": job.facts.machine.name,
             **({"serial": job.facts.machine.serial} if job.facts.machine.serial else {}),
             **({"derived_from": derived.model_dump()} if derived else {}),
-            **({"replaces": facts.replaces.model_dump(mode="json")} if facts.replaces else {}),
+            **({"replaces": facts.replaces.model_dump(mode="json", exclude_none=True)} if facts.replaces else {}),
             **({"altered": list(job.altered)} if job.altered else {}),
             **({"language": facts.language} if facts.language != ENGLISH else {}),
             "inputs_sha256": sha256(job.inputs),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -33,6 +33,7 @@ from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
 from cmm_uq.jobs.predicted import files_of, prediction_of
 from cmm_uq.jobs.recording_file import read_recording_file
 from cmm_uq.jobs.reference_file import EXPANDED, OF_POINTS, reference_file, with_references, with_uncertainties
+from cmm_uq.jobs.replaced import FILE as REPLACED
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
@@ -78,7 +79,7 @@ def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
-    return _read(InFolder(path), nameable, recorded=recorded)
+    return _beside_replaced(_read(InFolder(path), nameable, recorded=recorded), InFolder(path))
 
 
 def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = True) -> Job:
@@ -93,7 +94,7 @@ def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = T
     ------
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
-    return _read(InMemory(files), nameable, recorded=recorded)
+    return _beside_replaced(_read(InMemory(files), nameable, recorded=recorded), InMemory(files))
 
 
 def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
@@ -115,7 +116,8 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         [*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps, *logo], str(path)
     )
     before = results_named(facts.job.as_found)
-    others = calibrations if before is None else [*calibrations, before]
+    named = None if facts.job.replaces is None else results_named(facts.job.replaces.results)
+    others = [*calibrations, *(one for one in (before, named) if one is not None)]
     inputs |= _contents(source, others, TABLE_BYTES, written=True)
     if says is not None:
         inputs |= _contents(source, certificate, TABLE_BYTES)
@@ -205,6 +207,14 @@ def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path:
         if key is not None:
             problem, fix = needed(key, wish)
             raise CmmUqError(problem, where=f"{path}: [[conformity]]", fix=fix)
+
+
+def _beside_replaced(job: Job, source: Source) -> Job:
+    """The job with what the records had of the certificate that it replaces, where that lies beside it: its last input."""
+    replaces = job.facts.job.replaces
+    if replaces is None or replaces.results is not None or not source.has(REPLACED):
+        return job
+    return replace(job, inputs={**job.inputs, **_contents(source, [REPLACED], TABLE_BYTES, written=True)})
 
 
 def _acquired(facts: JobFile, source: Source, inputs: dict[str, bytes]) -> Provenance | None:

@@ -23,11 +23,11 @@ from cmm_uq.jobs.traceability import ThermometerFacts, Traceability
 from tests.documents.test_completeness import changed, measured
 
 DAY = dt.date(2026, 3, 2)
-NATIONAL = {
+NATIONAL: dict[str, Any] = {
     "number": "1234-PTB-25", "laboratory": "PTB", "date": dt.date(2025, 6, 1), "due": dt.date(2027, 6, 1),
     "issuer": "national institute", "arrangement": "CIPM MRA",
 }  # fmt: skip
-ACCREDITED = {
+ACCREDITED: dict[str, Any] = {
     "number": "K-77", "laboratory": "Messlabor AG", "date": dt.date(2025, 6, 1), "due": dt.date(2027, 6, 1),
     "issuer": "accredited", "accreditation": "D-K-15000-01-00", "accredited_by": "DAkkS", "arrangement": "ILAC MRA",
 }  # fmt: skip

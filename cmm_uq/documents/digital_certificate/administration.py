@@ -6,9 +6,10 @@ capitals, their laboratory is named as nobody, and no word of conformity is said
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
+from typing import Any
 
 from cmm_uq.dcc.administrative import (
     Contact,
@@ -30,6 +31,7 @@ from cmm_uq.dcc.results import Statement
 from cmm_uq.documents.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
 from cmm_uq.documents.digital_certificate.words import NOT_STATED, SayIn, one_line, rich_of, words_of
 from cmm_uq.documents.origin import BANNERS
+from cmm_uq.documents.reissue import Comparison
 from cmm_uq.documents.traceability_section import claimed
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
@@ -163,7 +165,7 @@ def customer(job: Job, say_in: SayIn) -> Contact:
     return _contact(job.facts.job.customer, job.facts.job.address, say_in)
 
 
-def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
+def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]:
     """What it is not, what the results relate to, how they are traceable, what it replaces, when the next is agreed."""
     facts, mark, found = job.facts.job, mark_of(job), []
     if mark is not None:
@@ -182,7 +184,13 @@ def formal_statements(job: Job, say_in: SayIn) -> tuple[Statement, ...]:
             )
         )  # fmt: skip
     if facts.replaces is not None:
-        told = (replaced_certificate(facts.replaces), Verbatim(facts.replaces.reason), Verbatim(facts.replaces.changed))
+        told: list[Text] = [
+            replaced_certificate(facts.replaces),
+            Verbatim(facts.replaces.reason),
+            Verbatim(facts.replaces.changed),
+        ]
+        if (comparison := Comparison.of_results(results)) is not None:
+            told += [comparison.sentence, *(one.sentence for one in comparison.differences)]
         found.append(
             Statement(
                 name=words_of(say("Replaces certificate"), say_in),

@@ -54,7 +54,7 @@ _TITLES: Mapping[str, Text] = MappingProxyType({
 
 _NOT_STATED_THERE = (
     "schema", "software", "job", "import", "acquisition", "sampling", "identifiability", "diagnosis", "screening", "posterior",
-    "accuracy", "conformity", "verdicts", "covariance", "iso17025",
+    "accuracy", "conformity", "verdicts", "covariance", "iso17025", "traceability", "replaced",
 )  # fmt: skip
 """Keys that are no results of the machine, or stand elsewhere in the certificate; the attached results.json has them."""
 
@@ -87,7 +87,7 @@ def digital_certificate(
             laboratory=laboratory(job, say_in),
             persons=persons(job, say_in),
             customer=customer(job, say_in),
-            statements=(*formal_statements(job, say_in), *stated),
+            statements=(*formal_statements(job, results, say_in), *stated),
         ),
         measurements=(
             Measurement(

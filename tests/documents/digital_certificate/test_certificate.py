@@ -37,6 +37,7 @@ HTML = b"<!doctype html><title>the page</title>"
 MEASURED = "iota-1102-20C"
 STATED_ELSEWHERE = {
     "schema", "software", "job", "sampling", "identifiability", "diagnosis", "screening", "posterior", "accuracy", "iso17025",
+    "traceability", "replaced",
     "verdicts",
 }  # fmt: skip
 """Keys of results.json that hold no result of the machine, but what was done, or what is thought of it."""
