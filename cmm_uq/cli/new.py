@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +14,7 @@ from cmm_uq.cli.deferred import defer_scipy
 from cmm_uq.cli.derived import put_manifest
 from cmm_uq.cli.importing import Columns, Keys, keys_of, show
 from cmm_uq.cli.options import Json, Quiet, examples
-from cmm_uq.cli.printing import put_data, say
+from cmm_uq.cli.printing import can_answer, put_data, say
 from cmm_uq.errors import CmmUqError
 
 if TYPE_CHECKING:
@@ -95,7 +94,7 @@ def command(
         if json:
             put_manifest(files)
         return
-    if not given and not (quiet or json) and kind != BUDGET and kind in known() and _asked_on_a_terminal():
+    if not given and not (quiet or json) and kind != BUDGET and kind in known() and can_answer():
         from cmm_uq.cli.asking import answers
 
         given = answers(kind)
@@ -110,7 +109,7 @@ def command(
 
 def _described() -> Answers | None:
     """What a user at a terminal says of a part; ``None`` where there is none."""
-    if not _asked_on_a_terminal():
+    if not can_answer():
         return None
     from cmm_uq.cli.asking_part import part_answers
 
@@ -130,10 +129,6 @@ def _of_export(
     if not quiet:
         say(f"{folder}: {', '.join(name for name in files if '/' not in name and name != 'manifest.json')}")
     return files
-
-
-def _asked_on_a_terminal() -> bool:
-    return sys.stdin is not None and sys.stdin.isatty() and sys.stdout is not None and sys.stdout.isatty()
 
 
 def _given(machine: str, serial: str, settings: list[str]) -> dict[str, dict[str, Any]]:

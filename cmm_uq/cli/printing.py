@@ -104,6 +104,11 @@ def on_terminal(stream: TextIO | None) -> bool:
     return stream is not None and stream.isatty()
 
 
+def can_answer() -> bool:
+    """Whether somebody sees a question and can answer it."""
+    return on_terminal(sys.stdin) and on_terminal(sys.stdout)
+
+
 def styled(stream: TextIO | None) -> bool:
     """Whether it shows colours, and is to (https://no-color.org)."""
     return on_terminal(stream) and not os.environ.get("NO_COLOR") and os.environ.get("TERM") not in ("dumb", "unknown")

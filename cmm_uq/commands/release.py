@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.commands.reissue import refuse_denial, refuse_unlike
 from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.jobs.verdicts import NONE, Verdicts
 from cmm_uq.records.facts import STANDING, Certificate
 from cmm_uq.records.recognised import spelled
 
@@ -69,7 +70,10 @@ def _near(records: Records, name: str) -> str:
     return near if near.startswith("Did you mean") else "Give its number, the id of its job, or the number of its entry"
 
 
-def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed:
+def release(
+    records: Records, name: str, *, by: str, reason: str = "", despite: str = "",
+    ask: Callable[[str], str] = lambda question: "",
+) -> Signed:  # fmt: skip
     """Release a certificate, or sign it as the first of two persons.
 
     Parameters
@@ -78,10 +82,12 @@ def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed
     name : of the certificate; see :func:`certificate_named`.
     by : who releases it.
     reason : for the record.
+    despite : what is said of a certificate that states no pass; it stays in the records.
+    ask : asks for that where it is not given.
 
     Raises
     ------
-    CmmUqError : it must not be released, or not by this person.
+    CmmUqError : it must not be released, or not by this person, or nothing is said of what is no pass.
     """
     certificate, person = certificate_named(records, name, ("draft",)), _person(by)
     if (why := blocked(certificate)) is not None:
@@ -100,8 +106,14 @@ def release(records: Records, name: str, *, by: str, reason: str = "") -> Signed
     if spelled(person) in signed:
         raise CmmUqError(f"{person} has signed the certificate {certificate.number} already", where=records.shown,
                          fix="A second person must")  # fmt: skip
-    waiting = needed - len(signed) - 1
-    _sign(records, "release", certificate, person, reason, complete=waiting <= 0)
+    waiting, further = needed - len(signed) - 1, {}
+    if stated := no_pass(certificate, content):
+        word = despite.strip() or ask(f"{certificate.number} states {stated}").strip()
+        if not word:
+            raise CmmUqError(f"{certificate.number} states {stated}", where=records.shown,
+                             fix='Say why it is released all the same: --despite "TEXT"')  # fmt: skip
+        further = {"outcome": certificate.decision, "despite": word}
+    _sign(records, "release", certificate, person, reason, complete=waiting <= 0, **further)
     return Signed(records.certificate(certificate.entry), max(0, waiting))
 
 
@@ -156,6 +168,19 @@ def blocked(certificate: Certificate) -> str | None:
     return None
 
 
+def no_pass(certificate: Certificate, content: Mapping[str, Any]) -> str:
+    """What a certificate states that is no pass, in words; empty where nobody has to say a word of it.
+
+    Parameters
+    ----------
+    content : of its entry; one of an earlier version has the gravest decision alone.
+    """
+    if certificate.decision in ("pass", "conditional pass", NONE):
+        return ""
+    each = [f"{one.called}: {one.outcome}" for one in Verdicts.of_results(content) if one.standing != "good"]
+    return f"{certificate.decision} ({'; '.join(each)})" if each else certificate.decision
+
+
 def _person(name: str) -> str:
     person = " ".join(name.split())
     if not person:
@@ -164,7 +189,7 @@ def _person(name: str) -> str:
 
 
 def _sign(
-    records: Records, kind: str, certificate: Certificate, by: str, reason: str, **further: bool | int
+    records: Records, kind: str, certificate: Certificate, by: str, reason: str, **further: bool | int | str
 ) -> None:  # fmt: skip
     content = {"certificate": certificate.entry, "by": by, "reason": reason.strip(), **further}
     records.append(kind, content | {"results_sha256": certificate.results_sha256})

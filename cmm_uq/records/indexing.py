@@ -182,7 +182,7 @@ class Indexer:
             row = dict(found)
         self._rows[signatures].append({
             "entry": entry.number, "certificate": number, "what": entry.kind, "by": data["by"],
-            "reason": data.get("reason") or "", "at": entry.at, "replaced_by": data.get("replaced_by"),
+            "reason": _reason(data), "at": entry.at, "replaced_by": data.get("replaced_by"),
         })  # fmt: skip
         state = STATE_AFTER.get(entry.kind, "released" if data.get("complete", True) else row["state"])
         if state == "released" and row["state"] not in STANDING:
@@ -240,3 +240,9 @@ def index(connection: Connection, entries: Iterable[Entry]) -> None:
     for entry in entries:
         indexer.add(entry)
     indexer.flush()
+
+
+def _reason(data: Mapping[str, Any]) -> str:
+    """Why something was signed, and what was said of a certificate that states no pass."""
+    despite = f"{data['outcome']}: {data['despite']}" if data.get("despite") else ""
+    return "; ".join(filter(None, (data.get("reason"), despite)))

@@ -9,6 +9,9 @@ from typing import Any
 
 import pytest
 
+from cmm_uq.commands.release import release
+from cmm_uq.errors import CmmUqError
+from cmm_uq.records import open_records
 from tests.cli.laboratory import PLACE, kept
 from tests.cli.process import run
 from tests.records.histories import certificate
@@ -16,8 +19,6 @@ from tests.records.histories import certificate
 
 def state(place: Path, entry: int) -> str:
     """Of a certificate, as another program of the laboratory reads it."""
-    from cmm_uq.records import open_records
-
     with open_records(place, read_only=True) as records:
         return records.certificate(entry).state
 
@@ -149,3 +150,48 @@ def test_a_person_must_be_named(place: Path) -> None:
     assert "a person must be named" in run("release", "K-1", "--by", "  ", "--records", place).stderr
     assert run("release", "K-1", "--records", place).returncode == 2
     assert state(place, 1) == "draft"
+
+
+SCALE = {"name": "scale_x.ppm", "by": None, "title": "Scale error of X", "outcome": "fail", "value": -53.0, "U": 6.0,
+         "limit": 25.0, "unit": "ppm", "missing": []}  # fmt: skip
+
+
+def test_what_states_no_pass_is_released_with_a_word_that_stays_in_the_records(place: Path) -> None:
+    kept(place, numbered("K-1", decision="fail", verdicts={"overall": "fail", "statements": [SCALE]}))
+    bare = run("release", "K-1", "--by", "A. Huber", "--reason", "checked", "--records", place)
+    assert bare.returncode == 2
+    assert "K-1 states fail (scale_x.ppm: fail)" in bare.stderr
+    assert '--despite "TEXT"' in bare.stderr
+    assert state(place, 1) == "draft"
+    done = run("release", "K-1", "--by", "A. Huber", "--reason", "checked", "--despite", "customer informed", "--records",
+               place, "--json")  # fmt: skip
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["signatures"][0]["reason"] == "checked; fail: customer informed"
+    with open_records(place, read_only=True) as records:
+        entry = next(records.entries(2)).data
+        assert (entry["outcome"], entry["despite"], entry["reason"]) == ("fail", "customer informed", "checked")
+        assert records.verify(files=False) == []
+
+
+@pytest.mark.parametrize(
+    ("decision", "code"),
+    [("pass", 0), ("conditional pass", 0), ("none", 0), ("incomplete", 2), ("undecided", 2), ("remeasure", 2),
+     ("conditional fail", 2), ("fail", 2), ("a word of another package", 2)],
+)  # fmt: skip
+def test_an_entry_of_an_earlier_version_has_the_gravest_decision_alone(place: Path, decision: str, code: int) -> None:
+    kept(place, numbered("K-1", decision=decision))
+    done = run("release", "K-1", "--by", "A. Huber", "--records", place)
+    assert done.returncode == code
+    assert (f"K-1 states {decision}" in done.stderr) == (code == 2)
+
+
+def test_a_terminal_is_asked(place: Path) -> None:
+    kept(place, numbered("K-1", decision="undecided"))
+    with open_records(place) as records:
+        asked: list[str] = []
+        with pytest.raises(CmmUqError, match="K-1 states undecided"):
+            release(records, "K-1", by="A. Huber", ask=lambda question: asked.append(question) or "  ")
+        done = release(records, "K-1", by="A. Huber", ask=lambda question: "agreed with the customer")
+        assert asked == ["K-1 states undecided"]
+        assert done.certificate.state == "released"
+        assert records.signatures(1)[0].reason == "undecided: agreed with the customer"
