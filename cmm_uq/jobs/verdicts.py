@@ -14,7 +14,7 @@ from cmm_uq.messages import NOTHING, Text, Verbatim
 from cmm_uq.units import UNITS, printed_unit
 
 GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
-"""Outcomes of statements, the gravest first."""
+"""Outcomes of statements, the gravest first: findings in their order, and before the passes what would be one, were it whole."""
 
 NONE = "none"
 """In place of an outcome where nothing is stated."""

@@ -1,0 +1,340 @@
+"""What is stated is stated alike everywhere: random jobs, and their statements as every output has them.
+
+Results are those of a real recording with statements and tolerances drawn at random. What each output says is read out of that
+output itself, and compared with what was drawn by the order of gravity as it is written here.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from random import Random
+from types import SimpleNamespace
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+import typer
+
+from cmm_uq.cli.printing import conclude
+from cmm_uq.commands.batch_jobs import conforming
+from cmm_uq.commands.batch_table import COLUMNS, rows
+from cmm_uq.commands.due import due_in
+from cmm_uq.commands.fleet import _members
+from cmm_uq.commands.history import history_of
+from cmm_uq.commands.release import release
+from cmm_uq.commands.written import Written
+from cmm_uq.conformity.decision import decide
+from cmm_uq.conformity.statement import Decided, Statement
+from cmm_uq.dcc import written
+from cmm_uq.documents.compose import certified
+from cmm_uq.documents.digital_certificate.certificate import digital_certificate
+from cmm_uq.documents.history_page import overview_of
+from cmm_uq.documents.html import render_html
+from cmm_uq.documents.outcome import Outcome, Page
+from cmm_uq.documents.qif_file import qif
+from cmm_uq.documents.result import Result
+from cmm_uq.documents.results_file import as_json
+from cmm_uq.documents.summary import subject_of
+from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.reported import Reported
+from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.messages import say
+from cmm_uq.recertification.fleet_found import OfValue
+from cmm_uq.records import open_records
+from cmm_uq.records.content import certificate_content
+from cmm_uq.records.listing import outcomes_of, standing_of_all
+from cmm_uq.records.store import Records
+from cmm_uq.scheduling.found import Found
+from cmm_uq.scheduling.notices import of_results
+from cmm_uq.scheduling.work import REPORTED, Ended
+from cmm_uq.serving.certificate_page import _notices
+from cmm_uq.serving.due import Due
+from cmm_uq.serving.overview import groups
+from cmm_uq.verification.consistent import check_verdicts
+from cmm_uq.verification.found import Inquiry
+from tests.kinds.simulated import analysed
+
+JOB = "iota-1102-20C"
+
+ORDER = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
+"""The gravest first."""
+
+DRAWS = 40
+STANDARDS = (("ISO 10360-2:2009", "E0"), ("ISO 10360-2:2009", "R0"), ("ASME B89.4.1-1997", "volumetric performance"))
+RULES = ("simple", "ISO 14253-1", "ILAC-G8 non-binary")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A job with what it states, by name and in order."""
+
+    result: Result
+    stated: dict[str, str]
+
+    @property
+    def overall(self) -> str:
+        return min(self.stated.values(), key=ORDER.index, default="none")
+
+    @property
+    def standing(self) -> str:
+        return {"pass": "good", "none": "good", "fail": "bad", "conditional fail": "bad"}.get(self.overall, "open")
+
+
+def statement(random: Random, standard: str, characteristic: str) -> Statement:
+    """Two values of one limit, and now and then something missing or a reading to be repeated."""
+    rule, errors = random.choice(RULES), []
+    for _ in range(2):
+        value, u = random.choice((0.5, 0.5, 0.5, 0.5, 2.9, 2.9, 3.1, 9.0)), random.choice((0.01, 0.3))
+        errors.append(Decided(value, u, 3.0, decide(value, u, 3.0, rule, signed=True)))
+    if random.random() < 0.1:
+        errors[0] = replace(errors[0], standing="again")
+    missing = (say("a position"),) if random.random() < 0.3 else ()
+    facts = ConformityFacts(standard=standard, limit_um=3.0, rule=rule)
+    return Statement(facts, characteristic, say("error"), say("lengths"), tuple(errors), missing, ())
+
+
+def outcome_of_statement(one: Statement) -> str:
+    """By hand: the gravest of its values, or incomplete."""
+    values = ["remeasure" if each.standing == "again" else each.decision.outcome for each in one.errors]
+    gravest = min(values, key=ORDER.index)
+    return "incomplete" if gravest in ("pass", "conditional pass") and one.missing else gravest
+
+
+def outcome_of_tolerance(low: float, high: float, tolerance: float, *, determined: bool) -> str:
+    """By hand: where the whole interval is."""
+    if not determined:
+        return "undecided"
+    smallest = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    return "pass" if max(abs(low), abs(high)) <= tolerance else "fail" if smallest > tolerance else "undecided"
+
+
+@cache
+def drawn(seed: int) -> Drawn:
+    random, result = Random(seed), analysed(JOB)
+    statements = tuple(statement(random, *one) for one in STANDARDS if random.random() < 0.4)
+    stated = {f"{one.facts.standard} {one.characteristic}": outcome_of_statement(one) for one in statements}
+    tolerances, free = {}, set()
+    for effect, parameters in result.parameters.items():
+        if random.random() < 0.75:
+            continue
+        (name, quantity), *_ = parameters.items()
+        low, high = quantity.interval95
+        inner = 0.0 if low < 0 < high else min(abs(low), abs(high))
+        most = max(abs(low), abs(high))
+        tolerance = random.choice((*(2.0 * most,) * 6, (inner + most) / 2, 0.8 * inner or most / 9))
+        free |= {effect} if random.random() < 0.1 else set()
+        tolerances[effect] = tolerance
+        stated[f"{effect}.{name}"] = outcome_of_tolerance(low, high, tolerance, determined=effect not in free)
+    facts = result.job.facts
+    model = facts.model.model_copy(update={"tolerances": tolerances})
+    diagnosed = replace(result.diagnosed, diagnosis=replace(result.diagnosed.diagnosis, verdict="consistent"))
+    job = replace(result.job, facts=facts.model_copy(update={"model": model}))
+    ls = result.least_squares
+    column = [i for i, unknown in enumerate(ls.unknowns) if unknown.key[0] in free]
+    estimate = replace(result.estimate, least_squares=replace(ls, null_space=np.eye(len(ls.unknowns))[:, column]))
+    found = replace(result, job=job, statements=statements, diagnosed=diagnosed, estimate=estimate)
+    return Drawn(found, stated)
+
+
+@cache
+def outcome(seed: int) -> Outcome:
+    return certified(drawn(seed).result, Page(lambda result: []))
+
+
+@cache
+def results(seed: int) -> dict[str, Any]:
+    """As another program reads them."""
+    found: dict[str, Any] = json.loads(as_json(outcome(seed).results))
+    return found
+
+
+def kept(seed: int, place: Path) -> Records:
+    """Records that hold the certificate of one draw, which lacks nothing that ISO/IEC 17025 asks for."""
+    content = certificate_content(results(seed), drawn(seed).result.job.facts, command="report", folder="x",
+                                  results_sha256=f"{seed:064x}", files={}, named=lambda name: name)  # fmt: skip
+    records = open_records(place, create=True)
+    records.append("report", content | {"missing": []})
+    return records
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[int], Records]]:
+    made: dict[int, Records] = {}
+    place = tmp_path_factory.mktemp("records")
+
+    def of(seed: int) -> Records:
+        if seed not in made:
+            made[seed] = kept(seed, place / f"{seed}.db")
+        return made[seed]
+
+    yield of
+    for one in made.values():
+        one.close()
+
+
+each = pytest.mark.parametrize("seed", range(DRAWS))
+ON = dt.date(2004, 9, 1)
+"""The day of the measurement."""
+
+
+def test_all_outcomes_are_among_those_that_are_drawn() -> None:
+    gravest = [drawn(seed).overall for seed in range(DRAWS)]
+    assert set(gravest) == {*ORDER, "none"}
+    assert any(
+        one.stated[name] == "undecided" for one in map(drawn, range(DRAWS)) for name in one.stated if "." in name
+    )
+
+
+@each
+def test_results_json_the_terminal_and_exit_codes(seed: int) -> None:
+    of, data = drawn(seed), results(seed)
+    assert {one["name"] if one["by"] is None else f"{one['by']} {one['name']}": one["outcome"]
+            for one in data["verdicts"]["statements"]} == of.stated  # fmt: skip
+    assert data["verdicts"]["overall"] == of.overall
+    told = outcome(seed).summary.verdicts
+    assert [one.word.lower() for one in told] == [*of.stated.values()]
+    ended = Written(outcome(seed), b"{}", {})
+    code = 0
+    try:
+        conclude(ended, json=False, quiet=True, strict=True, verbose=False)
+    except typer.Exit as exit_:
+        code = exit_.exit_code
+    assert code == (0 if of.overall in ("pass", "none") else 4)
+
+
+@each
+def test_results_of_earlier_versions_say_the_same(seed: int) -> None:
+    """But for parameters that are not determined, of which they said nothing."""
+    data = {key: value for key, value in results(seed).items() if key != "verdicts"}
+    of = drawn(seed)
+    assert {one.called: one.outcome for one in Verdicts.of_results(data)} == {
+        name: said for name, said in of.stated.items() if name.partition(".")[0] not in of.result.free
+    }  # fmt: skip
+    inquiry = Inquiry()
+    check_verdicts(inquiry, results(seed), "results.json")
+    assert not inquiry.findings
+
+
+@each
+def test_batches_and_scheduled_runs(seed: int) -> None:
+    of, data = drawn(seed), results(seed)
+    assert conforming(data) == (of.overall in ("pass", "none"))
+    decision = [name for name, *_ in COLUMNS].index("decision")
+    assert {row[decision] for row in rows(data)} == {of.overall}
+    notices = of_results(data, "inputs", "where")
+    events = {{"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}.get(said, "undecided")
+              for said in of.stated.values() if said != "pass"}  # fmt: skip
+    assert {one.event for one in notices} == events
+    ended = Ended(Found(Path(), Path(), "job", {}), REPORTED, results=data, notices=notices)
+    assert ended.line()["decisions"] == [*of.stated.values()]
+    assert ended.code == (0 if of.overall in ("pass", "none") else 1)
+
+
+@each
+def test_the_digital_certificate(seed: int) -> None:
+    of = drawn(seed)
+    tree = ET.fromstring(written(digital_certificate(results(seed), of.result.job, html=None)))
+    dcc = "{https://ptb.de/dcc}"
+    by_standard = [
+        one.findtext(f"{dcc}conformity") for one in tree.iterfind(f".//{dcc}administrativeData//{dcc}statement")
+        if "basic_conformity" in one.get("refType", "").split()
+    ]  # fmt: skip
+    word = {"conditional pass": "conditionalPass", "conditional fail": "conditionalFail", "undecided": "noPass",
+            "incomplete": "noPass", "remeasure": "noPass"}  # fmt: skip
+    assert by_standard == [word.get(said, said) for name, said in of.stated.items() if " " in name]
+    by_tolerance = {
+        one.get("id", "").removeprefix("estimates."): one.findtext(f"{dcc}measurementMetaData/{dcc}metaData/{dcc}conformity")
+        for one in tree.iterfind(f".//{dcc}quantity") if one.find(f"{dcc}measurementMetaData") is not None
+    }  # fmt: skip
+    assert by_tolerance == {name: word.get(said, said) for name, said in of.stated.items() if " " not in name}
+
+
+@each
+def test_qif(seed: int) -> None:
+    of = drawn(seed)
+    tree = ET.fromstring(qif(Reported.model_validate_json(as_json(results(seed)))))
+    space = "{http://qifstandards.org/xsd/qif3}"
+    whole = tree.findtext(f".//{space}InspectionStatusEnum")
+    assert whole == {"pass": "PASS", "fail": "FAIL"}.get(of.overall, "UNKNOWN")
+    said = {one.get("name", ""): one.get("value") for one in tree.iter(f"{space}AttributeStr")}
+    assert {re.sub("^decision (by|on) | by its tolerance$", "", name): word for name, word in said.items()
+            if name.startswith("decision")} == of.stated  # fmt: skip
+
+
+@each
+def test_the_records_what_is_due_and_the_history(seed: int, recorded: Callable[[int], Records]) -> None:
+    of, records = drawn(seed), recorded(seed)
+    (kept,) = records.certificates()
+    assert kept.decision == of.overall
+    stated = outcomes_of(records, [kept.entry])[kept.entry]
+    assert sorted(stated.values()) == sorted(of.stated.values())
+    (due,) = (one for one in due_in(records, (), ON) if one.item == "machine")
+    beyond = of.standing == "bad"
+    assert due.beyond == beyond
+    assert (due.state(ON, dt.timedelta(days=1)) == "overdue") == beyond
+    assert any("does not state that it conforms" in one for one in due.remarks) == (of.standing == "open")
+    history = history_of(records.machines()[0].serial, records.place, on=ON)
+    assert history.decision == of.overall
+    assert overview_of(history).standing == of.standing
+    assert (overview_of(history).verdict == "Beyond its limits") == beyond
+    for one in history.values:
+        said = of.stated.get(one.series.name)
+        if said is not None:
+            assert one.beyond == (said in ("fail", "conditional fail"))
+
+
+@each
+def test_the_fleet(seed: int, recorded: Callable[[int], Records]) -> None:
+    of, records = drawn(seed), recorded(seed)
+    frame = records.all_series()
+    stated = outcomes_of(records, {int(entry) for entry in frame["entry"]})
+    nothing = SimpleNamespace(estimates=SimpleNamespace(crossing=None))
+    for name, rows_ in frame.groupby("name"):
+        members = tuple(_members(rows_, {}, stated))
+        found = OfValue(name, name, "", members, nothing, np.ones(1, bool), 0)
+        if said := of.stated.get(str(name)):
+            assert found.beyond.tolist() == [said in ("fail", "conditional fail")]
+
+
+@each
+def test_the_pages_of_the_records(seed: int, recorded: Callable[[int], Records]) -> None:
+    of, records = drawn(seed), recorded(seed)
+    (newest,) = standing_of_all(records)
+    found = groups(newest, Due(None, say("")), ON)
+    assert ("failing" in found, "open" in found) == (of.standing == "bad", of.standing == "open")
+    (kept,) = records.certificates()
+    said = str(_notices(kept)[-1].head)
+    assert ("states no conformity" in said) if of.overall == "none" else (f"decision: {of.overall}" in said)
+
+
+@each
+def test_a_release_asks_for_a_word_unless_all_passes(seed: int, tmp_path: Path) -> None:
+    of, asked = drawn(seed), list[str]()
+
+    def ask(question: str) -> str:
+        asked.append(question)
+        return "agreed"
+
+    with kept(seed, tmp_path / "records.db") as records:
+        release(records, "1", by="A. Huber", ask=ask)
+        word = records.signatures(1)[0].reason
+    if of.overall in ("pass", "conditional pass", "none"):
+        assert (asked, word) == ([], "")
+    else:
+        assert word == f"{of.overall}: agreed"
+        assert all(f"{name}: {said}" in asked[0] for name, said in of.stated.items() if said != "pass")
+
+
+@pytest.mark.parametrize("seed", range(0, DRAWS, 5))
+def test_the_certificate(seed: int) -> None:
+    """Each statement with its outcome in words on the first page."""
+    page = re.sub(r"\s+", " ", re.sub("<[^>]*>", " ", render_html(outcome(seed).document)))
+    for one, said in zip(outcome(seed).verdicts, drawn(seed).stated.values(), strict=True):
+        assert f"{subject_of(one)}: {said}" in page
