@@ -39,6 +39,7 @@ from cmm_uq.cli import (
     serve,
     sign,
     simulate,
+    standards,
     verify,
 )
 from cmm_uq.cli.options import examples
@@ -79,6 +80,7 @@ for module, short in {
     sign: "A certificate signed electronically: PDF and XML.",
     affected: "Which certificates a correction of the package touches.",
     serve: "The records to look at, in a browser.",
+    standards: "The standards that are decided, clause by clause, and forms to check them by.",
     schema: "JSON Schema of a file, for editors that complete and explain.",
     selftest: "Published reference figures, computed here and compared.",
 }.items():

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.conformity.as_recorded import LeftOut, numbered
+from cmm_uq.conformity.clauses import Clause, in_words
 from cmm_uq.conformity.copies import copies_in_words
 from cmm_uq.conformity.decision import Decision, decide, needs_uncertainty, rule_words
 from cmm_uq.conformity.plans import Condition
@@ -111,12 +112,19 @@ class Standard:
     characteristics : that are decided; the first is meant where the job names none.
     remarks : what every statement by it says.
     sensing : for which probes it is; ``None`` for any.
+    clauses : what it takes the standard to ask, for the form that a laboratory fills in.
     """
 
     name: str
     characteristics: tuple[Characteristic, ...]
     remarks: tuple[Text, ...] = ()
     sensing: Literal["contacting", "optical"] | None = None
+    clauses: tuple[Clause, ...] = ()
+
+    @property
+    def clause_names(self) -> tuple[str, ...]:
+        """See :attr:`cmm_uq.jobs.conformity.Asked.clause_names`."""
+        return tuple(clause.name for clause in self.clauses)
 
     def characteristic(self, name: str | None) -> Characteristic:
         """One of them by name; without one the first.
@@ -320,10 +328,13 @@ class Test:
         repeats : up to which a repeat has every point of its measurement; all of them by default.
         lacking : what could not be decided of what was recorded.
         """
+        form = self.circumstances.clauses.get(self.facts.clauses or "")
+        clauses = [one for one in self.standard.clauses if not one.of or self.characteristic.name in one.of]
+        told, differing = in_words(self.standard.name, clauses, form)
         asked = (
             *self.characteristic.conditions(self.recorded, recorded=True),
             *self.characteristic.asks(self),
-            *(Condition(what, (what,)) for what in lacking),
+            *(Condition(what, (what,)) for what in (*lacking, *differing)),
             *self.unstated,
             *rated_conditions(self.circumstances, self.recorded.points),
             *numbered(self.recorded.points if self.left_out is None else self.left_out.recording, repeats),
@@ -339,6 +350,7 @@ class Test:
             more.append(RAISED)
         if copies := copies_in_words(self.recorded.points):
             more.append(copies)
+        more += told
         aside = [item for item in items if item.set_aside]
         outside = () if self.left_out is None else self.left_out.without_value
         if self.left_out is not None and (aside or outside):

@@ -7,11 +7,13 @@ tested, from which columns, and what is not: docs/standards.md.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 
 from cmm_uq.conformity.as_recorded import LeftOut
 from cmm_uq.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
+from cmm_uq.conformity.clauses import CLAUSES
 from cmm_uq.conformity.lengths_decided import (
     at_offset,
     errors_of_indication,
@@ -141,7 +143,9 @@ _STANDARDS = (
     ), sensing="contacting"),
 )  # fmt: skip
 
-BUILT_IN: Mapping[str, Standard] = MappingProxyType({standard.name: standard for standard in _STANDARDS})
+BUILT_IN: Mapping[str, Standard] = MappingProxyType(
+    {standard.name: replace(standard, clauses=CLAUSES[standard.name]) for standard in _STANDARDS}
+)
 """The standards that are decided here, by name."""
 
 

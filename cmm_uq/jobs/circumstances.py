@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.jobs.laboratory import Capability
 from cmm_uq.jobs.short_gauge import ShortGauge
+from cmm_uq.jobs.standard_clauses import ClausesForm
 from cmm_uq.jobs.table import Table, Temperature, Uncertainty
 
 
@@ -182,6 +183,7 @@ class Circumstances:
     cte_per_k : coefficient of expansion of the artefact, 1/K; ``None`` where it is not stated.
     short_gauge : recorded beside lengths that are not bidirectional by themselves.
     cmc : of the laboratory, below which no test value is said to be known.
+    clauses : forms of standards' clauses that the laboratory filled in, by their file.
     set_aside : measurements that the laboratory leaves out of the estimates, each with its reason.
     """
 
@@ -191,4 +193,5 @@ class Circumstances:
     cte_per_k: float | None = None
     short_gauge: ShortGauge | None = None
     cmc: Capability | None = None
+    clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
     set_aside: Mapping[int, str] = field(default_factory=dict)

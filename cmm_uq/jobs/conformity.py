@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from cmm_uq.errors import suggestion
+from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TEST_KEYS, TestUncertainty
 from cmm_uq.jobs.mpe_text import mpe_of
+from cmm_uq.jobs.standard_clauses import ClausesForm
 from cmm_uq.jobs.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
+from cmm_uq.jobs.toml_file import checked
 
 
 class MaximumPermissibleError(Table):
@@ -137,6 +140,9 @@ class ConformityFacts(Table):
     prior: Prior | None = None
     """What is known of such machines beforehand, for rules and risks that go by it (JCGM 106:2012, 7.2)."""
 
+    clauses: str | None = None
+    """Form of the standard's clauses, filled in beside the laboratory's own copy (`cmm-uq standards NAME --form FILE`)."""
+
     @field_validator("standard")
     @classmethod
     def _known(cls, name: str, info: ValidationInfo) -> str:
@@ -167,12 +173,51 @@ class ConformityFacts(Table):
         return self
 
 
+def clause_files(wishes: list[ConformityFacts]) -> list[str]:
+    """Forms that a job names."""
+    return list(dict.fromkeys(wish.clauses for wish in wishes if wish.clauses is not None))
+
+
+def forms_of(
+    wishes: list[ConformityFacts], inputs: Mapping[str, bytes], folder: Path, standards: Standards
+) -> dict[str, ClausesForm]:  # fmt: skip
+    """The forms that a job names, by their file.
+
+    Raises
+    ------
+    CmmUqError : one is no form, is of another standard, or has a clause that this has not.
+    """
+    found: dict[str, ClausesForm] = {}
+    for i, wish in enumerate(wishes, 1):
+        if wish.clauses is None:
+            continue
+        path = folder / wish.clauses
+        form = found[wish.clauses] = checked(inputs[wish.clauses], path, ClausesForm)
+        if form.standard != wish.standard:
+            raise CmmUqError(
+                f"is the form of {form.standard}, and [[conformity]] {i} states {wish.standard}", where=str(path),
+                fix=f'cmm-uq standards "{wish.standard}" --form FILE writes the one that belongs to it',
+            )  # fmt: skip
+        asked = standards.named(wish.standard)
+        known = () if asked is None else asked.clause_names
+        for name in form.clauses:
+            if name not in known:
+                raise CmmUqError(f"{wish.standard} has no clause {name!r} here", where=f"{path}: [clauses.{name}]",
+                                 fix=suggestion(name, known))  # fmt: skip
+    return found
+
+
 class Asked(Protocol):
     """What the check of a job must know of a standard."""
 
     @property
     def sensing(self) -> str | None:
         """For which probes it is; ``None`` for any."""
+        ...
+
+    @property
+    def clause_names(self) -> Sequence[str]:
+        """Names of its clauses, as a form has them."""
         ...
 
     def characteristic(self, name: str | None) -> object:

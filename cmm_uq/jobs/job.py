@@ -30,6 +30,7 @@ from cmm_uq.jobs.prediction import Prediction
 from cmm_uq.jobs.prove import ProveFacts
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.simulation import SimulationFacts
+from cmm_uq.jobs.standard_clauses import ClausesForm
 from cmm_uq.jobs.table import (
     Limit,
     Names,
@@ -267,6 +268,7 @@ class Job:
     as_found : what the machine showed before it was adjusted, where the job names it.
     short_gauge : recorded beside the artefact, where the job names one.
     prediction : of a simulation, where the job names a file of it.
+    clauses : forms of standards' clauses that the laboratory filled in, by their file.
     beside : files that it was read from and that lie outside its folder.
     imported : how files in another format than the project's own were read.
     acquired : how the recording was taken live, where it was.
@@ -286,6 +288,7 @@ class Job:
     imported: tuple[Recognised, ...] = ()
     acquired: Provenance | None = None
     certified: Mapping[str, Any] = field(default_factory=dict)
+    clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
 
     @property
     def circumstances(self) -> Circumstances:
@@ -295,7 +298,7 @@ class Job:
         """
         stated = self.facts.circumstances
         uncertainty = stated.uncertainty if self.acquired is None else self.acquired.with_joined(stated.uncertainty)
-        return replace(stated, short_gauge=self.short_gauge, uncertainty=uncertainty)
+        return replace(stated, short_gauge=self.short_gauge, clauses=self.clauses, uncertainty=uncertainty)
 
     @property
     def origin(self) -> Origin:

@@ -16,7 +16,7 @@ from cmm_uq.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, L
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.as_found import as_found_of
-from cmm_uq.jobs.conformity import Standards, needed, uncertainty_missing
+from cmm_uq.jobs.conformity import Standards, clause_files, forms_of, needed, uncertainty_missing
 from cmm_uq.jobs.digitizer_calibration import calibration_file
 from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.jobs.earlier_noise import noise_file
@@ -112,13 +112,15 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     logo = [*filter(None, [facts.laboratory.logo])]
     recordings = [facts.recording.file] if earlier is None else [facts.recording.file, earlier]
     recordings += [facts.short_gauge.file] if facts.short_gauge else []
+    forms = clause_files(facts.conformity)
     check_distinct(
-        [*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps, *logo], str(path)
+        [*recordings, *maps, *logs, *calibrations, *certificate, *predicted, *predicting_maps, *logo, *forms], str(path)
     )
     before = results_named(facts.job.as_found)
     named = None if facts.job.replaces is None else results_named(facts.job.replaces.results)
     others = [*calibrations, *(one for one in (before, named) if one is not None)]
-    inputs |= _contents(source, others, TABLE_BYTES, written=True)
+    inputs |= _contents(source, others, TABLE_BYTES, written=True) | _contents(source, forms, JOB_BYTES)
+    clauses = forms_of(facts.conformity, inputs, folder, nameable.standards)
     if says is not None:
         inputs |= _contents(source, certificate, TABLE_BYTES)
     inputs |= _pictures(source, logo)
@@ -160,7 +162,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
     prediction = prediction_of(facts.simulation, inputs, folder)
     how = tuple(filter(None, told))
     return Job(folder, facts, points, inputs, altered(derived, inputs), planned, found, gauge, prediction, imported=how,
-               acquired=acquired, certified={} if says is None else says.table)  # fmt: skip
+               acquired=acquired, certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
 
 
 def _pictures(source: Source, names: Sequence[str]) -> dict[str, bytes]:

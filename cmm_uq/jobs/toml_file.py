@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar, cast, get_origin
 
 import numpy as np
 import tomlkit
@@ -185,13 +185,15 @@ def _near(error: ErrorDetails) -> str | None:
 def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | None:
     """The class of the table that these keys lead to."""
     model: object = top
+    by_name = False
     for parent in parents:
-        if parent.isdigit():
+        if parent.isdigit() or by_name:
+            by_name = False
             continue
         fields = getattr(model, "model_fields", {})
         if parent not in fields:
             return None
-        model = _model_inside(fields[parent].annotation)
+        model, by_name = _model_inside(fields[parent].annotation), get_origin(fields[parent].annotation) is dict
     return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 
 
