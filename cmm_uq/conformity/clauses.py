@@ -98,8 +98,8 @@ _ISO_10360_5 = (
            "25: names of the characteristics, and summaries of manufacturers; neither more nor fewer: this project"),
     Clause("pattern", say("where on the sphere the points lie"), "No direction of the hemisphere is farther than 45° "
            "from the nearest point.", CHOSEN),
-    Clause("sphere_size", say("size of the sphere"), "10 to 50 mm.", "Harris 2004, 2.6.3, of ISO 10360-2:2000; not less than 10 "
-           "mm: clause 6.2.1 of the edition of 2020, as quoted by a reseller"),
+    Clause("sphere_size", say("size of the sphere"), "10 to 50 mm.", "Harris 2004, 2.6.3, of ISO 10360-2:2000; not less "
+           "than 10 mm: clause 6.2.1 of the edition of 2020, as quoted by a reseller"),
     Clause("every_sphere", say("every sphere by itself"), "Every sphere recorded is decided, form and size from the same "
            "points; nothing is measured again.", CHOSEN),
     _UNCERTAINTY,

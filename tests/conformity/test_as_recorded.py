@@ -23,7 +23,7 @@ from cmm_uq.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.points import Floats, Points
 from cmm_uq.uncertainty.quantity import Quantity
 from tests.conformity import recorded
-from tests.recordings import bar_facts, screened
+from tests.recordings import bar_facts, screened, with_columns
 
 STEP_GAUGE = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
 SPHERE = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.2)
@@ -163,7 +163,7 @@ def test_one_of_twenty_one_bars_that_is_too_long_or_too_short_fails(by_mm: float
 
 @pytest.mark.parametrize("characteristic", ["P_Form", "P_Size"])
 def test_a_point_of_a_sphere_that_is_far_off_fails(characteristic: str) -> None:
-    points = recorded.sphere(height_um=0.2).points
+    points = with_columns(recorded.sphere(height_um=0.2).points, temp_artefact_c=np.full(25, 20.0))
     xyz = points.xyz.copy()
     xyz[11] *= 1.08  # 1 mm
     wish = {"standard": "ISO 10360-5:2020", "characteristic": characteristic, "limit_um": 2.0}
