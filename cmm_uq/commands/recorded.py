@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.commands.modelled import model_of
+from cmm_uq.commands.modelled import FEWEST_LEFT, model_of
+from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.kinds import kind_of
 from cmm_uq.messages import Verbatim, say
 from cmm_uq.model import MeasurementModel
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.display import NANOMETRE, display_step
 from cmm_uq.model.placings import LAST_DIGIT
 from cmm_uq.physics.catalogue import effects
 from cmm_uq.points import AXES
@@ -36,7 +39,27 @@ def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
         set_aside=job.facts.recording.measurements_aside, where=where,
     )  # fmt: skip
     artefact = observe(job.facts.artefact, recording.points, where=where)
-    return model_of(job, artefact), (*recording.findings, *_unread(artefact))
+    model = model_of(job, artefact)
+    _refuse_exact(job, model)
+    return model, (*recording.findings, *_unread(artefact))
+
+
+def _refuse_exact(job: Job, model: MeasurementModel) -> None:
+    """Refuse what is said to be measured and fits to the last digit, though its digits would show a nanometre.
+
+    Raises
+    ------
+    CmmUqError : no machine reads so; the noise of one cannot be estimated from it.
+    """
+    found = model.estimate().least_squares
+    if job.origin != MEASURED or found.degrees_of_freedom < FEWEST_LEFT:
+        return
+    if found.sigma_of_residuals < NANOMETRE and display_step(job.points.xyz, found.sigma_of_residuals) < NANOMETRE:
+        raise CmmUqError(
+            "the readings have no scatter at all: they agree with each other to below a nanometre, as computed or nominal "
+            "values do, and no machine's", where=job.recording_path,
+            fix='Record what the machine indicated; or, of a simulation, state origin = "simulated" in job.toml [job]',
+        )  # fmt: skip
 
 
 def _unread(artefact: Artefact) -> list[Finding]:

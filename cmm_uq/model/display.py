@@ -11,7 +11,7 @@ from scipy import sparse
 from cmm_uq.points import Floats, Ints
 
 INCH = 25.4
-_NANOMETRE = 1e-6
+NANOMETRE = 1e-6
 """mm."""
 
 _EXACT = 1e-5
@@ -53,7 +53,7 @@ def of_last_digit(xyz: Floats, scatter: float) -> float:
     scatter : of a coordinate, mm, as the residuals show it: of figures without noise, of copies and of their differences, less
         than the digits can tell.
     """
-    least = max(display_step(xyz, scatter) / float(np.sqrt(12)), _NANOMETRE)
+    least = max(display_step(xyz, scatter) / float(np.sqrt(12)), NANOMETRE)
     return least if scatter < least else 0.0
 
 

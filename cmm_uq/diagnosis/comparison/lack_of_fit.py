@@ -204,7 +204,8 @@ def tail_probability(draws: Floats, value: float, tail: float = _TAIL) -> float:
     start = float(np.quantile(draws, tail))
     if value <= start:
         return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
-    excess = float((draws[draws > start] - start).mean())
+    beyond = draws[draws > start]
+    excess = float((beyond - start).mean()) if len(beyond) else 0.0  # all crowd where nothing but the digits is left
     if excess < _CROWDED:
         return float(max((1 - tail) * np.exp(-(value - start)), np.mean(draws >= value)))
     shown = (1 - tail) * np.exp(-(min(value, largest) - start) / excess)
