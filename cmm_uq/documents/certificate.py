@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from cmm_uq.documents.clauses import DRAFT, NOT_OURS, STATEMENTS, draft, replaced_certificate
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conditions import conditions
-from cmm_uq.documents.document import Document, Facts, Section, Signature
+from cmm_uq.documents.document import Document, Facts, Overview, Section, Signature
 from cmm_uq.documents.origin import CERTIFICATE, DIGITAL, came_about, file_name
 from cmm_uq.documents.provenance import FILE as PROVENANCE
 from cmm_uq.documents.reissue import CHANGED
+from cmm_uq.documents.traceability_section import claimed
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
@@ -29,22 +28,20 @@ def certificate_of(
     told: tuple[Text, ...],
     produced_by: Text,
     files: tuple[Text, ...] = (),
-    decided: Text = NOTHING,
+    overview: Overview | None = None,
 ) -> Document:
     """Sections and warnings between what every certificate has.
 
     Parameters
     ----------
     job : that was analysed.
-    sections : the first is that of the results, and is given the conditions under which they were found.
+    sections : of which the first page shows those that are marked.
     told : warnings on the results; those on what the job does not state follow them.
     produced_by : program, sampler and seed.
     files : attached beside job and recording.
-    decided : what every statement of conformity comes to, for the first page.
+    overview : what every statement of conformity comes to.
     """
     facts = job.facts
-    first, *others = (section for section in sections if section.blocks)
-    under = conditions(job)
     return Document(
         title=CERTIFICATE,
         number=Verbatim(facts.job.number or facts.job.id),
@@ -55,11 +52,9 @@ def certificate_of(
             date=day(facts.job.date),
         ),
         issuer=issuer_of(facts.laboratory),
-        particulars=_particulars(facts, decided),
+        particulars=_particulars(job),
         warnings=(*told, *formal_warnings(job)),
-        sections=tuple(sorted(
-            (replace(first, blocks=(*first.blocks, under)) if under.rows else first, *others), key=lambda one: one.opinion
-        )),
+        sections=tuple(sorted((one for one in sections if one.blocks), key=lambda one: (not one.first, one.opinion))),
         statements=statements_of(facts.job),
         signatures=signatures_of(facts.laboratory),
         attachments=(
@@ -71,11 +66,14 @@ def certificate_of(
         banner=DRAFT if draft(job) else NOTHING,
         draft=draft(job),
         logo=logo_of(facts.laboratory, job.inputs),
+        overview=overview,
+        decides=True,
     )  # fmt: skip
 
 
-def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
-    job, machine = facts.job, facts.machine
+def _particulars(of: Job) -> tuple[Facts, ...]:
+    facts, job, machine = of.facts, of.facts.job, of.facts.machine
+    method, *others = performed(job)
     return grouped(
         (
             *identified(job, facts.laboratory, job.origin),
@@ -89,8 +87,12 @@ def _particulars(facts: JobFile, decided: Text) -> tuple[Facts, ...]:
             (say("Measuring range"), _travel(facts)),
             (say("Place"), job.place),
         ),
-        (*performed(job), (say("Conformity"), decided)),
+        (method, *conditions(of).rows, *_traced(of), *others),
     )
+
+
+def _traced(job: Job) -> tuple[Row, ...]:
+    return ((say("Traceability"), claimed(job).statement),) if job.origin == MEASURED else ()
 
 
 def grouped(*groups: tuple[Row, ...]) -> tuple[Facts, ...]:

@@ -13,6 +13,7 @@ from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conformity_section import conformity_section
 from cmm_uq.documents.diagnosis.page import diagnosis_sections
 from cmm_uq.documents.document import Document, Section
+from cmm_uq.documents.first_page import overview_of, with_first
 from cmm_uq.documents.method_section import method, posterior_section
 from cmm_uq.documents.outcome import Outcome, Page
 from cmm_uq.documents.posterior_file import posterior_file, posterior_name
@@ -20,7 +21,7 @@ from cmm_uq.documents.program import program
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.results_file import results
 from cmm_uq.documents.results_section import error_factors, performance
-from cmm_uq.documents.summary import in_short, summary
+from cmm_uq.documents.summary import summary
 from cmm_uq.documents.traceability_section import traceability
 from cmm_uq.documents.warning import warnings
 from cmm_uq.messages import Text, Verbatim, say
@@ -55,7 +56,7 @@ def certified(result: Result, page: Page) -> Outcome:
 def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document:
     diagnosis = diagnosis_sections(result.diagnosed) if result.job.facts.job.diagnosis_on_certificate else ()
     sections = [
-        *_ordered(result, page.sections(result)), *tolerance_section.sections(result), method(result),
+        *with_first(result, [*_ordered(result, page.sections(result)), *tolerance_section.sections(result)]), method(result),
         *(replace(section, opinion=True) for section in (*diagnosis, posterior_section(result))),
     ]  # fmt: skip
     produced_by = say(
@@ -65,7 +66,7 @@ def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document
         seed=result.posterior.seed,
     )
     files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
-    return certificate_of(result.job, sections, told, produced_by, files, in_short(result))
+    return certificate_of(result.job, sections, told, produced_by, files, overview_of(result))
 
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:

@@ -8,8 +8,8 @@ from dataclasses import replace
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.documents.conformity_budget import budget_table
 from cmm_uq.documents.conformity_plot import trumpet
-from cmm_uq.documents.document import Block, Column, Decision, Section, Table
-from cmm_uq.documents.wording import OUTCOME_WORDS, measured, probability
+from cmm_uq.documents.document import Block, Column, Decision, Plot, Section, Table
+from cmm_uq.documents.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, in_a_row, number, plural, say, sentences, signed
 from cmm_uq.uncertainty.rounding import nominal, significant
@@ -33,8 +33,8 @@ def conformity_section(statements: Sequence[Statement]) -> Section:
 def decision_block(statement: Statement) -> Decision:
     """One statement: what was compared with what, by which rule, and what follows."""
     decision = statement.decision
-    value, U = measured(statement)
-    known = say(", U = {U} µm (k = 2)", U=U) if U else NOTHING
+    value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
+    known = say(" (k = 2)") if statement.u_um > 0 else NOTHING
     return Decision(
         named(statement),
         statement.quantity,
@@ -121,9 +121,8 @@ def _chances(statement: Statement) -> list[Text]:
 def _evidence(statement: Statement) -> list[Block]:
     """Table of all errors, their picture where lengths differ, and the budget of the named one."""
     blocks: list[Block] = []
-    drawn = {item.length_mm for item in statement.errors if not item.set_aside}
-    if statement.signed and len(drawn - {None}) > 1:
-        blocks.append(_picture(statement))
+    if has_picture(statement):
+        blocks.append(picture(statement))
     blocks.append(_table(statement))
     if statement.budget is not None:
         blocks.append(budget_table(_subject(statement), statement.budget))
@@ -134,7 +133,14 @@ def _subject(statement: Statement) -> Text:
     return say("the uncertainty of the test value named, {standard}", standard=named(statement))
 
 
-def _picture(statement: Statement) -> Block:
+def has_picture(statement: Statement) -> bool:
+    """Whether errors of several lengths stand against limits on both sides."""
+    drawn = {item.length_mm for item in statement.errors if not item.set_aside}
+    return statement.signed and len(drawn - {None}) > 1
+
+
+def picture(statement: Statement) -> Plot:
+    """Every error over its length, between the limits."""
     items = [item for item in statement.errors if not item.set_aside]
     far = len(statement.errors) - len(items)
     beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)

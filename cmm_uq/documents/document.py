@@ -111,11 +111,16 @@ Block = Paragraph | Facts | Table | Plot | Decision | Overview
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of the document; ``opinion`` marks what interprets the results and belongs in the annex."""
+    """A titled part of the document.
+
+    ``opinion`` marks what interprets the results and belongs in the annex, ``first`` what stands on the first page of a
+    document that decides there.
+    """
 
     title: Text
     blocks: tuple[Block, ...]
     opinion: bool = False
+    first: bool = False
 
 
 @dataclass(frozen=True)
@@ -150,6 +155,7 @@ class Document:
     overview : what comes before everything else.
     draft : whether the banner says only that something is still to be stated.
     logo : of the issuer.
+    decides : whether all that is decided, stated and signed stands on the first page, and the figures behind it.
     """
 
     title: Text
@@ -170,6 +176,7 @@ class Document:
     overview: Overview | None = None
     draft: bool = False
     logo: Logo | None = None
+    decides: bool = False
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.

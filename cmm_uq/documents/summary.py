@@ -8,9 +8,9 @@ from cmm_uq.conformity.accuracy import TITLES
 from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.in_short import Summary, Verdict, figure_row
 from cmm_uq.documents.result import Result
-from cmm_uq.documents.wording import CERTAIN, OUTCOME_WORDS, measured, probability, title_of
+from cmm_uq.documents.wording import CERTAIN, measured, probability, title_of
 from cmm_uq.jobs.verdicts import Verdict as Stated
-from cmm_uq.messages import Text, Verbatim, commas, day, lines, number, say, semicolons
+from cmm_uq.messages import Text, Verbatim, commas, day, number, say, semicolons
 from cmm_uq.uncertainty.rounding import rounded, significant
 
 
@@ -35,15 +35,6 @@ def summary(result: Result, warnings: Iterable[Text]) -> Summary:
         for one, told in zip(result.verdicts, remarks, strict=True)
     )
     return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
-
-
-def in_short(result: Result) -> Text:
-    """What each statement comes to, a line each, for the first page."""
-    return lines(
-        say("{standard}, {what}: {outcome}", standard=Verbatim(one.by), what=Verbatim(one.name), outcome=outcome)
-        if one.by else say("{subject}: {outcome}", subject=subject_of(one), outcome=outcome)
-        for one in result.verdicts for outcome in (OUTCOME_WORDS[one.outcome],)
-    )  # fmt: skip
 
 
 def subject_of(one: Stated) -> Text:

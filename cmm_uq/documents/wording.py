@@ -77,6 +77,16 @@ def measured(statement: Statement) -> tuple[Text, Text]:
     return (number(statement.value_um, ".4g"), NOTHING)
 
 
+def stated_value(value: float, U: float | None, *, signed: bool) -> Text:
+    """Value ± U; of a size that is never negative (``signed`` false) and may be zero, its interval."""
+    if not U:
+        return number(value, ".4g")
+    shown, expanded_ = rounded(value, U)
+    if not signed and value < U:
+        return say("{low} to {high}", low=rounded(0.0, U)[0], high=rounded(value + U, U)[0])
+    return say("{value} ± {U}", value=shown, U=expanded_)
+
+
 def title_of(key: tuple[str, str], result: Result) -> Text:
     """A parameter in words: ``Squareness X–Y``."""
     owner, name = key

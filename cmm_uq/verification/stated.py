@@ -150,12 +150,18 @@ def _check_decisions(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, 
         text = shown.text.replace(",", ".")
         # before 0.15.0 a decision had u instead of U, and a value to the digits of it
         for what, figures in (
-            ("value", [_measured(entry, 2), _measured(entry, 1)]), ("limit", [f"{entry['limit_um']:.4g}"]),
+            ("value", [_measured(entry, 2), _measured(entry, 1), *_from_zero(entry)]), ("limit", [f"{entry['limit_um']:.4g}"]),
             ("standard", [entry["standard"].replace(",", ".")]),
         ):  # fmt: skip
             if not any(re.search(".{1,14}".join(map(re.escape, figure.split(" ± "))), text) for figure in figures):
                 inquiry.wrong("figures", name, f"statement of conformity {i + 1}", f"does not state the {what} of {source}",
                               " ".join(shown.text.split()), figures[0])  # fmt: skip
+
+
+def _from_zero(entry: Mapping[str, Any]) -> list[str]:
+    """A size that may be zero, by its interval."""
+    U = 2 * entry["u_um"]
+    return [" ± ".join((rounded(0.0, U)[0], rounded(entry["value_um"] + U, U)[0]))] if entry["value_um"] < U else []
 
 
 def _measured(entry: Mapping[str, Any], k: int) -> str:

@@ -67,7 +67,7 @@ def test_a_decision_names_its_length_in_full_and_states_u_with_k() -> None:
     table = next(block for block in decided() if isinstance(block, Table))
     assert "1080.0012" in {row[1] for row in table.rows}
     decision = next(block for block in decided() if isinstance(block, Decision))
-    assert "U = " in decision.measured
+    assert " ± " in decision.measured
     assert decision.measured.endswith("µm (k = 2)")
 
 
@@ -82,7 +82,7 @@ def test_one_figure_has_one_u() -> None:
     """The range of this recording is decided on; the figure of performance is that of repeats, and is called so."""
     every = blocks("iota-1102-20C")
     (decision,) = [block for block in every if isinstance(block, Decision)]
-    assert decision.measured == "340 µm, U = 14 µm (k = 2)"
+    assert decision.measured == "340 ± 14 µm (k = 2)"
     performance = next(b for b in every if isinstance(b, Table) and b.caption == "Figures of performance")
     assert "Range of the lengths, on average over repeats" in {row[0] for row in performance.rows}
     assert any("another quantity" in note for note in performance.notes)
