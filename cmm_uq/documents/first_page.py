@@ -100,12 +100,11 @@ def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:
     the page has room for them.
     """
     shown = min((s for s in result.statements if has_picture(s)), key=lambda s: _gravity(s.outcome), default=None)
+    plot: Plot | None = None
     if shown is not None:
         plot = picture(shown)
     elif len(result.verdicts) > len(result.statements):
         plot = next((b for s in sections if s.title == _TOLERANCES for b in s.blocks if isinstance(b, Plot)), None)
-    else:
-        plot = None
     if plot is None:
         first, *others = (section for section in sections if section.blocks)
         rows = sum(len(block.rows) for block in first.blocks if isinstance(block, Table))

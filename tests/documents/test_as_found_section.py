@@ -37,7 +37,7 @@ def test_what_was_found_stands_beside_what_is_left_each_with_its_uncertainty(out
     """U as found is the larger distance to an end of the interval: 141 − 120 = 21 and 540 − 500 = 40."""
     left = {row[0]: row[1:3] for name in ("Figures of performance", "Error factors of the machine")
             for row in tables(outcome.document)[name].rows}  # fmt: skip
-    name = "Range of the lengths (ASME B89.4.1 volumetric performance)"
+    name = "Range of the lengths, on average over repeats"
     assert tables(outcome.document)["The machine as found and as left"].rows == (
         (name, "500", "40", *left[name], "µm"),
         ("Scale error of X", "120", "21", *left["Scale error of X"], "ppm"),

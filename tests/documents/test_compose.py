@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import datetime as dt
+import io
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from pypdf import PdfReader
 
 from cmm_uq.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.documents.clauses import STATEMENTS
 from cmm_uq.documents.completeness import formal_warnings
-from cmm_uq.documents.document import Decision, Document, Facts, Table
+from cmm_uq.documents.document import Decision, Document, Facts, Plot, Signature, Table
 from cmm_uq.documents.html import render_html
+from cmm_uq.documents.pdf import render_pdf
 from tests.documents.test_completeness import changed
 from tests.kinds.simulated import analysed
 
@@ -175,13 +178,43 @@ def test_results_and_decisions_come_first_and_what_interprets_them_is_in_the_ann
 
 
 def test_the_first_page_says_what_every_statement_comes_to(document: Document) -> None:
-    assert dict(document.particulars[-1].rows)["Conformity"] == "ASME B89.4.1-1997, volumetric performance: fail"
+    """340 µm of 60 µm, u = 7.07 µm: who reads nothing else knows what, how much, against which limit and by which rule."""
+    assert document.decides
+    assert document.overview is not None
+    assert (document.overview.verdict, document.overview.standing) == ("Does not conform", "bad")
+    rows = dict(document.overview.rows)
+    assert rows["ASME B89.4.1-1997, volumetric performance"] == "fail: 340 ± 14 µm, limit 60 µm"
+    assert rows["Decision rule"].startswith("ISO 14253-1:2017")
 
 
-def test_the_conditions_stand_with_the_results(document: Document) -> None:
-    table, under = document.sections[0].blocks
-    assert isinstance(table, Table)
-    assert dict(under.rows) == {"Conditions": "20 °C, controlled; 11 thermocouples on the machine"}
+def test_the_first_page_has_the_picture_and_no_other_has_it_again() -> None:
+    made = outcome_of(analysed("step-gauge-simulated")).document
+    first = [section for section in made.sections if section.first]
+    (plot,) = [block for section in first for block in section.blocks]
+    assert isinstance(plot, Plot)
+    assert "±MPE" in plot.caption
+    again = [b for section in made.sections if not section.first for b in section.blocks if isinstance(b, Plot)]
+    assert plot.svg not in [one.svg for one in again]
+
+
+def test_a_certificate_without_a_statement_shows_its_figures_first() -> None:
+    made = outcome_of(analysed("plate-simulated")).document
+    assert made.overview is None
+    (first,) = [section for section in made.sections if section.first]
+    assert isinstance(first.blocks[0], Table)
+
+
+def test_the_pdf_signs_on_the_page_that_decides(document: Document) -> None:
+    signed = replace(document, warnings=(), signatures=(Signature("Dr. A. Muster", "Head of the laboratory"),))
+    pages = [page.extract_text() for page in PdfReader(io.BytesIO(render_pdf(signed, {}))).pages]
+    said = "".join(pages[0].split())
+    for text in ("Doesnotconform", "340±14µm,limit60µm", "Traceability", "Conditions", "Dr.A.Muster", "Page1of"):
+        assert text in said
+    assert "Errorfactorsofthemachine" not in said
+
+
+def test_the_conditions_stand_with_the_method(document: Document) -> None:
+    assert dict(document.particulars[-1].rows)["Conditions"] == "20 °C, controlled; 11 thermocouples on the machine"
 
 
 def test_the_annex_is_marked_as_such_and_comes_after_the_statements(document: Document) -> None:
@@ -196,8 +229,8 @@ def test_the_annex_is_marked_as_such_and_comes_after_the_statements(document: Do
 )
 def test_every_kind_begins_with_its_results(kind: str) -> None:
     made = outcome_of(analysed(kind)).document
-    assert isinstance(made.sections[0].blocks[0], Table)
-    assert "U" in [column.heading for column in made.sections[0].blocks[0].columns]
+    table = next(block for section in made.sections for block in section.blocks if isinstance(block, Table))
+    assert "U" in [column.heading for column in table.columns]
     assert [section.opinion for section in made.sections] == sorted(section.opinion for section in made.sections)
 
 
