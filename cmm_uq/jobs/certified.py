@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import ValidationError
@@ -28,6 +28,7 @@ from cmm_uq.jobs.importing.imported import imported_references
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.importing.sheet import Fact
+from cmm_uq.jobs.traceability import ACCREDITED, CIPM, NATIONAL, Arrangement
 from cmm_uq.messages import Verbatim, say
 from cmm_uq.points import AXES, Floats, Points
 from cmm_uq.units import UNITS
@@ -38,6 +39,9 @@ _NO_RESULT = ("nominal", "nenn", "deviation", "abweichung", "error", "écart")
 
 _RECALIBRATION = "basic_recalibration"
 """What the good practice of DCC calls the statement of the next calibration."""
+
+_TRACEABLE = "basic_metrologicallyTraceableToSI"
+"""And the statement of traceability."""
 
 SAME = 1e-9
 """Relative difference of two numbers that say the same."""
@@ -129,13 +133,19 @@ def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[
 
 
 def _chain(certificate: Certificate, given: Mapping[str, Any], where: str) -> dict[str, Any]:
-    core = certificate.administrative.core
-    due = next((one.date for one in certificate.administrative.statements if _RECALIBRATION in one.ref_type), None)
+    core, statements = certificate.administrative.core, certificate.administrative.statements
+    due = next((one.date for one in statements if _RECALIBRATION in one.ref_type), None)
+    if "issuer" in given and any(one.traceable is False for one in statements if _TRACEABLE in one.ref_type):
+        raise CmmUqError("says itself that its results are not traceable to the SI", where=where,
+                         fix="Leave issuer out of [artefact.certificate], or name another certificate")  # fmt: skip
     says: dict[str, str | dt.date | None] = {
         "number": core.identifier, "laboratory": str(certificate.administrative.laboratory.contact.name),
         "date": core.issued or core.end, "due": None if "interval_months" in given else due,
         "accreditation": certificate.administrative.laboratory.code,
     }  # fmt: skip
+    if "arrangement" not in given:
+        fitting = {NATIONAL: {CIPM}, ACCREDITED: {*get_args(Arrangement)} - {CIPM}}.get(str(given.get("issuer")), set())
+        says["arrangement"] = next((one.convention for one in statements if one.convention in fitting), None)
     for key, value in says.items():
         if value and key in given and given[key] != value:
             raise _contradicted(f"[artefact.certificate] {key}", given[key], value, where)

@@ -109,6 +109,10 @@ def test_a_complete_job_has_no_such_warning_and_its_particulars_are_printed(job:
     text = text.replace(
         "[machine]\n", '[laboratory]\nname = "L"\naddress = "A"\nsignatory = "S"\n[machine]\nserial = "7"\n', 1
     )
+    text = text.replace(
+        'machine = "DEA Iota 1102"\n',
+        'issuer = "national institute"\narrangement = "CIPM MRA"\ndate = 2004-01-15\ndue = 2006-01-15\n', 1,
+    )  # fmt: skip
     path.write_text(text, encoding="utf-8")
     found = analyse(job)
     made = outcome_of(found).document

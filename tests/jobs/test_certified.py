@@ -14,6 +14,9 @@ import tomlkit
 from cmm_uq.commands.reading import job_of, read_job
 from cmm_uq.commands.simulate import simulated_job
 from cmm_uq.dcc import Certificate, written
+from cmm_uq.dcc.results import Statement
+from cmm_uq.dcc.texts import rich
+from cmm_uq.documents.traceability_section import claimed
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.kinds import kind_named
@@ -239,3 +242,36 @@ def test_an_item_of_several_is_not_named_for_the_job() -> None:
     two = made.with_changes(items=made.items.with_changes(items=(*made.items.items, other)))
     artefact = job("ballbar", BALL_BAR.with_changes(administrative=two)).facts.artefact
     assert (artefact.name, artefact.serial) == ("", "")
+
+
+CODED = BALL_BAR.with_changes(
+    administrative=BALL_BAR.administrative.with_changes(
+        laboratory=BALL_BAR.administrative.laboratory.with_changes(code="D-K-15000-01-00"),
+        statements=(*BALL_BAR.administrative.statements, Statement(convention="ILAC MRA", declaration=rich("covered"))),
+    )
+)
+UNTRACED = BALL_BAR.with_changes(
+    administrative=BALL_BAR.administrative.with_changes(statements=(
+        Statement(ref_type=("basic_metrologicallyTraceableToSI",), traceable=False, declaration=rich("not traceable")),
+    ))
+)  # fmt: skip
+
+
+def test_the_accreditation_of_its_issuer_is_read_and_what_the_issuer_is_the_job_says() -> None:
+    bare = job("ballbar", CODED).facts.artefact.certificate
+    assert bare is not None
+    assert (bare.accreditation, bare.arrangement, bare.issuer) == ("D-K-15000-01-00", None, None)
+    called = {"issuer": "accredited", "accredited_by": "DAkkS"}
+    found = job("ballbar", CODED, certificate=called)
+    assert claimed(found).claim == "not shown"  # the bar was certified in 2026, and the recording is of 2004
+    assert found.facts.artefact.certificate is not None
+    assert found.facts.artefact.certificate.arrangement == "ILAC MRA"
+    assert [key for _, key in claimed(found).lacks] == ["[artefact.certificate] date"]
+    with pytest.raises(CmmUqError, match=r"accreditation = D-K-1 in job\.toml, and D-K-15000-01-00 in the certificate"):
+        job("ballbar", CODED, certificate={"accreditation": "D-K-1"})
+
+
+def test_a_certificate_that_says_itself_that_it_is_not_traceable_is_no_claim() -> None:
+    assert job("ballbar", UNTRACED).facts.artefact.certificate is not None
+    with pytest.raises(CmmUqError, match="says itself that its results are not traceable to the SI"):
+        job("ballbar", UNTRACED, certificate={"issuer": "national institute", "arrangement": "CIPM MRA"})
