@@ -8,7 +8,7 @@ from cmm_uq.documents.conditions import conditions
 from cmm_uq.documents.document import Document, Facts, Overview, Section, Signature
 from cmm_uq.documents.origin import CERTIFICATE, DIGITAL, came_about, file_name
 from cmm_uq.documents.provenance import FILE as PROVENANCE
-from cmm_uq.documents.reissue import CHANGED
+from cmm_uq.documents.reissue import COMPARED, NOT_COMPARED
 from cmm_uq.documents.traceability_section import claimed
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
@@ -157,7 +157,8 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     return (
         (say("Replaces certificate"), replaced_certificate(replaced)),
         (say("Reason for the replacement"), replaced.reason),
-        (CHANGED, replaced.changed),
+        (say("Changed against it"), replaced.changed),
+        (COMPARED, NOT_COMPARED),
     )
 
 

@@ -12,7 +12,10 @@ from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, foreign, plural, say,
 KEY = "replaced"
 """Of results.json."""
 
-CHANGED = say("Changed against it")
+COMPARED = say("Results compared")
+"""On the first page."""
+
+NOT_COMPARED = say("No comparison of the results was made: those of the replaced certificate were not at hand.")
 _NAMED = 6
 """Differences that the first page names one by one."""
 
@@ -74,7 +77,7 @@ class Comparison:
     def sentence(self) -> Text:
         """For the first page, below what the laboratory says is changed."""
         if self.compared is None:
-            return say("No comparison of the results was made: those of the replaced certificate were not at hand.")
+            return NOT_COMPARED
         if not self.differences:
             return plural(
                 self.compared,
@@ -127,15 +130,10 @@ class Comparison:
 
     def on(self, document: Document) -> Document:
         """The certificate with the comparison on its first page, and the table of differences after its first section."""
-        particulars = tuple(replace(facts, rows=tuple(self._rows(facts))) for facts in document.particulars)
+        particulars = tuple(
+            Facts(tuple((label, self.sentence if label == COMPARED else text) for label, text in facts.rows))
+            for facts in document.particulars
+        )
         first, *others = document.sections
         table = (self.section,) if self.section.blocks else ()
         return replace(document, particulars=particulars, sections=(first, *table, *others))
-
-    def _rows(self, facts: Facts) -> list[tuple[Text, Text]]:
-        rows: list[tuple[Text, Text]] = []
-        for row in facts.rows:
-            rows.append(row)
-            if row[0] == CHANGED:
-                rows.append((say("Results compared"), self.sentence))
-        return rows
