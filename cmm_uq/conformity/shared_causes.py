@@ -86,6 +86,7 @@ def length_budget(
         u_alignment_mm=stated.u_alignment_um * MICROMETRE,
         u_fixturing_mm=stated.u_fixturing_um * MICROMETRE,
         u_beside_mm=u_beside_mm,
+        calibration_dof=circumstances.calibration_dof,
     )
 
 

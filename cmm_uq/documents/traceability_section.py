@@ -6,14 +6,18 @@ from typing import TYPE_CHECKING
 
 from cmm_uq.documents.document import Block, Facts, Paragraph, Section
 from cmm_uq.documents.wording import NO_FACTOR, expanded
+from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.chain import Chain, chain_of
+from cmm_uq.jobs.expanded import Growing, factor_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.reference_file import OF_POINTS
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
 from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
 from cmm_uq.model.artefact import Size
 from cmm_uq.physics.catalogue import every
+from cmm_uq.points import Points
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.uncertainty.rounding import figure, nominal, significant
 from cmm_uq.units import MICROMETRE, Unit, unit
@@ -102,6 +106,9 @@ def traceability(result: Result) -> Section:
     dimensions = [size for size in result.artefact.sizes if size.role == "dimension"]
     certified = [] if compared else [size for size in dimensions if size.certified]
     rows += [_certified(size) for size in certified]
+    rows += (
+        [(say("Uncertainty by its certificate"), stated_uncertainty(artefact, result.job.points))] if certified else []
+    )
     if compared:
         rows.append((say("References"), say("the earlier recording {file}", file=Verbatim(compared))))
     elif dimensions and not certified:
@@ -113,6 +120,43 @@ def traceability(result: Result) -> Section:
     rows += _short_gauge(result.job.facts.short_gauge)
     rows += [_fitted(size, result.sizes[size.name]) for size in certified]
     return traceability_section(result.job, tuple(rows))
+
+
+def stated_uncertainty(facts: ArtefactFacts, points: Points) -> Text:
+    """U as the certificate states it; nothing of a plain standard uncertainty, which stands beside the length."""
+    factor = NOTHING
+    if facts.k is not None:
+        factor = say("k = {k}", k=figure(facts.k, 10))
+    elif facts.degrees_of_freedom is not None and facts.U_um is not None:
+        factor = say("k = {k}", k=figure(factor_of(None, facts.degrees_of_freedom) or 0.0, 3))
+    if facts.degrees_of_freedom is not None:
+        factor = commas(
+            (*filter(None, (factor,)), say("{count} degrees of freedom", count=figure(facts.degrees_of_freedom, 10)))
+        )
+    told: list[Text] = []
+    if facts.U_um is not None:
+        told.append(commas((say("U = {formula}", formula=_formula(facts.U_um)), factor)))
+    elif isinstance(facts.u_um, Growing) or (facts.u_um is not None and factor):
+        told.append(commas((say("u = {formula}", formula=_formula(facts.u_um)), *filter(None, (factor,)))))
+    columns = [points.columns[name] for name in OF_POINTS if name in points.columns]
+    if columns:
+        least, most = (figure(pick(pick(column) for column in columns), 3) for pick in (min, max))
+        told.append(say("of each point by itself, u from {least} to {most} µm", least=least, most=most))
+        if isinstance(facts, ReferencedFacts) and facts.covariances_at(points.point)[1]:
+            told.append(say("with covariances"))
+    return semicolons(told) if told else NOTHING
+
+
+def _formula(stated: Growing | float) -> Text:
+    """As certificates print it: 0.2 µm + 0.5·10⁻⁶·L."""
+    if not isinstance(stated, Growing):
+        return say("{number} µm", number=figure(stated, 10))
+    fixed, slope = figure(stated.fixed_um, 10), figure(stated.per_mm * 1000, 10)
+    if not stated.fixed_um:
+        return say("{slope}·10⁻⁶·L", slope=slope)
+    if stated.squares:
+        return say("Q[{fixed} µm; {slope}·10⁻⁶·L]", fixed=fixed, slope=slope)
+    return say("{fixed} µm + {slope}·10⁻⁶·L", fixed=fixed, slope=slope)
 
 
 def _short_gauge(gauge: ShortGaugeFacts | None) -> list[tuple[Text, Text]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -185,6 +186,7 @@ class Circumstances:
     cmc : of the laboratory, below which no test value is said to be known.
     clauses : forms of standards' clauses that the laboratory filled in, by their file.
     set_aside : measurements that the laboratory leaves out of the estimates, each with its reason.
+    calibration_dof : degrees of freedom that the artefact's certificate states.
     """
 
     uncertainty: TestUncertainty = field(default_factory=TestUncertainty)
@@ -195,3 +197,4 @@ class Circumstances:
     cmc: Capability | None = None
     clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
     set_aside: Mapping[int, str] = field(default_factory=dict)
+    calibration_dof: float = inf

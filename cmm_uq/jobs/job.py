@@ -6,6 +6,7 @@ import datetime as dt
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -227,6 +228,7 @@ class JobFile(Table):
             self.test_uncertainty, self.rated_conditions, probe, self.artefact.cte_per_k if stated else None,
             cmc=self.laboratory.cmc,
             set_aside={entry.measurement: entry.reason for entry in self.recording.set_aside},
+            calibration_dof=self.artefact.degrees_of_freedom or inf,
         )  # fmt: skip
 
     @model_validator(mode="before")

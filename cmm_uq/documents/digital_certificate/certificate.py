@@ -94,7 +94,7 @@ def digital_certificate(
                 name=words_of(_title(job), say_in),
                 methods=methods(job, results, say_in),
                 software=software(results, say_in),
-                equipment=equipment(job, say_in),
+                equipment=equipment(job, results, say_in),
                 conditions=conditions(job, say_in),
                 results=(
                     *_results(results, say_in, figures),

@@ -19,7 +19,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.traceability import Traceability
 from cmm_uq.messages import Text, Verbatim, day, say
-from cmm_uq.units import UNITS, Unit
+from cmm_uq.units import MICROMETRE, UNITS, Unit
 
 NO_HASH = "none"
 """Procedure and value of the hash of a certificate that is not at hand as a file."""
@@ -54,10 +54,12 @@ def software(results: Mapping[str, Any], say_in: SayIn) -> tuple[Software, ...]:
     )  # fmt: skip
 
 
-def equipment(job: Job, say_in: SayIn) -> Equipments:
+def equipment(job: Job, results: Mapping[str, Any], say_in: SayIn) -> Equipments:
     """The artefact, the short gauge, and instruments of a recording that was taken live."""
     facts, gauge = job.facts.artefact, job.facts.short_gauge
     u_um = float(facts.u_of(facts.length_mm or 0.0))
+    if facts.u_um is None and "length_mm" in (certified := results.get("certified", {})):
+        u_um = certified["length_mm"]["u"] / MICROMETRE  # of its points, by themselves
     found = [
         _reference(
             job, facts.name or facts.kind, facts.serial, facts.certificate, say_in,

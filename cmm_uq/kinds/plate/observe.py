@@ -1,8 +1,8 @@
 """Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
 
 All three coordinates of every ball are observations; the six freedoms of each placing are projected out exactly. What the
-certificate leaves open is in the length of the plate as far as all positions have it in common, and an error of each ball where
-that is more. Nominal positions leave that scale free.
+certificate leaves open is in the length of the plate as far as all positions have it in common, and an error of each ball
+where that is more. Nominal positions leave that scale free.
 """
 
 from __future__ import annotations

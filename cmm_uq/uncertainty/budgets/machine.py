@@ -8,6 +8,7 @@ uncertainty of a measurement made with the machine (ISO 15530) contains them. Ne
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 
 import numpy as np
 
@@ -50,6 +51,7 @@ def length_test_uncertainty(
     u_alignment_mm: float = 0.0,
     u_fixturing_mm: float = 0.0,
     u_beside_mm: float = 0.0,
+    calibration_dof: float = inf,
 ) -> Budget:
     """Test uncertainty of an error of length measurement E (ISO/TS 23165:2006), mm.
 
@@ -59,11 +61,14 @@ def length_test_uncertainty(
     temperature_c, cte_per_k : of the artefact during the test.
     u_alignment_mm, u_fixturing_mm : by misalignment and by what the clamping does to the length.
     u_beside_mm : of the short gauge measured beside lengths that are not bidirectional by themselves; no line where 0.
+    calibration_dof : degrees of freedom that the artefact's certificate states.
     """
     return Budget(
         say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm),
         [
-            Line(say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=unit("mm")),
+            Line(
+                say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=unit("mm"), dof=calibration_dof
+            ),
             _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
             Line(
                 say("temperature of the artefact"),
