@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
+
+import numpy as np
 
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import refusal
 from cmm_uq.errors import CmmUqError
 from cmm_uq.kinds.bryan.observe import Bryan
 from cmm_uq.kinds.distances.adjustment import Setting, settings
-from cmm_uq.kinds.distances.equations import DistanceSolution, second_way_data
+from cmm_uq.kinds.distances.equations import FACTORS, DistanceSolution, second_way_data
 from cmm_uq.kinds.distances.lengths import Lengths, lengths_of
 from cmm_uq.messages import Text
 
@@ -28,11 +30,24 @@ def figures(result: Result) -> BryanFigures:
     """Of a result."""
     bar = cast("Bryan", result.artefact)
     distances = bar.distances(bar.points.xyz, None) / bar.expansion
+    lengths = lengths_of(result, distances, float(distances.mean()))
+    return BryanFigures(lengths, settings(result), _second_way(result, bar))
+
+
+def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
+    """The patent's way; its bias is what it makes of readings without noise on the machine that the model finds."""
+    found = result.values.mean(axis=0)
     try:
-        second_way: DistanceSolution | Text = bar.in_two_steps()[0]
+        solution, exact = (bar.in_two_steps(xyz=xyz)[0] for xyz in (None, result.model.predicted(found)))
     except CmmUqError as error:
-        second_way = refusal(error)
-    return BryanFigures(lengths_of(result, distances, float(distances.mean())), settings(result), second_way)
+        return refusal(error)
+    model = result.model.reported(found[None])
+    true = np.array([model[key][0][0] if key in model else 0.0 for key in FACTORS])
+    size = bar.sizes[0]
+    return replace(
+        solution, bias=np.array([*exact.scales_ppm, *exact.squareness_arcsec]) - true, open_scales=not size.certified,
+        relative_length_u=size.sd / size.nominal if size.certified else 0.0,
+    )  # fmt: skip
 
 
 def results(result: Result) -> dict[str, Any]:

@@ -49,11 +49,16 @@ class Bryan(Radial):
         whole_job = np.zeros(len(points), dtype=np.int64)
         super().__init__(facts, points, Placings(whole_job, np.array([0])), expansion(facts, points), where)
 
-    def in_two_steps(self, method: str = "QR") -> tuple[DistanceSolution, Floats]:
+    def in_two_steps(self, method: str = "QR", xyz: Floats | None = None) -> tuple[DistanceSolution, Floats]:
         """The patent's way: centre, and the length if it is not certified, from the sphere (108); then e1 … e6 from (110).
 
         The sphere is fitted as if the machine had no errors, and bends to them: unless the swept positions surround the
         fixed ball evenly, its centre takes up part of every scale and squareness error, and e1 … e6 lack that part.
+
+        Parameters
+        ----------
+        method : of solving the equations.
+        xyz : (n, 3) readings, mm; by default those recorded.
 
         Returns
         -------
@@ -64,7 +69,8 @@ class Bryan(Radial):
         CmmUqError : the swept directions do not determine all six factors.
         """
         certified = self.sizes[0].certified
-        centre = self.centres(self.points.xyz, self.sizes[0].nominal if certified else None)[0]
-        differences = self.points.xyz - centre
+        readings = self.points.xyz if xyz is None else xyz
+        centre = self.centres(readings, self.sizes[0].nominal if certified else None)[0]
+        differences = readings - centre
         length = self.sizes[0].nominal
         return solve_distances(differences, length * self.expansion, method), centre

@@ -13,8 +13,8 @@ from cmm_uq.kinds.distances import page as adjustment_section
 from cmm_uq.messages import NOTHING, number, say
 
 IN_TWO_STEPS = say(
-    "The fixed ball is found first, as if the machine had no errors, and its centre takes up part of them. The fitted model "
-    "finds all at once and is the better."
+    "The fixed ball is found first, as if the machine had no errors, and its centre takes up part of them: what this makes of "
+    "readings without noise is in U. The fitted model finds all at once and is the better."
 )
 
 

@@ -10,7 +10,7 @@ positions a known distance apart serves; a swept bar gives them once its fixed b
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,9 @@ class DistanceSolution:
     residuals : (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm.
     residual_sd : mm; 0 without degrees of freedom.
     relative_length_u : relative standard uncertainty of the distance, where it is certified; 0 where it is taken as known.
+    bias : (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not taken off, and
+        counts as a standard uncertainty.
+    open_scales : whether nothing says the distance, so that scales are not determined.
     """
 
     e: Floats
@@ -67,6 +70,8 @@ class DistanceSolution:
     residuals: Floats
     residual_sd: float
     relative_length_u: float = 0.0
+    bias: Floats = field(default_factory=lambda: np.zeros(UNKNOWNS))
+    open_scales: bool = False
 
     @property
     def scales_ppm(self) -> Floats:
@@ -103,16 +108,17 @@ class DistanceSolution:
         """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
         u, stated = self.u.tolist(), self.expanded(at_least)
         values = [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()]
+        known = [not (self.open_scales and parameter == "ppm") for _, parameter in FACTORS]
         return {
             "e": self.e.tolist(),
             "e_covariance": self.covariance.tolist(),
             "factors": {
                 effect: {
                     parameter: {
-                        "value": values[i],
-                        "u": u[i],
-                        "U": None if stated is None else stated[i][0],
-                        "k": None if stated is None else stated[i][1],
+                        "value": values[i] if known[i] else None,
+                        "u": u[i] if known[i] else None,
+                        "U": None if stated is None or not known[i] else stated[i][0],
+                        "k": None if stated is None or not known[i] else stated[i][1],
                     }
                 }
                 for i, (effect, parameter) in enumerate(FACTORS)
@@ -123,8 +129,9 @@ class DistanceSolution:
 
     @property
     def u(self) -> Floats:
-        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, the distance's own included."""
-        return np.hypot(self._u_of_residuals, self.relative_length_u / PPM * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]))
+        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, distance and bias included."""
+        of_distance = self.relative_length_u / PPM * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        return np.hypot(np.hypot(self._u_of_residuals, of_distance), self.bias)
 
     @property
     def conditional_on(self) -> str:

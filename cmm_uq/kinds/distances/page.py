@@ -68,7 +68,8 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
     values, stated = [*solution.scales_ppm, *solution.squareness_arcsec], solution.expanded(result.at_least)
     rows: list[tuple[Text, ...]] = []
     for i, (effect, _) in enumerate(FACTORS):
-        value, U, k = number(values[i], ".4g"), NOTHING, NOTHING
+        value: Text = number(values[i], ".4g")
+        U, k = NOTHING, NOTHING
         if stated is not None:
             value, U = rounded(float(values[i]), stated[i][0])
             k = number(stated[i][1], ".2f")
@@ -77,6 +78,8 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
             if i < 3
             else say("Angle {plane} − 90°", plane=Verbatim(ANGLES[effect]))
         )
+        if solution.open_scales and i < 3:
+            value, U, k = say("not determined"), NOTHING, NOTHING
         model = result.parameters.get(effect)
         beside = (NOTHING, NOTHING) if model is None else expanded(next(iter(model.values())))[:2]
         beside = (say("not determined"), NOTHING) if effect in result.free else beside

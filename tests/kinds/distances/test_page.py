@@ -56,10 +56,10 @@ def test_an_uncalibrated_bar_gives_no_scale_to_enter() -> None:
 
 
 def test_the_joint_fit_finds_what_two_steps_lose() -> None:
-    """Swept over half a sphere: Z–X was simulated as 4″, and the patent's second step is left with a quarter of it."""
+    """Swept over half a sphere: Z–X was simulated as 4″, the second step has a quarter of it, and U says so."""
     recovered("bryan-simulated", SQUARE)
     rows = {row[0]: row for row in table("bryan-simulated", SECOND_WAY).rows}
     _, two_steps, U, _, joint, *_ = rows["Angle Z–X − 90°"]
-    assert abs(number(joint) - 4.0) < abs(number(two_steps) - 4.0) - number(U)
+    assert abs(number(joint) - 4.0) + 2 < abs(number(two_steps) - 4.0) < number(U)
     _, two_steps, U, _, joint, *_ = rows["Angle Y–Z − 90°"]
-    assert abs(number(joint) + 7.5) < abs(number(two_steps) + 7.5) - number(U)
+    assert abs(number(joint) + 7.5) + 2 < abs(number(two_steps) + 7.5) < number(U)
