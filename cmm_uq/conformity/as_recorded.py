@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.conformity.plans import Condition
 from cmm_uq.errors import CmmUqError
-from cmm_uq.messages import Text, commas, number, say
+from cmm_uq.messages import Message, Text, commas, number, say
 from cmm_uq.model.artefact import Artefact, Forms, Indications
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import Floats, Ints, Points
@@ -181,7 +181,9 @@ class AsRecorded(Artefact):
         return self._raw.size_change()
 
 
-def numbered(points: Points, repeats: int | None = None) -> tuple[Condition, ...]:
+def numbered(
+    points: Points, repeats: int | None = None, *, measurements: bool = True
+) -> tuple[Condition, ...]:  # fmt: skip
     """That nothing is missing from the numbering of measurements, of their repeats and of the points in each.
 
     Whoever numbers consecutively and takes a row out leaves a gap: what stood there is not known, and the test lacks it.
@@ -190,8 +192,11 @@ def numbered(points: Points, repeats: int | None = None) -> tuple[Condition, ...
     ----------
     points : the whole recording.
     repeats : up to which a repeat has every point of its measurement; later ones may be of a single length.
+    measurements : whether these are numbered consecutively, not after those of another recording.
     """
-    gaps = [*_gaps(points, repeats)]
+    absent = _absent(np.unique(points.measurement)) if measurements else []
+    gaps = [say("measurement {which}: numbered, and not recorded", which=_which(absent))] if absent else []
+    gaps += _gaps(points, repeats)
     if not gaps:
         return ()
     shown = gaps[:_NAMED]
@@ -200,9 +205,7 @@ def numbered(points: Points, repeats: int | None = None) -> tuple[Condition, ...
     return (Condition(say("measurements, repeats and points numbered without a gap"), tuple(shown)),)
 
 
-def _gaps(points: Points, repeats: int | None) -> Iterator[Text]:
-    if absent := _absent(np.unique(points.measurement)):
-        yield say("measurement {which}: numbered, and not recorded", which=_which(absent))
+def _gaps(points: Points, repeats: int | None) -> Iterator[Message]:
     runs: dict[int, dict[int, set[int]]] = {}
     for group, rows in enumerate(points.rows_of_groups):
         measurement, repeat = points.run_of(group)

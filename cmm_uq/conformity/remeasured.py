@@ -7,13 +7,20 @@ or a sixth length, fail. Further repeats of the same measurement are those ten.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cmm_uq.conformity.statement import Decided, Standing
 from cmm_uq.points import Ints
+
+OUTSIDE = ("fail", "conditional fail")
+"""Outcomes of a value that lies outside."""
+
+NOT_INSIDE = (*OUTSIDE, "undecided", "conditional pass")
+"""Outcomes of one that lies outside the zone of conformance: further readings stand for it, too, where they were made, or a
+larger error would pass where a smaller one does not."""
 
 
 @dataclass(frozen=True)
@@ -46,26 +53,35 @@ def with_standing(items: Sequence[Decided], nominal: Ints, again: Again) -> tupl
     sets: dict[tuple[int | None, int], list[int]] = {}
     for i, item in enumerate(items):
         sets.setdefault((item.measurement, int(nominal[i])), []).append(i)
-    eligible = {key: found for key, rows in sets.items() if (found := _one_outside(items, rows, again)) is not None}
-    failed = {key for key, rows in sets.items() if any(items[i].outcome == "fail" for i in rows)}
-    if len(eligible) > again.lengths or failed - set(eligible):
-        return tuple(items)  # the test fails, whatever more is measured
     standing: dict[int, Standing] = {}
-    for outside, further in eligible.values():
-        if further and any(items[i].outcome == "fail" for i in further):
-            continue
-        enough = len({items[i].repeat for i in further}) >= again.readings
-        standing |= dict.fromkeys(outside, "replaced" if enough else "again")
+    for not_inside in (OUTSIDE, NOT_INSIDE):
+        eligible = {
+            key: found for key, rows in sets.items() if (found := _one(items, rows, again, not_inside)) is not None
+        }
+        failed = {key for key, rows in sets.items() if any(items[i].outcome in OUTSIDE for i in rows)}
+        if not_inside is OUTSIDE and failed - set(eligible):
+            break  # the test fails, whatever more is measured
+        if len(eligible) > again.lengths:
+            break
+        for outside, further in eligible.values():
+            if further and any(items[i].outcome in OUTSIDE for i in further):
+                continue
+            if len({items[i].repeat for i in further}) >= again.readings:
+                standing |= dict.fromkeys(outside, "replaced")
+            elif not_inside is OUTSIDE:
+                standing |= dict.fromkeys(outside, "again")
     return tuple(replace(item, standing=standing.get(i, "counts")) for i, item in enumerate(items))
 
 
-def _one_outside(items: Sequence[Decided], rows: Sequence[int], again: Again) -> tuple[list[int], list[int]] | None:
-    """Those outside among the repeats of the test, and the further readings; ``None`` where the clause does not apply."""
+def _one(
+    items: Sequence[Decided], rows: Sequence[int], again: Again, not_inside: Collection[str]
+) -> tuple[list[int], list[int]] | None:
+    """Those not inside among the repeats of the test, and the further readings; ``None`` where the clause does not apply."""
     repeats = np.unique([items[i].repeat or 0 for i in rows])
     if len(repeats) < again.repeats:
         return None
     test = [i for i in rows if (items[i].repeat or 0) in repeats[: again.repeats]]
-    outside = [i for i in test if items[i].outcome == "fail"]
+    outside = [i for i in test if items[i].outcome in not_inside]
     if not 1 <= len({items[i].repeat for i in outside}) <= again.outside:
         return None
     return outside, [i for i in rows if i not in test]

@@ -338,6 +338,7 @@ class Test:
             *self.unstated,
             *rated_conditions(self.circumstances, self.recorded.points),
             *numbered(self.recorded.points if self.left_out is None else self.left_out.recording, repeats),
+            *self._gaps_of_short_gauge(),
         )
         worst = least_favourable(items)
         more: list[Text] = []
@@ -350,7 +351,6 @@ class Test:
             more.append(RAISED)
         if copies := copies_in_words(self.recorded.points):
             more.append(copies)
-        more += told
         aside = [item for item in items if item.set_aside]
         outside = () if self.left_out is None else self.left_out.without_value
         if self.left_out is not None and (aside or outside):
@@ -358,7 +358,7 @@ class Test:
         more = [*_set_aside(self.circumstances.set_aside), *more]
         joint = None if causes is None or outside or counted(aside) else _joint(items, causes, signed)
         lines, stated = self.characteristic.lines, self.circumstances.uncertainty
-        more += [*declared_in_words(lines, stated), *rated_in_words(self.circumstances.rated)]
+        more += [*declared_in_words(lines, stated), *rated_in_words(self.circumstances.rated), *told]
         if budget is not None:
             budget = with_declared(budget, lines, stated)
         missing = {text: condition.remedy for condition in asked for text in condition.missing}
@@ -366,6 +366,14 @@ class Test:
             self.facts, self.characteristic.name, quantity, measured, items, tuple(missing), (*remarks, *more), signed,
             joint, budget, self._risks(worst, signed), outside, tuple(missing.values()),
         )  # fmt: skip
+
+    def _gaps_of_short_gauge(self) -> tuple[Condition, ...]:
+        """What is missing from the numbering of a short gauge that lengths of this test rest on."""
+        gauge, found = self.circumstances.short_gauge, self.artefact.indications()
+        if gauge is None or found is None or found.u_beside is None or not found.u_beside.any():
+            return ()
+        gaps = [text for condition in numbered(gauge.points, measurements=False) for text in condition.missing]
+        return tuple(Condition(text, (say("short gauge, {gap}", gap=text),)) for text in gaps)
 
     def _raised(self, items: Sequence[Decided]) -> bool:
         """Whether any was decided with the capability's uncertainty in place of a smaller one."""

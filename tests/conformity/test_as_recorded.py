@@ -251,3 +251,49 @@ def test_measurements_are_set_aside_by_number_or_with_a_reason(written: Any, num
     facts = RecordingFacts.model_validate({"file": "recording.csv", "set_aside": written})
     assert facts.measurements_aside == numbers
     assert {entry.measurement: entry.reason for entry in facts.set_aside} == reasons
+
+
+def test_a_gauge_block_of_one_repeat_far_off_is_measured_again_and_of_two_fails() -> None:
+    """Three blocks in each of the seven positions, two faces each; one face 10 mm off."""
+    made = recorded.gauge(lengths=[[20.0, 100.0, 200.0, 300.0, 0.7 * 500 + 50]] * 7).points
+    facts = artefact_facts(kind="gauge_blocks", length_mm=400.0, u_um=0.2)
+    for repeats, outcome in ((1, "remeasure"), (2, "fail")):
+        chosen = (made.measurement == 3) & (made.point == 4) & (made.repeat <= repeats)
+        assert decided(along_line(made, chosen, 10.0), facts, **ISO).finding == outcome
+
+
+@pytest.mark.parametrize("across", [False, True])
+def test_a_ball_of_a_plate_that_is_far_off_fails(across: bool) -> None:
+    """10 mm along the plate, or off it: square to a distance that hardly changes its length, and is outside all the same."""
+    x, y = np.meshgrid(np.arange(5) * 100.0, np.arange(5) * 100.0)
+    body = np.column_stack([x.ravel(), y.ravel(), np.zeros(25)])
+    count = 7
+    xyz = np.vstack([body + np.array([200.0, 50.0, -400.0 + 50 * k]) for k in range(count)])
+    points = Points(
+        xyz, np.repeat(np.arange(1, count + 1), 25), np.tile(np.arange(1, 26), count), np.ones(25 * count, dtype=np.int64),
+        recorded.MACHINE, {f"reference_{a}_mm": np.tile(body[:, i], count) for i, a in enumerate("xyz")},
+    )  # fmt: skip
+    facts = artefact_facts(kind="plate", length_mm=400.0, u_um=0.2)
+    wish = {"standard": "VDI/VDE 2617", "limit_um": 40.0}
+    assert decided(points, facts, **wish).finding == "pass"
+    xyz = xyz.copy()
+    xyz[30] += [0.0, 0.0, 5.0] if across else [10.0, 0.0, 0.0]
+    found = decided(points.at(xyz), facts, **wish)
+    assert found.finding == "fail"
+    aside = [item for item in found.errors if item.set_aside]
+    assert len(aside) == 24
+    assert {item.outcome for item in aside} == {"fail"}
+    if across:  # 5 mm off the plate lengthen 500 mm by 25 µm
+        assert min(abs(item.error_um) for item in aside) == pytest.approx(25.0, abs=0.1)
+
+
+@pytest.mark.parametrize("by_mm", [2.0, 10.0])
+def test_a_bar_against_its_calibrated_length_fails(by_mm: float) -> None:
+    lengths = [300.0] * 20
+    lengths[4] += by_mm
+    points, wish = recorded.bars(lengths=lengths).points, {"standard": "VDI/VDE 2617-2.1", "limit_um": 3.0}
+    found = decided(points, bar_facts(300.0, 0.35), characteristic="U1", **wish)
+    assert found.finding == "pass"  # the axes alone: the bar lies along a face diagonal
+    found = decided(points, bar_facts(300.0, 0.35), characteristic="U2", **wish)
+    assert found.finding == "fail"
+    assert found.value_um == pytest.approx(1e3 * by_mm, abs=1e-3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.conformity.standards import statement
-from cmm_uq.conformity.statement import Statement
+from cmm_uq.conformity.statement import GRAVEST, Statement
 from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.kinds import artefact_facts
 from cmm_uq.kinds.gauge_lines.observe import StepGauge
@@ -22,7 +22,7 @@ FAR = 9.0
 
 
 def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 10360-2:2009", further: int = 0,
-           lines: int = 7, shuffled: int | None = None) -> Statement:  # fmt: skip
+           lines: int = 7, shuffled: int | None = None, rule: str = "ISO 14253-1") -> Statement:  # fmt: skip
     """Seven lines three times; with further repeats of the shortest length of the first line alone."""
     artefact = gauge(SEVEN[:lines], errors=errors)
     if further:
@@ -39,7 +39,7 @@ def judged(errors: Mapping[tuple[int, int, float], float], standard: str = "ISO 
         artefact = StepGauge(
             artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000"), artefact.points.select(rows)
         )
-    facts = FACTS.model_copy(update={"standard": standard})
+    facts = FACTS.model_copy(update={"standard": standard, "rule": rule})
     return statement(facts, artefact, {}, "[[conformity]] 1", [LENGTHS], None, STATED)
 
 
@@ -112,3 +112,42 @@ def test_the_order_of_the_rows_is_no_matter(further: int) -> None:
     assert sorted(item.error_um for item in mixed.errors) == pytest.approx(
         sorted(item.error_um for item in plain.errors), abs=1e-6
     )
+
+
+def graded(first: float, second: float, further: int, rule: str) -> str:
+    """Errors of two of the three repeats of 20 mm, limit 2.5667 µm, u = 0.01 µm."""
+    errors = {(1, 1, SHORT[1]): first, (1, 2, SHORT[1]): second}
+    return judged(errors, further=further, rule=rule).finding
+
+
+INSIDE, NEAR, OVER = 2.0, 2.56, 2.575
+"""0.567 µm inside the limit, and 0.007 and 0.008 µm on either side of it, where u is 0.01 µm."""
+
+
+@pytest.mark.parametrize(("rule", "near", "over", "both_over"), [
+    ("ISO 14253-1", "undecided", "undecided", "undecided"),
+    ("ILAC-G8 non-binary", "conditional pass", "remeasure", "conditional fail"),
+    ("simple", "pass", "remeasure", "fail"),
+])  # fmt: skip
+def test_what_lies_just_beyond_the_limit_is_measured_again_where_it_is_outside(
+    rule: str, near: str, over: str, both_over: str
+) -> None:
+    assert graded(INSIDE, INSIDE, 0, rule) == "pass"
+    assert graded(NEAR, INSIDE, 0, rule) == near
+    assert graded(OVER, INSIDE, 0, rule) == over
+    assert graded(OVER, OVER, 0, rule) == both_over
+
+
+@pytest.mark.parametrize("rule", ["ISO 14253-1", "ILAC-G8 non-binary", "ILAC-G8 binary", "simple"])
+@pytest.mark.parametrize("further", [0, 9, 10])
+def test_a_larger_error_never_improves_the_finding(rule: str, further: int) -> None:
+    sizes = (INSIDE, NEAR, OVER, FAR)
+    for second in sizes:
+        found = [GRAVEST.index(graded(first, second, further, rule)) for first in sizes]
+        assert found == sorted(found, reverse=True), (second, found)
+
+
+@pytest.mark.parametrize("rule", ["ISO 14253-1", "ILAC-G8 non-binary"])
+def test_ten_more_that_lie_inside_stand_for_a_value_near_the_limit_too(rule: str) -> None:
+    assert graded(NEAR, INSIDE, 10, rule) == "pass"
+    assert graded(NEAR, NEAR, 10, rule) == graded(NEAR, NEAR, 0, rule)

@@ -89,6 +89,13 @@ def test_it_must_be_short_near_along_the_lengths_and_as_often_repeated(how: dict
     assert judged(one_sided(), short(**how)).outcome == outcome
 
 
+def test_a_repeat_that_was_taken_out_is_missing() -> None:
+    whole = short([0.0] * 4)
+    rest = whole.points.select((whole.points.measurement != 3) | (whole.points.repeat != 2))
+    found = judged(one_sided(), ShortGauge(whole.facts, rest, np.arange(len(rest)).reshape(-1, 2)))
+    assert found.missing == ("short gauge, repeat 2 of measurement 3: numbered, and not recorded",)
+
+
 def test_a_copied_repeat_is_none() -> None:
     beside = short()
     xyz = beside.points.xyz.copy()
@@ -155,7 +162,7 @@ def test_to_lengths_met_from_both_sides_nothing_is_added() -> None:
     )
     found = judged(both, short((9.0, 9.0, 9.0)))
     assert found.outcome == "pass"
-    assert not any("short gauge" in text for text in found.remarks)
+    assert not any("is added" in text for text in found.remarks)
     assert judged(both, short((9.0,))).outcome == "pass"
 
 
