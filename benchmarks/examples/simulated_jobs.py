@@ -69,6 +69,19 @@ class Simulated:
     columns: Sequence[str] = ()
 
 
+LENGTH = {"expansion": "at 20 °C", "temperature": "at 20 °C", "alignment": "in line", "fixturing": "undistorted"}
+FORM = {"form": "perfectly round"}
+
+
+def _negligible(artefact: str, lines: Mapping[str, str]) -> str:
+    """Tables that declare what of the test uncertainty the simulation leaves out."""
+    verb = "were" if artefact.endswith("s") else "was"
+    rows = [f'{line} = {{ by = "the simulation", reason = "the {artefact} {verb} simulated {how}" }}'
+            for line, how in lines.items()]  # fmt: skip
+    rated = 'declared = { by = "the simulation", reason = "the machine was simulated at 20 °C" }'
+    return "\n".join(["", "[test_uncertainty.negligible]", *rows, "", "[rated_conditions]", rated, ""])
+
+
 def recording(xyz: Floats, measurement: Ints, point: Ints, repeat: Ints | None = None, **columns: Floats) -> Points:
     repeats = np.ones(len(xyz), dtype=np.int64) if repeat is None else repeat
     return Points(xyz, measurement, point, repeats, MACHINE, columns)
@@ -96,7 +109,8 @@ def step_gauge() -> Simulated:
         "step-gauge-simulated", "ISO 10360-2, seven positions of a step gauge, faces met outwards and on the way back, "
         "three times", {"kind": "step_gauge", "name": "Step gauge, 820 mm", "u_um": 0.4, "cte_per_k": 11.5e-6}, points,
         {**SCALE, **SQUARE, **hysteresis}, [*SCALE, *SQUARE, *hysteresis], 0.6,
-        extra='\n[[conformity]]\nstandard = "ISO 10360-2:2009"\nmpe = { a_um = 4.0, k = 100.0 }\n',
+        extra=_negligible("gauge", LENGTH)
+        + '\n[[conformity]]\nstandard = "ISO 10360-2:2009"\nmpe = { a_um = 4.0, k = 100.0 }\n',
         columns=("reference_mm", "approach_x", "approach_y", "approach_z"),
     )  # fmt: skip
 
@@ -117,7 +131,8 @@ def gauge_blocks() -> Simulated:
     return Simulated(
         "gauge-blocks-simulated", "Four gauge blocks along X and along Y, outer faces, three times",
         {"kind": "gauge_blocks", "name": "Gauge blocks, grade K", "u_um": 0.15, "cte_per_k": 11.5e-6}, points, truth,
-        list(truth), 0.3, extra='\n[[conformity]]\nstandard = "VDI/VDE 2617"\nmpe = { a_um = 3.0, k = 80.0 }\n',
+        list(truth), 0.3,
+        extra=_negligible("blocks", LENGTH) + '\n[[conformity]]\nstandard = "VDI/VDE 2617"\nmpe = { a_um = 3.0, k = 80.0 }\n',
         columns=("reference_mm", "approach_x", "approach_y", "approach_z", "nx", "ny", "nz"),
     )  # fmt: skip
 
@@ -137,7 +152,8 @@ def sphere() -> Simulated:
         "sphere-simulated", "ISO 10360-5, 25 points of a sphere in three places",
         {"kind": "sphere", "name": "Ceramic sphere, 25 mm", "length_mm": 25.0012, "u_um": 0.1, "form_um": 0.1}, points,
         truth, list(truth), 0.35,
-        extra='\n[[conformity]]\nstandard = "ISO 10360-5:2010"\nlimit_um = 5.0\n', columns=("nx", "ny", "nz"),
+        extra=_negligible("sphere", FORM)
+        + '\n[[conformity]]\nstandard = "ISO 10360-5:2010"\nlimit_um = 5.0\n', columns=("nx", "ny", "nz"),
     )  # fmt: skip
 
 

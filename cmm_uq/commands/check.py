@@ -222,7 +222,9 @@ def _unfit(job: Job, wrong: Gathered) -> list[Problem]:
             ))  # fmt: skip
     if wrong.problems:
         return []
-    _, findings = recorded_model(job)
+    model, findings = recorded_model(job)
+    with wrong.going_on():
+        model.estimate()
     return [
         Problem(str(one.why), job.recording_path, one.lines[0] if one.lines else None, one.column or "")
         for one in findings

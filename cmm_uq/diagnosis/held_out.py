@@ -79,7 +79,7 @@ def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float
         errors.append(float(error @ error) * linear.noise_scale[out].mean() ** 2)
         counts.append(len(error) - open_)
         densities.append(_log_density(error / sigma, np.hstack(told)) - counts[-1] * np.log(sigma * np.sqrt(2 * np.pi)))
-    return float(np.sqrt(sum(errors) / sum(counts)) / MICROMETRE), np.array(densities)
+    return float(np.sqrt(sum(errors) / max(sum(counts), 1)) / MICROMETRE), np.array(densities)
 
 
 def _log_density(error: Floats, spread: Floats) -> float:

@@ -30,7 +30,8 @@ def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> l
     estimate = model.estimate()
     columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))
-    components = noise_of(replace(model, sigma=None))
+    # without a degree of freedom the recording says nothing of its noise, and what is stated holds
+    components = noise_of(replace(model, sigma=None) if estimate.least_squares.degrees_of_freedom else model)
     jumps = _jumps(estimate.linear, estimate.least_squares.residuals, candidates)
     return kinds(estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals, jumps)
 

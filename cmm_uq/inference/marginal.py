@@ -232,6 +232,8 @@ class Marginal:
         if self._freedoms.count:
             lost, own = self._eliminated(v, blocks)
             whole -= lost
+            # of as many observations as freedoms nothing is left
+            whole[:, -1, -1] = np.maximum(whole[:, -1, -1], np.finfo(np.float64).tiny)
             log -= own
         return _cholesky(whole), log
 

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from cmm_uq.errors import CmmUqError, suggestion
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TEST_KEYS, TestUncertainty
-from cmm_uq.jobs.mpe_text import mpe_of
+from cmm_uq.jobs.mpe_text import FLATTEST, mpe_of
 from cmm_uq.jobs.standard_clauses import ClausesForm
 from cmm_uq.jobs.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
 from cmm_uq.jobs.toml_file import checked
@@ -150,6 +150,21 @@ class ConformityFacts(Table):
         if standards is not None and standards.named(name) is None:
             raise ValueError(f"no such standard is decided. {suggestion(name, standards.names())}")
         return name
+
+    @model_validator(mode="before")
+    @classmethod
+    def _k_of_one_meaning(cls, data: Any) -> Any:
+        """A table has L/K; a K of K·L read so would let nearly any error pass."""
+        given = data.get("mpe") if isinstance(data, dict) else None
+        k = given.get("k") if isinstance(given, dict) else None
+        if isinstance(k, (int, float)) and not isinstance(k, bool) and k > 0:
+            guideline = str(data.get("standard", "")).startswith("VDI")
+            if k < (FLATTEST if guideline else 1.0):
+                raise ValueError(
+                    f"mpe k = {k:g} means L/{k:g}, which is {1000 / k:.4g} µm in a metre; the K of A + K·L is meant "
+                    f'otherwise: write mpe = "A + L/{k:g}", "A + {k:g}·L/1000" or "A + {k:g}·L", L in mm and the error in µm'
+                )
+        return data
 
     @model_validator(mode="after")
     def _one_limit(self) -> Self:

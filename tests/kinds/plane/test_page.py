@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
+import cmm_uq
+from cmm_uq.commands.check import check_job
 from cmm_uq.documents.document import Facts
+from cmm_uq.errors import CmmUqError
 from tests.conftest import ROOT
 from tests.kinds.simulated import blocks, recovered, table
 
@@ -39,3 +46,44 @@ def test_a_plane_has_no_length_to_be_certified() -> None:
     labels = [label for block in blocks(JOB) if isinstance(block, Facts) for label, _ in block.rows]
     assert "Artefact" in labels
     assert "Certified length" not in labels
+
+
+THREE = """measurement,point,repeat,x_mm,y_mm,z_mm
+1,0,1,59.99942,100.00027,-551.99925
+1,1,1,60.00026,99.99956,-559.99882
+1,2,1,709.99957,599.99977,-559.98465
+1,3,1,839.99993,1100.00031,-559.98186
+"""
+
+
+def three_contacts(folder: Path, *, effects: str = "", u_coordinate_um: float | None = 0.5) -> Path:
+    text = (ROOT / "examples" / JOB / "job.toml").read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^effects = .*$", f"effects = [{effects}]", text)
+    if u_coordinate_um is not None:
+        text = text.replace('"recording.csv"\n', f'"recording.csv"\nu_coordinate_um = {u_coordinate_um}\n')
+    (folder / "job.toml").write_text(text, encoding="utf-8")
+    (folder / "recording.csv").write_text(THREE, encoding="utf-8")
+    return folder
+
+
+def test_three_contacts_make_a_plane_whose_points_are_as_uncertain_as_is_stated(tmp_path: Path) -> None:
+    """At least three (US 4,866,643, claim 1 b): in their middle u is √(0.5²/3 + 0.3²) µm of points and offset."""
+    folder = three_contacts(tmp_path)
+    assert not check_job(folder).problems
+    (plane,) = cmm_uq.report(folder).results["planes"]
+    matrix = np.array(plane["surface"]["covariance"]["matrix"])
+    assert np.sqrt(matrix[2, 2]) * 1e3 == pytest.approx(np.hypot(0.5 / np.sqrt(3), 0.3), rel=0.1)
+
+
+@pytest.mark.parametrize(("how", "told"), [
+    ({"u_coordinate_um": None}, "leave nothing to estimate the noise from"),
+    ({"effects": '"straightness_x_z"'}, "0 observations cannot determine 1 parameters"),
+])  # fmt: skip
+def test_what_three_contacts_cannot_tell_is_refused_by_the_check_and_by_the_report(
+    tmp_path: Path, how: dict[str, Any], told: str
+) -> None:
+    folder = three_contacts(tmp_path, **how)
+    (problem,) = check_job(folder).problems
+    assert told in problem.problem
+    with pytest.raises(CmmUqError, match=told):
+        cmm_uq.report(folder)
