@@ -14,8 +14,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from cmm_uq.documents.clauses import clauses, draft
-from cmm_uq.documents.traceability_section import claimed
+from cmm_uq.documents.clauses import clauses, clauses_data, draft
+from cmm_uq.documents.digital_certificate.administration import formal_statements
+from cmm_uq.documents.digital_certificate.words import speaking
+from cmm_uq.documents.document import Paragraph
+from cmm_uq.documents.traceability_section import claimed, traceability_section
 from cmm_uq.jobs.acquired import Acquired, Provenance
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
@@ -236,6 +239,21 @@ def test_the_clause_is_stated_where_traceability_is_shown_and_missing_where_it_i
     status = {one.status for one in clauses(job) if one.clause == "7.8.4.1 c"}
     assert status == ({"stated"} if chain is NATIONAL else {"missing"})
     assert draft(job)
+
+
+@pytest.mark.parametrize("chain", [NATIONAL, without(NATIONAL, "arrangement", **EVIDENCE), {"number": "7"}, None])
+def test_page_results_and_digital_certificate_say_the_same_of_it(chain: dict[str, Any] | None) -> None:
+    job = job_with(chain)
+    found = claimed(job)
+    page = next(block.text for block in traceability_section(job, ()).blocks if isinstance(block, Paragraph))
+    data = clauses_data(job)["traceability"]
+    digital = next(
+        one for one in formal_statements(job, {}, speaking("en"))
+        if "basic_metrologicallyTraceableToSI" in one.ref_type
+    )  # fmt: skip
+    assert page == data["statement"] == found.statement == str(digital.declaration)
+    assert data["claim"] == found.claim
+    assert digital.traceable == (found.claim == "traceable")
 
 
 @pytest.mark.parametrize("chain", [NATIONAL, ACCREDITED, without(NATIONAL, "due"), {"number": "7"}, None])
