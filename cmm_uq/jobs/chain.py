@@ -222,9 +222,11 @@ class Chain:
     def lacks(self) -> tuple[Lack, ...]:
         """All that a claim of traceability lacks."""
         if self.said == OWN_MACHINE:
-            return ((say("traceability by another certificate of the artefact"), "[artefact.certificate] machine"),)
+            return (
+                (say("traceability (artefact: a certificate from another machine)"), "[artefact.certificate] machine"),
+            )
         return tuple(
-            (say("traceability by the {what}, as {lack}", what=link.what, lack=lack), key)
+            (say("traceability ({what}: {lack})", what=link.what, lack=lack), key)
             for link in self.links for lack, key in link.lacks()
         )  # fmt: skip
 
