@@ -19,7 +19,7 @@ from cmm_uq.conformity.shared_causes import Causes, causes_of_lengths, length_bu
 from cmm_uq.conformity.short_gauge import added_in_words
 from cmm_uq.conformity.standard import NOT_STATED, Test
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
-from cmm_uq.conformity.uncertainty_lines import u_of_repeats
+from cmm_uq.conformity.uncertainty_lines import WARM, away_from_20, u_of_repeats
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TestUncertainty
 from cmm_uq.messages import NOTHING, Text, plural, say, semicolons
@@ -30,10 +30,6 @@ from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 NORMAL_EXPANSION = (8e-6, 13e-6)
 """1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)."""
-
-WARM = 0.5
-"""K from 20 °C from which on an unknown expansion matters."""
-
 
 Chosen = Callable[[Artefact, Indications], NDArray[np.bool_]]
 """Which of the lengths of a recording belong to a test, (m,)."""
@@ -177,11 +173,8 @@ def normal_expansion(test: Test) -> tuple[Condition, ...]:
 
 def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
     """What a reader must know of lengths measured away from 20 °C on a gauge of unknown expansion; else nothing."""
-    recorded = artefact.points.columns.get("temp_artefact_c")
-    if cte_per_k or recorded is None:
-        return NOTHING
-    away = float(np.abs(recorded - REFERENCE_TEMPERATURE).max())
-    if away < WARM:
+    away = away_from_20(artefact)
+    if cte_per_k or away < WARM:
         return NOTHING
     return say(
         "The artefact was up to {away:.2g} K from 20 °C and its expansion is not stated ([artefact] cte_per_k): its lengths "

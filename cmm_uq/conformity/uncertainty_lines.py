@@ -17,10 +17,13 @@ from cmm_uq.jobs.circumstances import LINE_KEYS, Circumstances, TestUncertainty
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.uncertainty.budget import Budget
-from cmm_uq.units import MICROMETRE
+from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")
 """Of a calibrated length, in the order of its budget."""
+
+WARM = 0.5
+"""K from 20 °C from which on an unknown expansion matters."""
 
 SIZE_LINES = LENGTH_LINES[:3]
 FORM_LINES = ("form",)
@@ -107,6 +110,13 @@ def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
             say("uncertainty: the expansion coefficient of the artefact is not stated"),
             "cte_per_k in [artefact], or expansion in [test_uncertainty.negligible]",
         )
+    elif under.cte_per_k is None and stated.machine.expansion is None and away_from_20(artefact) >= WARM:
+        yield _lacks(
+            say(
+                "uncertainty: lengths are not brought to 20 °C, for the expansion coefficient of the artefact is not stated"
+            ),
+            "cte_per_k in [artefact], or expansion in [test_uncertainty.machine] of a machine that corrects it",
+        )
     if "temp_artefact_c" in artefact.points.columns:
         return
     if stated.machine.temperature is None:
@@ -119,6 +129,12 @@ def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
             say("uncertainty: how far the artefact was from 20 °C, on which that of its expansion coefficient depends"),
             "column temp_artefact_c, or expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]",
         )
+
+
+def away_from_20(artefact: Artefact) -> float:
+    """How far the artefact was from 20 °C at most, K; 0 where its temperature was not recorded."""
+    recorded = artefact.points.columns.get("temp_artefact_c")
+    return 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max(initial=0.0))
 
 
 def _neither(line: str) -> Condition:
