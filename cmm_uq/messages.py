@@ -50,6 +50,13 @@ class Verbatim(Text):
 Argument = Text | float
 """What stands in a message: another text, or a number that the pattern says how to round."""
 
+
+class Key(Verbatim):
+    """Where a job states what a sentence speaks of, for the laboratory; a page for customers is without it."""
+
+    __slots__ = ()
+
+
 NOTHING = Text("")
 DASH = Number("–")
 """Where a figure does not exist."""
@@ -229,6 +236,24 @@ def _folded(texts: Sequence[Text], join: Callable[[Text, Text], Message]) -> Tex
         return texts[0] if texts else NOTHING
     half = len(texts) // 2
     return join(_folded(texts[:half], join), _folded(texts[half:], join))
+
+
+def at_key(name: str) -> Key:
+    """A key behind what it states, in brackets."""
+    return Key(f" ({name})")
+
+
+def without_keys(text: Text) -> Text:
+    """A text for customers: the same words without the keys of a job."""
+    if isinstance(text, Key):
+        return NOTHING
+    if isinstance(text, Plural):
+        one, many = without_keys(text.one), without_keys(text.many)
+        return Plural(text.number, one, many) if isinstance(one, Message) and isinstance(many, Message) else text
+    if isinstance(text, Message):
+        found = {name: without_keys(each) if isinstance(each, Text) else each for name, each in text.arguments.items()}
+        return Message(text.pattern, found)
+    return text
 
 
 def foreign(text: str) -> Text:

@@ -8,7 +8,7 @@ import numpy as np
 
 from cmm_uq.conformity.measurement_lines import PARALLELS, position_of
 from cmm_uq.conformity.plans import BarPlan, Condition
-from cmm_uq.messages import Text, commas, number, plural, say
+from cmm_uq.messages import Text, at_key, commas, number, plural, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats, Points
 
@@ -25,7 +25,8 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     count = len(distinct)
     missing = _lacking(wanted, count, _in_words(same)) if count < wanted else ()
     unknown = () if known else (
-        say("[machine] travel_mm of all three axes, by whose proportions the number of positions goes"),
+        say("the travel of all three axes{key}, by whose proportions the number of positions goes",
+            key=at_key("[machine] travel_mm")),
     )  # fmt: skip
     taken = {position_of(ends[i, 1] - ends[i, 0]) for i in distinct}
     directions = tuple(say("position {along}", along=_along(d)) for d in plan.directions if d not in taken)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
 from cmm_uq.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
-from cmm_uq.messages import Text, Verbatim, commas, number, say, semicolons
+from cmm_uq.messages import Text, Verbatim, at_key, commas, number, say, semicolons
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.uncertainty.rounding import nominal
@@ -75,7 +75,11 @@ def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
     """That a tip offset is recorded where the plan asks for one."""
     if not plan.offset_mm:
         return ()
-    what = say("stylus tip {offset_mm:g} mm across the ram (tip_x_mm, tip_y_mm, tip_z_mm)", offset_mm=plan.offset_mm)
+    what = say(
+        "stylus tip {offset_mm:g} mm across the ram{key}",
+        key=at_key("tip_x_mm, tip_y_mm, tip_z_mm"),
+        offset_mm=plan.offset_mm,
+    )
     found = artefact.indications()
     there = found is not None and with_offset(artefact.points, found.rows, plan.offset_mm).any()
     return (Condition(what, () if there else (what,)),)
@@ -159,8 +163,9 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
     least = say("{least_share:.0f} %", least_share=100 * plan.least_share)
     what = say("longest length at least {least} of the travel along each line", least=least)
     if not np.all(np.isfinite(machine.travel_mm)):
-        key = say("[machine] travel_mm of all three axes, without which no length's share of the travel is known")
-        return Condition(say("{what}: not known", what=what), (key,))
+        travel = say("the travel of all three axes{key}, without which no length's share of it is known",
+                     key=at_key("[machine] travel_mm"))  # fmt: skip
+        return Condition(say("{what}: not known", what=what), (travel,))
     shares = {line: max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
     missing = tuple(
         say(

@@ -22,7 +22,7 @@ from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.conformity.uncertainty_lines import WARM, away_from_20, u_of_repeats
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TestUncertainty
-from cmm_uq.messages import NOTHING, Text, plural, say, semicolons
+from cmm_uq.messages import NOTHING, Text, at_key, plural, say, semicolons
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Ints
 from cmm_uq.uncertainty.rounding import nominal
@@ -177,9 +177,9 @@ def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
     if cte_per_k or away < WARM:
         return NOTHING
     return say(
-        "The artefact was up to {away:.2g} K from 20 °C and its expansion is not stated ([artefact] cte_per_k): its lengths "
+        "The artefact was up to {away:.2g} K from 20 °C and its expansion is not stated{key}: its lengths "
         "are taken as those at 20 °C, which for steel is {steel:.2g} µm wrong in a metre.",
-        away=away, steel=11.5 * away,
+        away=away, steel=11.5 * away, key=at_key("[artefact] cte_per_k"),
     )  # fmt: skip
 
 

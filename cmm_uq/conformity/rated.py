@@ -6,7 +6,7 @@ import numpy as np
 
 from cmm_uq.conformity.plans import Condition
 from cmm_uq.jobs.circumstances import Circumstances, RatedConditions
-from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.messages import Text, Verbatim, at_key, say
 from cmm_uq.points import Points
 
 SECONDS_PER_HOUR = 3600.0
@@ -70,7 +70,9 @@ def _change(points: Points, most: float) -> Condition:
     what = say("rated change of temperature {most:g} K/h", most=most)
     columns = _recorded(points)
     if not columns or "time_s" not in points.columns:
-        return Condition(what, (say("{what}: no temperature is recorded over time (temp_…_c, time_s)", what=what),))
+        return Condition(
+            what, (say("{what}: no temperature is recorded over time{key}", what=what, key=at_key("temp_…_c, time_s")),)
+        )
     time = points.columns["time_s"]
     largest = max(_largest_change(time, points.columns[name]) for name in columns)
     told = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)

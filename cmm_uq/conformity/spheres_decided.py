@@ -15,7 +15,7 @@ from cmm_uq.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.messages import Text, say
+from cmm_uq.messages import Text, at_key, say
 from cmm_uq.model.artefact import Artefact, Forms
 from cmm_uq.uncertainty.rounding import nominal
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
@@ -38,7 +38,7 @@ def form_error(test: Test) -> Statement:
         if test.circumstances.uncertainty.u_form_um
         else say("u is the test uncertainty (ISO/TS 23165): half the form deviation of the sphere, {u:.2g} µm.", u=u)
         if u > 0
-        else say("The test sphere is taken as perfectly round: its form deviation (form_um) is not given.")
+        else say("The test sphere is taken as perfectly round: its form deviation{key} is not given.", key=at_key("form_um"))
     ]  # fmt: skip
     remarks += _largest(items)
     causes = Causes(np.full((len(items), 1), known), np.zeros(len(items)), np.arange(len(items)))

@@ -29,7 +29,7 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, needed
 from cmm_uq.jobs.short_gauge import ShortGauge
-from cmm_uq.messages import Text, Verbatim, say
+from cmm_uq.messages import Text, Verbatim, at_key, say
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.budget import Budget, Line
@@ -47,10 +47,11 @@ NOT_STATED = say("No uncertainty is stated above zero: none is considered, and n
 
 RAISED = say(
     "Where the test uncertainty evaluated is smaller, u is half of the laboratory's calibration and measurement capability "
-    "([laboratory.cmc], k = 2)."
+    "(k = 2){key}.",
+    key=at_key("[laboratory.cmc]"),
 )
 
-CMC = Verbatim("[laboratory.cmc]")
+CMC = say("the laboratory's calibration and measurement capability")
 
 BY_MEASUREMENT_ALONE = say(
     "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
 from cmm_uq.documents.clauses import DRAFT, NOT_OURS, STATEMENTS, draft, replaced_certificate
 from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.conditions import conditions
@@ -15,7 +18,7 @@ from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say
+from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, without_keys
 from cmm_uq.uncertainty.rounding import nominal
 
 Row = tuple[Text, str]
@@ -42,7 +45,7 @@ def certificate_of(
     overview : what every statement of conformity comes to.
     """
     facts = job.facts
-    return Document(
+    return in_words(Document(
         title=CERTIFICATE,
         number=Verbatim(facts.job.number or facts.job.id),
         subject=say(
@@ -68,7 +71,23 @@ def certificate_of(
         logo=logo_of(facts.laboratory, job.inputs),
         overview=overview,
         decides=True,
-    )  # fmt: skip
+    ))  # fmt: skip
+
+
+def in_words(document: Document) -> Document:
+    """The document without keys of the job, which the laboratory reads from ``check``, the terminal and results.json."""
+    made: Document = _in_words(document)
+    return made
+
+
+def _in_words(value: Any) -> Any:
+    if isinstance(value, Text):
+        return without_keys(value)
+    if isinstance(value, tuple):
+        return tuple(map(_in_words, value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{field.name: _in_words(getattr(value, field.name)) for field in fields(value)})
+    return value
 
 
 def _particulars(of: Job) -> tuple[Facts, ...]:

@@ -11,9 +11,11 @@ from cmm_uq.documents.clauses import Clause, missing
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.messages import Text, Verbatim, foreign, say, semicolons
+from cmm_uq.messages import Key, Text, Verbatim, at_key, foreign, say, semicolons
 
-_INTERIM = say("An interim check ([job] interim): no calibration certificate, whatever the title says.")
+_INTERIM = say(
+    "An interim check{key}: no calibration certificate, whatever the title says.", key=at_key("[job] interim")
+)
 
 
 def formal_warnings(job: Job) -> tuple[Text, ...]:
@@ -33,7 +35,7 @@ def contradictions(job: Job) -> tuple[Text, ...]:
 def not_stated(lacking: Iterable[Clause]) -> list[Text]:
     """That a certificate is not complete, and by which keys it would be; nothing of one that is."""
     wanted = [
-        say("{what} ({clause}): {key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Verbatim(one.key))
+        say("{what} ({clause}){key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Key(f": {one.key}"))
         for one in lacking
     ]
     if not wanted:
@@ -46,7 +48,8 @@ def _circular(facts: JobFile) -> list[Text]:
         return []
     return [
         say(
-            "The artefact was certified on the machine that it now tests ([artefact.certificate] machine): errors that both "
-            "measurements have in common are not seen here."
+            "The artefact was certified on the machine that it now tests{key}: errors that both "
+            "measurements have in common are not seen here.",
+            key=at_key("[artefact.certificate] machine"),
         )
     ]

@@ -36,9 +36,7 @@ def noise_found(noise: Noise, *, heavy_tails: bool) -> Text:
     if "placing" not in noise.components:
         hidden.append(say("set-up offsets (no repeats)"))
     hidden.append(
-        say("what had drifted before the first reading")
-        if "slow" in noise.components
-        else say("slow noise (no time_s)")
+        say("what had drifted before the first reading") if "slow" in noise.components else say("slow noise (no times)")
     )
     return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
 

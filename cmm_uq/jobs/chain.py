@@ -28,7 +28,7 @@ from cmm_uq.jobs.traceability import (
     OTHER,
     Traceability,
 )
-from cmm_uq.messages import NOTHING, Text, Verbatim, commas, day, names, say, semicolons, sentences
+from cmm_uq.messages import NOTHING, Text, Verbatim, at_key, commas, day, names, say, semicolons, sentences
 
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
 """What a statement of traceability says; the last where nothing that is certified enters."""
@@ -329,7 +329,7 @@ def dates_out_of_order(of: Job) -> tuple[Text, ...]:
         ),
     )  # fmt: skip
     return tuple(
-        say("Dates out of order: {what}, {first} against {second} ({key}).", what=what, first=day(first), second=day(second),
-            key=Verbatim(key))
-        for first, second, what, key in ordered if first and second and first < second
+        say("Dates out of order: {what}, {first} against {second}{key}.", what=what, first=day(first), second=day(second),
+            key=at_key(at))
+        for first, second, what, at in ordered if first and second and first < second
     )  # fmt: skip

@@ -55,12 +55,12 @@ def _assumed(digitizer: Digitizer) -> list[Block]:
     if digitizer.u_turn:
         known.append(say("attitude, u = {u:g}″ about each axis", u=digitizer.u_turn))
     else:
-        missing.append(say("of the attitudes (u_attitude_arcsec)"))
+        missing.append(say("of the attitudes"))
     if any(digitizer.u_shift):
         x, y, z = digitizer.u_shift
         known.append(say("the sphere's centre as a whole, u = ({x:g}, {y:g}, {z:g}) µm along x, y, z", x=x, y=y, z=z))
     else:
-        missing.append(say("of what shifts a whole scan: form of the ball, digitizer, scales (u_centre_um)"))
+        missing.append(say("of what shifts a whole scan: form of the ball, digitizer, scales"))
     said: list[Block] = []
     if known:
         said.append(Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known))))
