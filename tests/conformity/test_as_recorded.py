@@ -297,3 +297,11 @@ def test_a_bar_against_its_calibrated_length_fails(by_mm: float) -> None:
     found = decided(points, bar_facts(300.0, 0.35), characteristic="U2", **wish)
     assert found.finding == "fail"
     assert found.value_um == pytest.approx(1e3 * by_mm, abs=1e-3)
+
+
+def test_a_temperature_that_cannot_be_trusted_is_not_taken_for_20_degrees() -> None:
+    points = recorded.gauge().points
+    temperatures = np.where(np.arange(len(points)) == 7, 293.15, 20.0)
+    found = decided(with_columns(points, temp_artefact_c=temperatures), STEP_GAUGE, **ISO)
+    assert found.outcome == "incomplete"
+    assert any("temperature" in text for text in found.missing)

@@ -13,7 +13,7 @@ from cmm_uq.documents.conformity_section import conformity_section, decision_blo
 from cmm_uq.documents.document import Decision, Plot, Table
 from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError, Prior
 from cmm_uq.model.kind import BARS, LENGTHS
-from tests.conformity.recorded import gauge
+from tests.conformity.recorded import STATED, gauge
 
 MPE = MaximumPermissibleError(a_um=2.5, k=300.0)
 ERRORS = {(1, 2, 20.0): 2.40, (1, 3, 800.0): -4.99, (2, 1, 400.0): 6.5}
@@ -22,7 +22,7 @@ ERRORS = {(1, 2, 20.0): 2.40, (1, 3, 800.0): -4.99, (2, 1, 400.0): 6.5}
 def stated(u_um: float | None = 0.4, **wish: object) -> Statement:
     facts = ConformityFacts(standard="ISO 10360-2:2009", **({"mpe": MPE} | wish))
     artefact = gauge(list(np.eye(3)[:2]), [[20.0, 800.0], [20.0, 400.0]], errors=ERRORS, u_um=u_um)
-    return statement(facts, artefact, {}, "[[conformity]] 1", (BARS, LENGTHS))
+    return statement(facts, artefact, {}, "[[conformity]] 1", (BARS, LENGTHS), None, STATED)
 
 
 def blocks(found: Statement) -> tuple[Decision, Plot, Table]:
@@ -73,7 +73,7 @@ def test_without_an_uncertainty_the_table_has_no_columns_of_it() -> None:
 
 def test_the_picture_counts_what_is_not_accepted_and_says_its_lines() -> None:
     _, plot, _ = blocks(stated())
-    assert plot.alternative == "12 errors over length between the limits; 2 of them are not accepted."
+    assert plot.alternative == "12 errors over length between the limits; 3 of them are not accepted."
     assert any("dashed: limits of acceptance" in text for text in plot.lettering)
 
 
