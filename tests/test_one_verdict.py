@@ -9,6 +9,7 @@ from __future__ import annotations
 import datetime as dt
 import json
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cache
@@ -59,6 +60,9 @@ from cmm_uq.serving.due import Due
 from cmm_uq.serving.overview import groups
 from cmm_uq.verification.consistent import check_verdicts
 from cmm_uq.verification.found import Inquiry
+from tests.cli.laboratory import CHAIN, STATED
+from tests.cli.process import run
+from tests.conftest import ROOT
 from tests.kinds.simulated import analysed
 
 JOB = "iota-1102-20C"
@@ -338,3 +342,40 @@ def test_the_certificate(seed: int) -> None:
     page = re.sub(r"\s+", " ", re.sub("<[^>]*>", " ", render_html(outcome(seed).document)))
     for one, said in zip(outcome(seed).verdicts, drawn(seed).stated.values(), strict=True):
         assert f"{subject_of(one)}: {said}" in page
+
+
+def test_the_commands_on_a_machine_that_is_out_of_tolerance(tmp_path: Path) -> None:
+    """Scale Z is 14 ppm and squareness XY 12″, with tolerances of 12 ppm and 8″; no standard decides on anything."""
+    job = Path(shutil.copytree(ROOT / "examples" / "triangle-simulated", tmp_path / "jobs" / "triangle"))
+    toml = (job / "job.toml").read_text(encoding="utf-8").replace('origin = "simulated"', 'number = "K-1"')
+    toml = toml.replace("[machine]\n", f'{STATED}[machine]\nserial = "77"\n').replace(
+        "[recording]\n", f"{CHAIN}[recording]\n"
+    )
+    (job / "job.toml").write_text(toml, encoding="utf-8")
+    jobs, records = tmp_path / "jobs", tmp_path / "records.db"
+    done = run("report", "--scheduled", jobs, "--out", tmp_path / "reports", "--records", records)
+    told = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 1
+    (line,) = (one for one in told if one.get("job"))
+    assert (line["events"], line["exit_code"]) == (["fail", "undecided"], 1)
+    assert {one: line["decisions"].count(one) for one in ORDER} == dict.fromkeys(ORDER, 0) | {
+        "fail": 2, "undecided": 1, "pass": 12
+    }  # fmt: skip
+    certificate = (tmp_path / "reports" / "triangle-simulated" / "certificate.xml").read_text(encoding="utf-8")
+    assert certificate.count("<dcc:conformity>fail<") == 2
+    done = run("report", job, "--out", tmp_path / "again", "--records", "none", "--strict")
+    assert done.returncode == 4
+    assert "FAIL       Scale error of Z, tolerance 12 ppm: " in done.stdout
+    assert run("batch", jobs, "--out", tmp_path / "batch", "--results-only", "--strict", "--workers", 1).returncode == 4
+    done = run("due", "--strict", "--on", "2026-01-01", "--records", records)
+    assert done.returncode == 4
+    assert "last certificate finds it beyond its limits" in " ".join(done.stdout.split())
+    history = json.loads(run("history", "77", "--on", "2026-01-01", "--records", records, "--json").stdout)
+    assert history["decision"] == "fail"
+    beyond = {name for name, one in history["values"].items() if one["beyond_limit"]}
+    assert beyond == {"scale_z.ppm", "squareness_xy.angle_arcsec"}
+    done = run("release", "K-1", "--by", "A. Huber", "--records", records)
+    assert done.returncode == 2
+    assert "scale_z.ppm: fail; squareness_xy.angle_arcsec: fail; squareness_yz.angle_arcsec: undecided" in done.stderr
+    done = run("release", "K-1", "--by", "A. Huber", "--despite", "to be adjusted", "--records", records)
+    assert (done.returncode, done.stdout.endswith("released\n")) == (0, True)

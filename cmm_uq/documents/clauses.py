@@ -18,6 +18,7 @@ from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.jobs.verdicts import TOLERANCE_RULE
 from cmm_uq.messages import Text, Verbatim, day, say
 
 Status = Literal["stated", "missing", "not applicable", "laboratory"]
@@ -211,8 +212,12 @@ def _traceable(job: Job) -> tuple[Clause, ...]:
 
 
 def _statements(facts: JobFile) -> tuple[Clause, ...]:
-    decided = bool(facts.conformity)
-    rules = "; ".join(dict.fromkeys(rule_name(wish.rule) for wish in facts.conformity))
+    decided = bool(facts.conformity or facts.model.tolerances)
+    named = (
+        *(rule_name(wish.rule) for wish in facts.conformity),
+        *((TOLERANCE_RULE,) if facts.model.tolerances else ()),
+    )
+    rules = "; ".join(dict.fromkeys(named))
     stated = "value, measurement and length named with each statement" if decided else ""
     return (
         _where("7.8.6.1", "a decision rule, with the risk that it takes",
@@ -238,7 +243,8 @@ def _replacing(facts: JobFile) -> tuple[Clause, ...]:
 
 
 def _standards(facts: JobFile) -> str:
-    return "; ".join(dict.fromkeys(wish.standard for wish in facts.conformity))
+    held = ("tolerances of the job",) if facts.model.tolerances else ()
+    return "; ".join(dict.fromkeys((*(wish.standard for wish in facts.conformity), *held)))
 
 
 def _number(facts: JobFile) -> str:

@@ -14,7 +14,7 @@ from cmm_uq.messages import NOTHING, Text, Verbatim
 from cmm_uq.units import UNITS, printed_unit
 
 GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
-"""Outcomes of statements, the gravest first: findings in their order, and before the passes what would be one, were it whole."""
+"""Outcomes of statements, the gravest first: findings in their order; incomplete is what would pass, were it whole."""
 
 NONE = "none"
 """In place of an outcome where nothing is stated."""
@@ -29,6 +29,9 @@ STANDS: Mapping[str, Literal["good", "bad"]] = MappingProxyType(
 
 TOLERANCE_OUTCOMES: Mapping[str, str] = MappingProxyType({"in": "pass", "out": "fail", "open": "undecided"})
 """By the word that results.json has beside a tolerance."""
+
+TOLERANCE_RULE = "the whole 95 % interval within the tolerance: pass; beyond it: fail; otherwise undecided"
+"""By which parameters are held to their tolerances."""
 
 
 def standing_of(outcome: str) -> Literal["good", "open", "bad"]:

@@ -6,8 +6,9 @@ import json
 
 import pytest
 
+from cmm_uq.conformity.statement import GRAVEST as FINDINGS
 from cmm_uq.conformity.verdicts import by_tolerance
-from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdict, Verdicts
+from cmm_uq.jobs.verdicts import GRAVEST, NO_VERDICTS, Verdict, Verdicts
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import UNITS
 
@@ -86,3 +87,7 @@ def test_results_of_earlier_versions_have_none_of_it_and_say_the_same() -> None:
         ("scale_y.ppm", "undecided", None, None, 25.0, "ppm"),
     ]  # fmt: skip
     assert found.overall == "fail"
+
+
+def test_findings_and_outcomes_have_one_order() -> None:
+    assert [one for one in GRAVEST if one != "incomplete"] == list(FINDINGS)

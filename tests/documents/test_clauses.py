@@ -19,6 +19,7 @@ from cmm_uq.documents.origin import marked
 from cmm_uq.documents.results_file import head
 from cmm_uq.jobs.job import Job, JobFacts
 from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.jobs.verdicts import TOLERANCE_RULE
 from cmm_uq.messages import NOTHING, say
 from tests.conftest import ROOT
 from tests.documents.test_completeness import CHAIN, WHOLE, changed, measured
@@ -72,6 +73,15 @@ def test_what_is_asked_for_only_where_there_is_any_makes_no_draft() -> None:
     silent = {one.clause for one in clauses(none) if one.status == "not applicable"}
     assert {"7.8.2.1 h", "7.8.2.1 n", "7.8.2.2", "7.8.4.1 d", "7.8.4.1 e", "7.8.6.1", "7.8.8.3"} <= silent
     assert missing(none) == ()
+
+
+def test_a_tolerance_is_a_statement_of_conformity_with_its_rule() -> None:
+    job = complete()
+    model = job.facts.model.model_copy(update={"tolerances": {"scale_x": 25.0}})
+    stated = replace(job, facts=job.facts.model_copy(update={"conformity": [], "model": model}))
+    found = {one.clause: (one.status, one.stated) for one in clauses(stated)}
+    assert found["7.8.4.1 e"] == found["7.8.6.2 b"] == ("stated", "tolerances of the job")
+    assert found["7.8.6.2 c"] == ("stated", TOLERANCE_RULE)
 
 
 @pytest.mark.parametrize(("table", "values"), [("job", {"origin": "simulated"}), ("job", {"interim": True})])

@@ -19,7 +19,7 @@ from cmm_uq.documents.digital_certificate.figures import Figures, Part
 from cmm_uq.documents.digital_certificate.shapes import decimal
 from cmm_uq.documents.digital_certificate.units import ONE, dsi_of, ratio
 from cmm_uq.documents.digital_certificate.words import SayIn, english, one_line, rich_of, words_of
-from cmm_uq.jobs.verdicts import Verdict, Verdicts
+from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.units import UNITS
 
@@ -38,9 +38,6 @@ _WHY: Mapping[str, Text] = MappingProxyType({
         "The standard asks for further readings before anything is decided, so noPass: conformity is not stated."
     ),
 })  # fmt: skip
-
-TOLERANCE_RULE = "the whole 95 % interval within the tolerance: pass; beyond it: fail; otherwise undecided"
-"""By which parameters are held to their tolerances."""
 
 _MICROMETRE, _MILLIMETRE = UNITS["µm"].dsi, UNITS["mm"].dsi
 _P_TWICE = Decimal("0.9545")
