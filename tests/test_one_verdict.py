@@ -34,6 +34,7 @@ from cmm_uq.commands.written import Written
 from cmm_uq.conformity.decision import decide
 from cmm_uq.conformity.statement import Decided, Statement
 from cmm_uq.dcc import written
+from cmm_uq.documents import first_page
 from cmm_uq.documents.compose import certified
 from cmm_uq.documents.digital_certificate.certificate import digital_certificate
 from cmm_uq.documents.history_page import overview_of
@@ -56,7 +57,7 @@ from cmm_uq.scheduling.found import Found
 from cmm_uq.scheduling.notices import of_results
 from cmm_uq.scheduling.work import REPORTED, Ended
 from cmm_uq.serving.certificate_page import _notices
-from cmm_uq.serving.due import Due
+from cmm_uq.serving.due import by_rule
 from cmm_uq.serving.overview import groups
 from cmm_uq.verification.consistent import check_verdicts
 from cmm_uq.verification.found import Inquiry
@@ -311,7 +312,9 @@ def test_the_fleet(seed: int, recorded: Callable[[int], Records]) -> None:
 def test_the_pages_of_the_records(seed: int, recorded: Callable[[int], Records]) -> None:
     of, records = drawn(seed), recorded(seed)
     (newest,) = standing_of_all(records)
-    found = groups(newest, Due(None, say("")), ON)
+    due = by_rule(records, ON)[newest.machine.serial]
+    found = groups(newest, due, ON)
+    assert ("overdue" in found) == (of.standing == "bad")
     assert ("failing" in found, "open" in found) == (of.standing == "bad", of.standing == "open")
     (kept,) = records.certificates()
     said = str(_notices(kept)[-1].head)
@@ -336,12 +339,28 @@ def test_a_release_asks_for_a_word_unless_all_passes(seed: int, tmp_path: Path) 
         assert all(f"{name}: {said}" in asked[0] for name, said in of.stated.items() if said != "pass")
 
 
-@pytest.mark.parametrize("seed", range(0, DRAWS, 5))
-def test_the_certificate(seed: int) -> None:
-    """Each statement with its outcome in words on the first page."""
+@each
+def test_the_box_of_the_first_page(seed: int) -> None:
+    of, box = drawn(seed), first_page.overview_of(drawn(seed).result)
+    if box is None:
+        assert of.overall == "none"
+        return
+    assert box.standing == of.standing
+    assert (box.verdict == "Conforms" or box.verdict.startswith("Conforms: all")) == (of.overall == "pass")
+    shown = dict(box.rows)
+    said = {subject_of(one): word for one, word in zip(of.result.verdicts, of.stated.values(), strict=True)}
+    assert {name: shown[name].partition(":")[0] for name in said if name in shown} == {
+        name: word for name, word in said.items() if name in shown
+    }
+    assert min((said[name] for name in said if name in shown), key=ORDER.index) == of.overall
+
+
+@pytest.mark.parametrize("seed", range(0, DRAWS, 10))
+def test_the_certificate_shows_that_box(seed: int) -> None:
     page = re.sub(r"\s+", " ", re.sub("<[^>]*>", " ", render_html(outcome(seed).document)))
-    for one, said in zip(outcome(seed).verdicts, drawn(seed).stated.values(), strict=True):
-        assert f"{subject_of(one)}: {said}" in page
+    box = first_page.overview_of(outcome(seed).found)  # type: ignore[arg-type]
+    for name, said in () if box is None else box.rows:
+        assert " ".join(f"{name} {said}".split()) in page
 
 
 def test_the_commands_on_a_machine_that_is_out_of_tolerance(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> I
         return
     for one in due_in(records, (), on):
         if one.due is not None and one.due <= on + within:
-            yield of_due(one.item, one.serial, one.due, on, one.why)
+            yield of_due(one.item, one.serial, one.due, on, one.why, beyond=one.beyond)
 
 
 def drift_notices(records: Records | None, job: str, on: dt.date) -> Iterable[Notice]:

@@ -97,7 +97,7 @@ def of_error(error: CmmUqError, about: str, since: str) -> Notice:
     return Notice("error", about, title, Verbatim(str(error)), f"{error} since {since}", error.where or "")
 
 
-def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text) -> Notice:
+def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text, *, beyond: bool = False) -> Notice:
     """What has to be said of a machine or an artefact that is to be calibrated: once before its day, and once after it.
 
     Parameters
@@ -107,8 +107,9 @@ def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text) -> Noti
     due : day by which it is to be calibrated.
     on : today.
     why : it is due then.
+    beyond : whether its last certificate finds it beyond its limits.
     """
-    overdue = due < on
+    overdue = beyond or due < on
     state = say("overdue since {due}", due=day(due)) if overdue else say("due on {due}", due=day(due))
     title = say("{state}: {item} {called}", state=state, item=Verbatim(item), called=Verbatim(called))
     text = say("{item} {called} is {state}: {why}.", item=Verbatim(item.capitalize()), called=Verbatim(called), state=state,

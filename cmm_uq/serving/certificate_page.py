@@ -9,6 +9,7 @@ from typing import Any
 
 from cmm_uq.documents.document import Standing
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, day, number, say
 from cmm_uq.records.entries import Entry
 from cmm_uq.records.facts import Certificate, Value
@@ -109,8 +110,17 @@ def _notices(one: Certificate) -> list[Notice]:
 
 def _facts(view: View, one: Certificate, entry: Entry) -> Facts:
     artefact = next((row for row in view.records.artefacts() if row.serial == one.artefact), None)
+    stated = Verdicts.of_results(entry.data)
     rows: list[tuple[Text, Cell]] = [
         (say("Decision"), cell_of(DECISIONS, one.decision)),
+        *(
+            (
+                Verbatim(f"{each.by}, {each.name}" if each.by else each.title or each.name),
+                cell_of(DECISIONS, each.outcome),
+            )
+            for each in stated
+            if len(stated) > 1 or not each.by
+        ),
         (say("Diagnosis"), cell_of(VERDICTS, one.diagnosis)),
         (say("Machine"), machine_cell(one.machine)),
         (say("Artefact"), Cell(shown(one.artefact), "/artefacts" if artefact else "")),

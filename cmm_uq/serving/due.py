@@ -21,10 +21,12 @@ class Due(NamedTuple):
     ----------
     day : on which; ``None`` where no rule gives one.
     why : one sentence.
+    beyond : whether its last certificate finds it beyond its limits: it is overdue from that day on.
     """
 
     day: dt.date | None
     why: Text
+    beyond: bool = False
 
 
 DueDates = Callable[[Records, dt.date], Mapping[str, Due]]
@@ -40,4 +42,4 @@ def by_rule(records: Records, today: dt.date) -> dict[str, Due]:
     today : the day for which they are asked.
     """
     found = due_in(records, (), today) if records.head()[0] else []
-    return {one.serial: Due(one.due, one.why) for one in found if one.item == "machine"}
+    return {one.serial: Due(one.due, one.why, one.beyond) for one in found if one.item == "machine"}

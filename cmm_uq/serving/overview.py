@@ -98,7 +98,7 @@ def groups(newest: Newest, due: Due | None, today: dt.date) -> tuple[str, ...]:
     """To which groups a machine belongs, the most urgent first."""
     found: tuple[str, ...] = ()
     if due is not None and due.day is not None:
-        found = ("overdue",) if due.day < today else ("due",) if due.day <= today + SOON else ()
+        found = ("overdue",) if due.beyond or due.day < today else ("due",) if due.day <= today + SOON else ()
     certificate = newest.certificate
     if certificate is None:
         found += ("never",)
