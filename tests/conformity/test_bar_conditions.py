@@ -87,4 +87,6 @@ def test_the_travel_of_two_axes_does_not_tell_how_many_positions_are_asked() -> 
     travel[1] = np.nan
     what, missing = said(X, XY, moved(X, 0, 100), travel=travel)
     assert what[0] == "at least 3 positions of the bar: 3"
-    assert missing == ["the travel of all three axes ([machine] travel_mm), by whose proportions the number of positions goes"]
+    assert missing == [
+        "the travel of all three axes ([machine] travel_mm), by whose proportions the number of positions goes"
+    ]

@@ -99,7 +99,9 @@ def test_the_travel_of_two_axes_does_not_tell_the_share_of_a_line(unknown: int) 
     travel[unknown] = np.nan
     what, missing = said(along((X, [25.0, 720.0]), machine=Machine("m", "XYZ", travel)))
     assert what[1] == "longest length at least 66 % of the travel along each line: not known"
-    assert "the travel of all three axes ([machine] travel_mm), without which no length's share of it is known" in missing
+    assert (
+        "the travel of all three axes ([machine] travel_mm), without which no length's share of it is known" in missing
+    )
 
 
 def test_as_many_lengths_as_the_plan_asks_for_are_to_be_repeated_and_no_more() -> None:
