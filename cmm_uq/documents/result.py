@@ -24,6 +24,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.model import Estimate, MeasurementModel
 from cmm_uq.model.artefact import Artefact
+from cmm_uq.model.doubt import growth
 from cmm_uq.planning.advice import NextPlan, Suggestion
 from cmm_uq.points import Floats
 from cmm_uq.screening.screened import Finding
@@ -193,6 +194,14 @@ class Result:
         yield from self.sizes.items()
         yield "u_coordinate_um", self.noise.coordinate
         yield from self.accuracy.items()
+
+    @property
+    def relative_doubt(self) -> float:
+        """Standard uncertainty of the size of the artefact as a whole, over its size, by what is stated beside its sizes."""
+        along = growth(self.artefact)
+        if along is None:
+            return 0.0
+        return float(np.sqrt(Doubt.of(self.causes, along[None] / (along @ along)).variance(np.ones(1))))
 
     @property
     def averaged(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import hypot
 from typing import Any, cast
 
 from cmm_uq.documents.result import Result
@@ -79,6 +80,6 @@ def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | Text:
         return say("The length of the bar is not certified.")
     try:
         found = solve_distances((ends[:, 1] - ends[:, 0])[used], (size.nominal * bar.expansion)[used])
-        return replace(found, relative_length_u=size.sd / size.nominal)
+        return replace(found, relative_length_u=hypot(size.sd / size.nominal, result.relative_doubt))
     except CmmUqError as error:
         return refusal(error)

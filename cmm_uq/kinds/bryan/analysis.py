@@ -46,7 +46,7 @@ def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
     size = bar.sizes[0]
     return replace(
         solution, bias=np.array([*exact.scales_ppm, *exact.squareness_arcsec]) - true, open_scales=not size.certified,
-        relative_length_u=size.sd / size.nominal if size.certified else 0.0,
+        relative_length_u=float(np.hypot(size.sd / size.nominal, result.relative_doubt)) if size.certified else 0.0,
     )  # fmt: skip
 
 

@@ -43,6 +43,12 @@ def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
     else:
         told, results = plane_page.warnings(found), plane_shift_results(found)
     told += tuple(found.stating.warnings())
+    if found.job.circumstances.uncertainty.of_artefact:
+        told += (
+            say(
+                "What is stated of the artefact's temperature, expansion, alignment and fixturing is in no figure here."
+            ),
+        )
     warned = (*told, *formal_warnings(found.job))
     short = axis_page.summary(found, warned) if isinstance(found, ShiftResult) else plane_page.summary(found, warned)
     draws, table = posterior_file(found.draws, found.job.origin), table_file(found.job)

@@ -153,6 +153,7 @@ class TriangleFigures:
             return refusal(error)
         noise, dimensions = self.result.noise.coordinate, triangle.standard.u
         by_noise, known = solution.u(noise.value * MICROMETRE, 0 * dimensions), solution.u(0.0, dimensions)
+        known = np.hypot(known, solution.per_dimension @ triangle.standard.dimensions * self.result.relative_doubt)
         return tuple(
             ByEquations(
                 name,
