@@ -123,7 +123,20 @@ class ReferencedFacts(ArtefactFacts):
     nominal: bool = False
     """Whether the references in the recording are nominal only: their common scale then stays free."""
 
+    _largest_um: float | None = PrivateAttr(default=None)
     _covariances: tuple[tuple[int, ...], tuple[Floats, ...]] = PrivateAttr(default=((), ()))
+
+    def with_largest(self, u_um: float) -> Self:
+        """The same, of whose points by themselves at most this is stated: it holds for points of which nothing is."""
+        found = self.model_copy()
+        found._largest_um = u_um
+        return found
+
+    @property
+    def of_other_points(self) -> Self:
+        """What is stated of points of which nothing is stated by themselves, as those of a plan."""
+        by_points = self.u_um is None and self._largest_um is not None
+        return self.model_copy(update={"u_um": self._largest_um}) if by_points else self
 
     def with_covariances(self, numbers: Sequence[int], covariances: Sequence[Floats]) -> Self:
         """The same with the covariances that a digital certificate gives of its points.

@@ -14,7 +14,7 @@ from pydantic import create_model
 from cmm_uq.errors import CmmUqError, Gathered
 from cmm_uq.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.as_found import as_found_of
 from cmm_uq.jobs.conformity import Standards, clause_files, forms_of, needed, uncertainty_missing
 from cmm_uq.jobs.digitizer_calibration import calibration_file
@@ -193,7 +193,11 @@ def _certified_points(
     if recognised is not None:
         where = str(folder / recognised.file)
     unread = [heading for one in (*told, recognised) if one is not None for heading in one.unused]
-    return facts, with_uncertainties(points, artefact, where, unread), recognised
+    points = with_uncertainties(points, artefact, where, unread)
+    stated = [float(points.columns[name].max()) for name in OF_POINTS if name in points.columns]
+    if stated and isinstance(artefact, ReferencedFacts):
+        facts = facts.model_copy(update={"artefact": artefact.with_largest(max(stated))})
+    return facts, points, recognised
 
 
 def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path: Path) -> None:
@@ -283,6 +287,10 @@ def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile, Read | N
     facts = checked(
         content, source.toml, lambda data: _model_for(data, nameable, source.toml), nameable.standards, beside=beside
     )  # fmt: skip
+    places = says[0].places if says else None
+    if places is not None and isinstance(facts.artefact, ReferencedFacts):
+        largest = max(float(values.max()) for values in places.u.values())
+        facts = facts.model_copy(update={"artefact": facts.artefact.with_largest(largest)})
     return content, facts, says[0] if says else None
 
 

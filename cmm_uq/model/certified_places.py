@@ -62,7 +62,7 @@ class CertifiedPlaces:
             u = np.where(np.abs(places) <= _SAME_MM, 0.0, u)  # distances count from there
         rows, covariances = facts.covariances_at(points.point)
         if len(covariances) != count:
-            return cls(facts, places, u)
+            return cls(facts.of_other_points if u is None else facts, places, u)
         return cls(facts, places, u, tuple(MICROMETRE**2 * covariance for covariance in covariances), rows)
 
     @property

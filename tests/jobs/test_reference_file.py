@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from cmm_uq.commands.reading import job_of
 from cmm_uq.commands.simulate import simulated_job
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.job import Job
+from cmm_uq.kinds.gauge_lines.observe import StepGauge
 from tests.conftest import ROOT
 
 SAMPLES = ROOT / "docs" / "import" / "samples"
@@ -67,6 +69,17 @@ def test_the_uncertainty_of_every_face_is_u_over_the_factor_that_the_heading_say
     assert other.points.columns["reference_u_um"][3] == pytest.approx(0.16e-3 / 2.5, rel=1e-12)
     small = job(GAUGE, "certificate.csv", CERTIFICATE.replace("U (um) k=2", "u (µm)"))
     assert small.points.columns["reference_u_um"].tolist() == [0.10, 0.12, 0.14, 0.16] * 2
+
+
+def test_other_places_of_a_plan_have_the_largest_and_a_derived_recording_each_its_own() -> None:
+    toml = TOML.format(kind="step_gauge", file="certificate.csv").replace("u_um = 0.2\n", "")
+    files = {"job.toml": toml, "recording.csv": GAUGE, "certificate.csv": CERTIFICATE}
+    found = job_of({name: text.encode() for name, text in files.items()})
+    derived = simulated_job(found, {"seed": 1, "noise": {"coordinate_um": 1.0}})
+    assert derived.points.columns["reference_u_um"].tolist() == [0.05, 0.06, 0.07, 0.08] * 2
+    bare = {name: values for name, values in found.points.columns.items() if name != "reference_u_um"}
+    gauge = StepGauge(found.facts.artefact, replace(found.points, columns=bare))  # type: ignore[arg-type]
+    assert gauge.sizes[0].sd == pytest.approx(0.08e-3)
 
 
 @pytest.mark.parametrize(
