@@ -92,7 +92,7 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     worst = least_favourable(items)
     named = int(rows[items.index(worst)])
     remarks = [_uncertainty_in_words(worst, test.circumstances.uncertainty), _counted_in_words(items, worst)]
-    remarks += _again_in_words(items, again) + _unshown(test, found)
+    remarks += _others_in_words(test, found, rows) + _again_in_words(items, again) + _unshown(test, found)
     degrees = temperatures(found, artefact)
     budget = length_budget(
         float(found.lengths[named]), float(found.u[named]),
@@ -148,6 +148,7 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
         )
         if least > 0
         else NOT_STATED,
+        *_others_in_words(test, found, rows),
     ]
     quantity = say("range of repeated lengths, worst against its limit")
     return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats,
@@ -189,6 +190,23 @@ def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> Ints
     own = ~copied & (True if chosen is None else chosen(test.artefact, found))
     test.refuse_nothing_measured(bool(own.any()), "lengths of its own positions, tips and sizes")
     return np.flatnonzero(own)
+
+
+def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
+    """How many lengths of the recording are not decided for they belong to another test."""
+    copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
+    others = int((~copied).sum()) - len(rows)
+    if not others:
+        return []
+    one = say(
+        "{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
+        count=others,
+    )
+    many = say(
+        "{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
+        count=others,
+    )
+    return [plural(others, one=one, many=many)]
 
 
 def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
@@ -45,6 +46,15 @@ def test_the_whole_analysis_states_the_same(case: Case) -> None:
     found, alone = reported(case.files()), decided(case.files())
     assert found.outcome == case.right.outcome, case.why
     assert (found.errors, found.missing) == (alone.errors, alone.missing)
+
+
+def test_lengths_of_another_test_are_counted_beside_those_decided() -> None:
+    """Of seven lines U1 decides three, 5 lengths thrice; the 60 lengths of the space diagonals are none of it."""
+    case = next(case for case in CASES if case.base[0] == "step gauge, seven lines")
+    job = 'conformity.standard = "VDI/VDE 2617-2.1"; conformity.characteristic = "U1"'
+    found = decided(replace(case, recording="", job=job).files())
+    assert (found.outcome, len(found.errors)) == ("pass", 45)
+    assert any(str(text).startswith("60 lengths recorded beside them") for text in found.remarks)
 
 
 def test_thirty_are_taken_through_the_whole_analysis() -> None:
