@@ -183,7 +183,12 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
 
 def _travel(facts: JobFile) -> Text:
     travel = [
-        say("{axis} {low} … {high}", axis=Verbatim(axis.upper()), low=nominal(given[0]), high=nominal(given[1]))
+        say(
+            "{axis}\u00a0{low}\u00a0…\u00a0{high}",
+            axis=Verbatim(axis.upper()),
+            low=nominal(given[0]),
+            high=nominal(given[1]),
+        )
         for axis in "xyz"
         if (given := getattr(facts.machine.travel_mm, axis))
     ]

@@ -17,6 +17,7 @@ from cmm_uq.documents.completeness import formal_warnings
 from cmm_uq.documents.document import Decision, Document, Facts, Plot, Signature, Table
 from cmm_uq.documents.html import render_html
 from cmm_uq.documents.pdf import render_pdf
+from cmm_uq.messages import Verbatim
 from tests.documents.test_completeness import changed
 from tests.kinds.simulated import analysed
 
@@ -199,6 +200,14 @@ def test_the_first_page_has_the_picture_and_no_other_has_it_again() -> None:
     assert "±MPE" in plot.caption
     again = [b for section in made.sections if not section.first for b in section.blocks if isinstance(b, Plot)]
     assert plot.svg not in [one.svg for one in again]
+
+
+def test_a_number_is_not_broken_at_the_end_of_a_line(document: Document) -> None:
+    """A customer's order beside words that fill its line in the narrow column of particulars."""
+    orders = Facts(tuple((Verbatim("Order"), Verbatim("w" * n + " CAL-2024-0117-DIM")) for n in range(1, 24)))
+    made = replace(document, particulars=(orders, orders), language="fr")
+    text = PdfReader(io.BytesIO(render_pdf(made, {}))).pages[0].extract_text()
+    assert text.count("CAL-2024-0117-DIM") >= 2 * 23
 
 
 def test_a_certificate_without_a_statement_shows_its_figures_first() -> None:
