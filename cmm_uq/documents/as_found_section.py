@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from cmm_uq.conformity.accuracy import TITLES
-from cmm_uq.conformity.statement import Statement
 from cmm_uq.documents.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.documents.result import Result
+from cmm_uq.documents.summary import subject_of
 from cmm_uq.documents.wording import OUTCOME_WORDS, expanded, title_of
 from cmm_uq.jobs.as_found import Figure
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import Verdict
 from cmm_uq.messages import NOTHING, Text, Verbatim, day, say
 from cmm_uq.uncertainty.quantity import Quantity
 
@@ -19,13 +20,13 @@ Left = tuple[str, str, Text, Quantity]
 """Group and name of a quantity in results.json, its title, and what it is now."""
 
 
-def as_found_section(job: Job, left: Iterable[Left], statements: Iterable[Statement] = ()) -> Section:
+def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict] = ()) -> Section:
     """Every quantity and every decision of both, side by side; without blocks where the job names nothing as found.
 
     Parameters
     ----------
     left : quantities as left; the group of the figures of the lengths is ``accuracy``.
-    statements : of conformity, as left.
+    verdicts : what is stated of conformity, as left.
     """
     title, found = say("As found and as left"), job.as_found
     if found is None:
@@ -48,12 +49,8 @@ def as_found_section(job: Job, left: Iterable[Left], statements: Iterable[Statem
         note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
         blocks.append(Table(say("The machine as found and as left"), heads, rows, (note,)))
     decided = tuple(
-        (
-            say("{standard}, {what}", standard=Verbatim(now.facts.standard), what=Verbatim(now.characteristic)),
-            _outcome(before.decision), _outcome(now.outcome),
-        )
-        for now in statements for before in found.conformity
-        if (before.standard, before.characteristic) == (now.facts.standard, now.characteristic)
+        (subject_of(now), _outcome(before.outcome), _outcome(now.outcome))
+        for now in verdicts for before in found.stated if (before.by, before.name) == (now.by, now.name)
     )  # fmt: skip
     if decided:
         columns = tuple(Column(one, numeric=False) for one in (say("Statement"), say("As found"), say("As left")))

@@ -75,7 +75,7 @@ def _ordered(result: Result, own: list[Section]) -> list[Section]:
     The results of an artefact without lengths are the error factors, and without these the first of the kind's own sections.
     """
     figures, factors, decided = performance(result), error_factors(result), conformity_section(result.statements)
-    before = as_found_section(result.job, quantities_left(result), result.statements)
+    before = as_found_section(result.job, quantities_left(result), result.verdicts)
     rests_on = traceability(result)
     if figures.blocks:
         return [figures, decided, before, factors, rests_on, *own]

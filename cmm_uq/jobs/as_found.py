@@ -5,13 +5,14 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.origin import Origin
 from cmm_uq.jobs.results_named import Part, read_results
+from cmm_uq.jobs.verdicts import Verdicts
 
 KEY = "[job] as_found"
 
@@ -54,7 +55,14 @@ class AsFound(Part):
     estimates: dict[str, dict[str, Figure]]
     accuracy_uncertainty: dict[str, Figure] = {}
     conformity: list[Found] = []
+    tolerances: dict[str, dict[str, float | str]] = {}
+    verdicts: dict[str, Any] | None = None
     identifiability: _Identifiability = _Identifiability()
+
+    @property
+    def stated(self) -> Verdicts:
+        """All that it states of conformity."""
+        return Verdicts.of_results(self.model_dump())
 
     def figure(self, group: str, name: str) -> Figure | None:
         """An estimate, or of the group ``accuracy`` a figure of the lengths; ``None`` where nothing determined it."""

@@ -12,6 +12,7 @@ import pytest
 
 from cmm_uq.commands.reading import read_job
 from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.derived_job import derived_toml
 
 FOUND: dict[str, Any] = {
@@ -78,3 +79,12 @@ def test_a_derived_recording_was_never_adjusted_and_agrees_on_nothing(job: Path)
     told = tomllib.loads(derived_toml(replace(read, inputs={**read.inputs, "job.toml": text}), "simulate", {}).decode())
     assert told["job"].keys().isdisjoint({"as_found", "recalibration_agreed"})
     assert told["job"]["place"] == read.facts.job.place
+
+
+def test_what_was_found_by_tolerances_is_stated_too() -> None:
+    found = AsFound.model_validate_json(
+        json.dumps(FOUND | {"tolerances": {"scale_x": {"ppm": 25.0, "verdict": "out"}}})
+    )
+    assert [(one.called, one.outcome) for one in found.stated] == [
+        ("ASME B89.4.1-1997 volumetric performance", "fail"), ("scale_x.ppm", "fail"),
+    ]  # fmt: skip

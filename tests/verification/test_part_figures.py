@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.verification.again import beyond_sampling, differences
+from cmm_uq.verification.consistent import check_verdicts
 from cmm_uq.verification.found import Inquiry
 from cmm_uq.verification.html_page import read_html
 from cmm_uq.verification.part_decided import check_part_decisions
@@ -42,6 +43,7 @@ def places(check: Any, found: dict[str, Any]) -> list[str]:
 def test_the_figures_of_a_report_agree() -> None:
     assert not places(check_part_figures, data())
     assert not places(check_part_decisions, data())
+    assert not places(check_verdicts, data())
 
 
 @pytest.mark.parametrize(("path", "value", "place"), [
