@@ -1,7 +1,8 @@
 """Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
 
 A reading that misses the artefact by more than any machine's error spoils an estimate and is left out of it. For a decision it
-is a value outside: the machine, or whoever worked at it, indicated it. Copies alone are no measurements.
+is a value outside: the machine, or whoever worked at it, indicated it. Copies of a whole (measurement, repeat) alone are no
+measurements.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from cmm_uq.model.artefact import Artefact, Forms, Indications
 from cmm_uq.model.kind import Observed
 from cmm_uq.points import Floats, Ints, Points
 from cmm_uq.screening.finding import Finding
-from cmm_uq.screening.screened import COPIES, REVERSED, with_sound_sensors
+from cmm_uq.screening.screened import REVERSED, with_sound_sensors
 
 _NAMED = 5
 """Findings, or gaps of a numbering, that are named one by one."""
@@ -58,9 +59,9 @@ class LeftOut:
         findings : of the screening, whose rows are those of the recording.
         observe : makes the artefact of points.
         """
-        lost = _rows(recording, findings)
-        measured = ~_rows(recording, [f for f in findings if f.kind in COPIES])
-        damaged = tuple(f for f in findings if f.rows and f.kind not in (*COPIES, REVERSED))
+        lost, copied = _rows(recording, findings), np.isin(recording.group, list(recording.copies))
+        measured = ~(lost & copied)
+        damaged = tuple(f for f in findings if f.kind != REVERSED and any(not copied[row] for row in f.rows))
         points, outside = with_sound_sensors(recording, findings).select(measured), _rows(recording, damaged)[measured]
         artefact = None
         for xyz in (points.xyz, _of_other_repeats(points, outside)) if np.any(lost & measured) else ():

@@ -33,9 +33,6 @@ __all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeat
 GROSS = 1e-3
 """Probability, over all observations together, that noise alone makes one look like an outlier."""
 
-COPIES = ("duplicate", "repeated block")
-"""Kinds of findings whose rows are no measurements."""
-
 REVERSED = "reversed"
 """Kind of a finding whose rows are sound, but not what was recorded beside them."""
 

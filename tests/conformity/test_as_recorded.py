@@ -305,3 +305,16 @@ def test_a_temperature_that_cannot_be_trusted_is_not_taken_for_20_degrees() -> N
     found = decided(with_columns(points, temp_artefact_c=temperatures), STEP_GAUGE, **ISO)
     assert found.outcome == "incomplete"
     assert any("temperature" in text for text in found.missing)
+
+
+def test_a_face_found_exactly_where_another_lies_is_outside_and_no_copy() -> None:
+    """The face at 20 mm found at 0, to the last digit, in all three repeats; six lengths, so that five remain."""
+    lengths = [[*recorded.five(line), recorded.five(line)[1] + 30] for line in recorded.SEVEN]
+    points = recorded.gauge(lengths=lengths).points
+    xyz = points.xyz.copy()
+    for repeat in (1, 2, 3):
+        first, second = (rows(points, measurement=7, repeat=repeat, point=point) for point in (1, 2))
+        xyz[second] = xyz[first]
+    found = decided(points.at(xyz), STEP_GAUGE, **ISO)
+    assert found.finding == "fail"
+    assert [item.error_um for item in found.errors if item.set_aside] == pytest.approx([-2e4] * 3)
