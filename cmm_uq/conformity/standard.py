@@ -23,7 +23,7 @@ from cmm_uq.conformity.rated import rated_conditions, rated_in_words
 from cmm_uq.conformity.risk import Known, Risks, global_risks
 from cmm_uq.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.conformity.statement import Decided, Statement, counted, least_favourable
-from cmm_uq.conformity.uncertainty_lines import declared_in_words, uncertainty_conditions, with_declared
+from cmm_uq.conformity.uncertainty_lines import FORM_LINES, declared_in_words, uncertainty_conditions, with_declared
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
@@ -147,7 +147,7 @@ class Standard:
         if wish.rule == "simple":
             return None
         asked = self.characteristic(wish.characteristic)
-        if asked.lines and all(stated.declared(line) for line in asked.lines):
+        if asked.lines and asked.lines != FORM_LINES and all(stated.declared(line) for line in asked.lines):
             return None
         if asked.needs is not None and not (
             getattr(stated, asked.needs) or stated.u_temperature_k or stated.u_fixturing_um

@@ -43,12 +43,11 @@ _NAMES = {
 def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
     """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
     found: list[Condition] = []
-    stated = under.uncertainty
     for line in lines:
         met = {"calibration": _calibrated, "repeat": _repeats}.get(line, _stated)
         if not met(line, artefact, under):
             found.append(_neither(line))
-    if "form" in lines and not stated.declared("form") and not _form_of_sphere(artefact):
+    if "form" in lines and not _form_of_sphere(artefact):
         found.append(
             _lacks(say("uncertainty: the form deviation of the test sphere is not stated"), "form_um in [artefact]")
         )

@@ -62,7 +62,7 @@ class NegligibleLines(Table):
     fixturing: Declared | None = None
     """Fixturing of the artefact."""
     form: Declared | None = None
-    """Form deviation of a test sphere, and its calibration."""
+    """Calibration of the form deviation of a test sphere."""
     repeat: Declared | None = None
     """What of the artefact changes between repeated readings."""
 

@@ -157,9 +157,9 @@ class ConformityFacts(Table):
         """A table has L/K; a K of K·L read so would let nearly any error pass."""
         given = data.get("mpe") if isinstance(data, dict) else None
         k = given.get("k") if isinstance(given, dict) else None
-        if isinstance(k, (int, float)) and not isinstance(k, bool) and k > 0:
+        if isinstance(k, (int, float)) and not isinstance(k, bool):
             guideline = str(data.get("standard", "")).startswith("VDI")
-            if k < (FLATTEST if guideline else 1.0):
+            if 1e-3 <= k < (FLATTEST if guideline else 1.0):
                 raise ValueError(
                     f"mpe k = {k:g} means L/{k:g}, which is {1000 / k:.4g} µm in a metre; the K of A + K·L is meant "
                     f'otherwise: write mpe = "A + L/{k:g}", "A + {k:g}·L/1000" or "A + {k:g}·L", L in mm and the error in µm'

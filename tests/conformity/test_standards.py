@@ -27,7 +27,7 @@ from tests.recordings import bar_facts
 ISO_2, ISO_5, B89 = "ISO 10360-2:2009", "ISO 10360-5:2010", "ASME B89.4.1-1997"
 MPE = MaximumPermissibleError(a_um=2.5, k=300.0)
 GUARDED: list[Rule] = ["ISO 14253-1", GuardBand(guard_band=1.0), FalseAccept(max_false_accept=0.02)]
-TRAVEL_KEY = "[machine] travel_mm of all three axes"
+TRAVEL_KEY = "the travel of all three axes ([machine] travel_mm)"
 
 
 def judged(

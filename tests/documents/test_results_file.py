@@ -87,7 +87,9 @@ def test_a_statement_has_all_that_was_decided_and_all_that_is_missing(data: dict
     compensated = data["job"]["id"].endswith("-compensated")
     assert (found["characteristic"], found["scope"]) == ("volumetric performance", "partial")
     assert found["decision"] == ("undecided" if compensated else "fail")
-    assert found["missing"] == ["1 of 20 positions: 19 distinct, measurement 18 is a copy of 14"]
+    assert found["missing"][0] == "1 of 20 positions: 19 distinct, measurement 18 is a copy of 14"
+    assert found["missing"][1].startswith("uncertainty: what of the artefact changes between the readings")
+    assert "u_repeat_um in [test_uncertainty]" in found["missing"][1]
     (entry,) = found["errors"]
     assert (entry["error_um"], entry["u_um"], entry["limit_um"]) == (
         found["value_um"],
