@@ -259,6 +259,10 @@ def _longest(
         for one in held
         for stated, unit in zip(one.uncertainties, one.units, strict=True)
     )
+    every = [stated.u is not None for one in held for stated in one.uncertainties]
+    if any(every) and not all(every):
+        raise CmmUqError("states an uncertainty of some of its points and none of others", where=where,
+                         fix="Ask the laboratory for all, or give the values as a CSV with U_um in [artefact]")  # fmt: skip
     if given.get("nominal") or not known:
         return {}, None
     places = _places(found.columns.get("point"), wanted, held)

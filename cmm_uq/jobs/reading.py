@@ -192,7 +192,8 @@ def _certified_points(
         facts = facts.model_copy(update={"artefact": artefact})
     if recognised is not None:
         where = str(folder / recognised.file)
-    unread = [heading for one in (*told, recognised) if one is not None for heading in one.unused]
+    read = (recognised,) if recognised is not None else told
+    unread = [heading for one in read if one is not None for heading in one.unused]
     points = with_uncertainties(points, artefact, where, unread)
     stated = [float(points.columns[name].max()) for name in OF_POINTS if name in points.columns]
     if stated and isinstance(artefact, ReferencedFacts):

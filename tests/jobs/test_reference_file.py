@@ -82,6 +82,16 @@ def test_other_places_of_a_plan_have_the_largest_and_a_derived_recording_each_it
     assert gauge.sizes[0].sd == pytest.approx(0.08e-3)
 
 
+def test_an_uncertainty_in_an_export_of_measured_points_is_none_of_certified_ones() -> None:
+    """An export may say how well a point was measured; without certified values beside it that is left out, and said."""
+    export = "Measurement;Point;X [mm];Y [mm];Z [mm];U (µm)\n" + "".join(
+        f"{m};{p};{20.001 * (p - 1)};{m}.0;0.0;0.9\n" for m in (1, 2) for p in (1, 2, 3, 4)
+    )
+    found = job(export, "certificate.csv", CERTIFICATE)
+    assert found.points.columns["reference_u_um"].tolist() == [0.05, 0.06, 0.07, 0.08] * 2
+    assert found.imported[0].data["uncertainties_not_used"] == "U (µm)"
+
+
 @pytest.mark.parametrize(
     ("heading", "message"),
     [

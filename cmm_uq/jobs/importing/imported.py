@@ -17,7 +17,7 @@ from cmm_uq.jobs.importing.registry import format_of
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.units import length_named
 from cmm_uq.jobs.importing.wanted import POINTS, REFERENCES
-from cmm_uq.messages import Verbatim, say
+from cmm_uq.messages import Verbatim, commas, names, say
 from cmm_uq.points import Floats, Ints
 
 _UNIT_LINE = re.compile(
@@ -56,7 +56,21 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
     ------
     CmmUqError : it is of no known format, damaged or hostile, or can be read in two ways that no key settles.
     """
-    return _read(content, where, keys, POINTS, reach_mm)
+    found = _read(content, where, keys, POINTS, reach_mm)
+    own = [name for name in found.columns if name.startswith("reference_u_") or name == "reference_U_um"]
+    others = [name for name in own if found.recognised.columns[name] != name and name not in keys.columns]
+    if not others or any(name.startswith("reference_") and name.endswith("_mm") for name in found.columns):
+        return found
+    unused = commas(
+        names([found.recognised.columns[name] for name in others])
+    )  # of the measured point, not of a certificate
+    told = found.recognised
+    recognised = replace(
+        told, columns={name: heading for name, heading in told.columns.items() if name not in others},
+        facts=(*told.facts, Fact("uncertainties_not_used", say("Uncertainties not used"), unused)),
+    )  # fmt: skip
+    columns = {name: values for name, values in found.columns.items() if name not in others}
+    return replace(found, columns=columns, recognised=recognised)
 
 
 def imported_references(content: bytes, where: str, keys: FileKeys) -> Imported:
