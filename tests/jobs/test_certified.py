@@ -40,6 +40,7 @@ def files(kind: str, certificate: Certificate, /, **artefact: Any) -> dict[str, 
     """An example whose artefact is certified by a DCC alone, with these keys beside; ``None`` takes one out."""
     folder = ROOT / "examples" / EXAMPLE[kind]
     data = tomllib.loads((folder / "job.toml").read_text(encoding="utf-8"))
+    data.pop("test_uncertainty", None)  # what a simulation declares of its artefact
     left = {key: held for key, held in data["artefact"].items() if key not in (*STATED.get(kind, ()), "name")}
     chain = {"file": "artefact.xml", **artefact.pop("certificate", {})}
     held = {**left, **artefact, "certificate": chain}
