@@ -6,6 +6,7 @@ Every quantity is decided by the package's own rules (:mod:`cmm_uq.conformity`),
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from math import isclose
 from typing import Any
 
@@ -74,19 +75,20 @@ def _entry(entry: Mapping[str, Any]) -> Iterator[Wrong]:
     if not errors:
         yield ".errors", "holds nothing that was decided", "", ""
         return
-    found, signed = _best(errors, rule, prior)
+    unstated = any(text.startswith("uncertainty: ") for text in entry["missing"])
+    found, signed = _best(errors, rule, prior, unstated=unstated)
     for i, (error, decided) in enumerate(zip(errors, found, strict=True)):
         for key, problem, stands, should in _error(error, decided, entry):
             yield f".errors[{i}].{key}", problem, stands, should
     yield from _whole(entry, found, signed, prior)
 
 
-def _best(errors: list[Any], rule: Rule, prior: Any) -> tuple[list[Decided], bool]:
+def _best(errors: list[Any], rule: Rule, prior: Any, *, unstated: bool) -> tuple[list[Decided], bool]:
     """Decided with limits on both sides of zero, or on one: whichever agrees with what is said; a sign asks for both."""
-    both = [_decided(error, rule, prior, signed=True) for error in errors]
+    both = [_decided(error, rule, prior, signed=True, unstated=unstated) for error in errors]
     if any(error["error_um"] < 0 for error in errors) or _wrong_in(errors, both) == 0:
         return both, True
-    one = [_decided(error, rule, prior, signed=False) for error in errors]
+    one = [_decided(error, rule, prior, signed=False, unstated=unstated) for error in errors]
     return (one, False) if _wrong_in(errors, one) < _wrong_in(errors, both) else (both, True)
 
 
@@ -99,9 +101,12 @@ def _wrong_in(errors: list[Any], found: list[Decided]) -> int:
     )  # fmt: skip
 
 
-def _decided(error: Mapping[str, Any], rule: Rule, prior: Any, *, signed: bool) -> Decided:
+def _decided(error: Mapping[str, Any], rule: Rule, prior: Any, *, signed: bool, unstated: bool) -> Decided:
+    """What follows; a nonconformity that would be proved were the uncertainty whole may be undecided where it is not."""
     value, u, limit = error["error_um"], error["u_um"], error["limit_um"]
     decision: Decision = decide(value, u, limit, rule, signed=signed, prior=_known(prior, limit))
+    if unstated and (decision.outcome, error["outcome"]) == ("fail", "undecided"):
+        decision = replace(decision, outcome="undecided")
     return Decided(value, u, limit, decision, error["measurement"], error["repeat"], error["length_mm"],
                    standing=error["standing"], set_aside=error.get("set_aside", False))  # fmt: skip
 
