@@ -216,18 +216,21 @@ def contradictions(
         averaged.mean(axis=0),
     )
     lines: dict[int, list[tuple[float, float, Contradiction]]] = {}
+    along_axis = (1 - 2 * ALIGNED**2) * PPM
     for number, weights in _lines(model, along[model.used], linear.freedoms):
         slope = weights @ linear.design
+        spoken = [i for i in np.flatnonzero(np.abs(slope) >= along_axis).tolist() if linear.unknowns[i].unit == "ppm"]
+        if not spoken:
+            continue
         left = float(weights @ linear.observed - slope @ mean)
         expected = float(expanded_of(averaged @ slope, slope @ mean))
         u, U = uncertainty_of_sum(components, sizes, weights)
-        for i in np.flatnonzero(np.abs(slope) >= (1 - 2 * ALIGNED**2) * PPM):
-            if (unknown := linear.unknowns[i]).unit == "ppm":
-                off, wide = left / slope[i], np.array([u, U]) / abs(slope[i])
-                value = float(mean[i] + off)
-                alone = Quantity(value, float(wide[0]), (value - float(wide[1]), value + float(wide[1])), unknown.unit)
-                own = float(np.hypot(expected / slope[i], wide[1]))
-                lines.setdefault(int(i), []).append((abs(off), own, Contradiction(unknown.key, number, alone)))
+        for i in spoken:
+            off, wide = left / slope[i], np.array([u, U]) / abs(slope[i])
+            value, unknown = float(mean[i] + off), linear.unknowns[i]
+            alone = Quantity(value, float(wide[0]), (value - float(wide[1]), value + float(wide[1])), unknown.unit)
+            own = float(np.hypot(expected / slope[i], wide[1]))
+            lines.setdefault(i, []).append((abs(off), own, Contradiction(unknown.key, number, alone)))
     found = []
     for each in lines.values():
         factor = float(special.ndtri(0.5 + 0.5 * 0.95 ** (1 / len(each))) / special.ndtri(0.975))

@@ -29,7 +29,8 @@ def causes_of(artefact: Artefact, circumstances: Circumstances) -> tuple[Cause, 
     set_up, excess = artefact.measurement, np.zeros(len(along))
     if (recorded := artefact.points.columns.get("temp_artefact_c")) is not None:
         excess = recorded[artefact.rows].mean(axis=1) - REFERENCE_TEMPERATURE
-    part = along / longest_lengths(artefact) * MICROMETRE
+    of_length = stated.u_alignment_um or stated.u_fixturing_um
+    part = along / longest_lengths(artefact) * MICROMETRE if of_length else np.zeros(len(along))
     changes = (
         (say("temperature of the artefact"), stated.u_temperature_k * (circumstances.cte_per_k or 0.0) * along),
         (say("alignment of the artefact"), stated.u_alignment_um * part),
