@@ -23,7 +23,13 @@ from cmm_uq.conformity.rated import rated_conditions, rated_in_words
 from cmm_uq.conformity.risk import Known, Risks, global_risks
 from cmm_uq.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.conformity.statement import Decided, Statement, counted, least_favourable
-from cmm_uq.conformity.uncertainty_lines import FORM_LINES, declared_in_words, uncertainty_conditions, with_declared
+from cmm_uq.conformity.uncertainty_lines import (
+    FORM_LINES,
+    all_stated,
+    declared_in_words,
+    uncertainty_conditions,
+    with_declared,
+)
 from cmm_uq.errors import CmmUqError
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
@@ -237,10 +243,14 @@ class Test:
         if u_um <= 0 and self.answered and needs_uncertainty(self.facts.rule):
             simple = decide(value_um, 0.0, limit_um, "simple", signed=signed)
             return replace(simple, rule=rule_words(self.facts.rule))
-        unstated = float(np.hypot(limit_um, self._uncorrected_um)) if self.unstated else 0.0
+        unstated = 0.0 if self._all_stated else float(np.hypot(limit_um, self._uncorrected_um))
         return decide(
             value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um), unstated=unstated
         )
+
+    @cached_property
+    def _all_stated(self) -> bool:
+        return all_stated(self.characteristic.lines, self.recorded, self.circumstances)
 
     @cached_property
     def _uncorrected_um(self) -> float:

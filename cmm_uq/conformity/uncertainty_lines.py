@@ -42,11 +42,7 @@ _NAMES = {
 
 def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
     """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
-    found: list[Condition] = []
-    for line in lines:
-        met = {"calibration": _calibrated, "repeat": _repeats}.get(line, _stated)
-        if not met(line, artefact, under):
-            found.append(_neither(line))
+    found = [_neither(line) for line in lines if not _met(line, artefact, under)]
     if "form" in lines and not _form_of_sphere(artefact):
         found.append(
             _lacks(say("uncertainty: the form deviation of the test sphere is not stated"), "form_um in [artefact]")
@@ -54,6 +50,16 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
     if "expansion" in lines:
         found += _thermal(artefact, under)
     return tuple(found)
+
+
+def all_stated(lines: Collection[str], artefact: Artefact, under: Circumstances) -> bool:
+    """Whether the job says of every line how large it is, whatever was recorded."""
+    expansion = "expansion" not in lines or bool(under.cte_per_k or under.uncertainty.declared("expansion"))
+    return expansion and all(_met(line, artefact, under) for line in lines)
+
+
+def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    return {"calibration": _calibrated, "repeat": _repeats}.get(line, _stated)(line, artefact, under)
 
 
 def u_of_repeats(length_mm: float, under: Circumstances) -> float:
