@@ -82,6 +82,7 @@ def _one(
         return None
     test = [i for i in rows if (items[i].repeat or 0) in repeats[: again.repeats]]
     outside = [i for i in test if items[i].outcome in not_inside]
-    if not 1 <= len({items[i].repeat for i in outside}) <= again.outside:
+    beyond = [i for i in test if abs(items[i].error_um) > items[i].limit_um]  # proved or not
+    if not outside or len({items[i].repeat for i in (*outside, *beyond)}) > again.outside:
         return None
     return outside, [i for i in rows if i not in test]
