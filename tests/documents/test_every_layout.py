@@ -270,7 +270,8 @@ def together(document: Document, pages: list[str]) -> None:
             assert set.intersection(*(pages_of(label) for label, _ in block.rows)), block
     results = [section for section in document.sections if not section.opinion]
     if document.statements:
-        assert pages_of(document.statements[0]) & pages_of(last_words(results[-1].blocks[-1]))
+        last = document.subject if document.decides else last_words(results[-1].blocks[-1])
+        assert pages_of(document.statements[0]) & pages_of(last)
         assert pages_of(document.statements[0]) == pages_of(document.statements[-1])
         assert all(pages_of(one.name) & pages_of(document.statements[-1]) for one in document.signatures)
     end = pages_of(document.end + document.number) or pages_of(document.end)
