@@ -86,6 +86,6 @@ def start(marginal: Marginal) -> tuple[Floats, Floats]:
     d = marginal.noise.dimension
     dof = max(marginal.estimate.degrees_of_freedom, 1)
     centre = np.zeros(d)
-    sigma = np.log(max(marginal.estimate.sigma, 2e-6, 4 * marginal.noise.least)) - (0.5 if d > 1 else 0.0)
+    sigma = np.log(max(marginal.estimate.sigma, 2e-6, marginal.noise.display / 5)) - (0.5 if d > 1 else 0.0)
     centre[0] = max(sigma, np.log(marginal.noise.known) + 1 / np.sqrt(2 * dof)) if marginal.noise.known else sigma
     return centre, np.diag([1 / np.sqrt(2 * dof) + (0.7 if d > 1 else 0.0), *np.ones(d - 1)])
