@@ -81,7 +81,8 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Aga
     items = tuple(
         Decided(
             float(errors[i]), float(causes.u[i]), float(limits[i]),
-            test.decide(float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True),
+            test.decide(float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True,
+                        length_mm=float(found.lengths[i])),
             int(points.measurement[first[i]]), int(points.repeat[first[i]]), float(found.lengths[i]), position[i],
             set_aside=bool(aside[i]),
         )
@@ -132,8 +133,8 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
         limit = float(test.limits_um(np.array([length]))[0])
         known = test.at_least(u_of_repeats(length, test.circumstances), length)
         items.append(Decided(
-            value, known, limit, test.decide(value, known, limit, signed=False), int(key[0]), None, length,
-            position[own[0]], set_aside=bool(aside[own].any()),
+            value, known, limit, test.decide(value, known, limit, signed=False, length_mm=length), int(key[0]), None,
+            length, position[own[0]], set_aside=bool(aside[own].any()),
         ))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of lengths")
     remarks = [

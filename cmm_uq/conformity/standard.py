@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
@@ -25,8 +25,8 @@ from cmm_uq.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.conformity.statement import Decided, Statement, counted, least_favourable
 from cmm_uq.conformity.uncertainty_lines import (
     FORM_LINES,
-    all_stated,
     declared_in_words,
+    u_of_unstated,
     uncertainty_conditions,
     with_declared,
 )
@@ -41,9 +41,6 @@ from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.quantity import Quantity
 from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
-
-LARGEST_EXPANSION = 25e-6
-"""1/K; of what gauges are made of, aluminium expands most."""
 
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
@@ -234,33 +231,33 @@ class Test:
         """Whether an uncertainty of nought is one that somebody answers for, and not an unknown one."""
         return bool(self.characteristic.lines) and not self.unstated
 
-    def decide(self, value_um: float, u_um: float, limit_um: float, *, signed: bool) -> Decision:
+    def decide(
+        self, value_um: float, u_um: float, limit_um: float, *, signed: bool, length_mm: float | None = None
+    ) -> Decision:
         """One value by the rule and the prior of the job.
 
         Where all lines of the uncertainty are declared negligible every rule comes to simple acceptance. Where some are
-        unknown, they are taken to be as large as the limit before anything is proved to be beyond it.
+        unknown, what they may well be of the length (of the artefact's size by default) counts before anything is proved to
+        be beyond the limit.
         """
         if u_um <= 0 and self.answered and needs_uncertainty(self.facts.rule):
             simple = decide(value_um, 0.0, limit_um, "simple", signed=signed)
             return replace(simple, rule=rule_words(self.facts.rule))
-        unstated = 0.0 if self._all_stated else float(np.hypot(limit_um, self._uncorrected_um))
+        length = self.artefact.sizes[0].nominal if length_mm is None else length_mm
         return decide(
-            value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um), unstated=unstated
-        )
+            value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um),
+            unstated=self._u_of_unstated(length),
+        )  # fmt: skip
 
     @cached_property
-    def _all_stated(self) -> bool:
-        return all_stated(self.characteristic.lines, self.recorded, self.circumstances)
+    def _u_of_unstated(self) -> Callable[[float], float]:
+        """Standard uncertainty, µm, that what is not stated may well have, of a length in mm."""
 
-    @cached_property
-    def _uncorrected_um(self) -> float:
-        """What of the longest length's expansion may not be corrected, µm: of one whose coefficient is not stated."""
-        recorded = self.recorded.points.columns.get("temp_artefact_c")
-        found = self.recorded.indications()
-        if self.circumstances.cte_per_k is not None or recorded is None or found is None:
-            return 0.0
-        away = float(np.abs(recorded - REFERENCE_TEMPERATURE).max())
-        return float(found.lengths.max()) / MICROMETRE * away * LARGEST_EXPANSION
+        @cache
+        def of(length_mm: float) -> float:
+            return u_of_unstated(self.characteristic.lines, self.recorded, self.circumstances, length_mm)
+
+        return of
 
     def least_u(self, lengths_mm: Floats) -> Floats:
         """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.

@@ -29,6 +29,12 @@ SIZE_LINES = LENGTH_LINES[:3]
 FORM_LINES = ("form",)
 REPEAT_LINES = ("repeat",)
 
+UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
+"""What a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others."""
+
+STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6
+"""1/K; of what gauges are made of, aluminium expands most."""
+
 _NAMES = {
     "calibration": say("calibration of the artefact"),
     "expansion": say("expansion coefficient of the artefact"),
@@ -52,10 +58,23 @@ def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Ci
     return tuple(found)
 
 
-def all_stated(lines: Collection[str], artefact: Artefact, under: Circumstances) -> bool:
-    """Whether the job says of every line how large it is, whatever was recorded."""
-    expansion = "expansion" not in lines or bool(under.cte_per_k or under.uncertainty.declared("expansion"))
-    return expansion and all(_met(line, artefact, under) for line in lines)
+def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstances, length_mm: float) -> float:
+    """Standard uncertainty, µm, that the lines of a length which are neither stated nor declared may well have.
+
+    It counts before a value is called nonconforming, and for nothing else: the figures are this project's, and larger than a
+    laboratory that controls its temperature has. An expansion of which no coefficient is stated was not corrected at all.
+    """
+    recorded = artefact.points.columns.get("temp_artefact_c")
+    away = 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max())
+    per_length = {
+        "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
+        "expansion": away * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
+    }
+    missing = {line for line in lines if not _met(line, artefact, under)}
+    if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):
+        missing.add("expansion")
+    each = [per_length[line] * length_mm / MICROMETRE if line in per_length else UNSTATED_UM for line in missing]
+    return float(np.linalg.norm(each)) if each else 0.0
 
 
 def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:

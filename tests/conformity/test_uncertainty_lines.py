@@ -11,6 +11,7 @@ import pytest
 
 from cmm_uq.conformity.standards import statement
 from cmm_uq.conformity.statement import Statement
+from cmm_uq.conformity.uncertainty_lines import LENGTH_LINES, u_of_unstated
 from cmm_uq.jobs.circumstances import Circumstances, NegligibleLines, RatedConditions, TestUncertainty
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.kinds import artefact_facts
@@ -162,17 +163,37 @@ def test_a_length_with_one_repeat_has_no_range_and_is_named() -> None:
 # --- nothing left out improves the finding ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("left_out", ["u_cte_per_k", "u_temperature_k", "u_alignment_um", "u_fixturing_um"])
-def test_by_iso_14253_1_a_line_that_is_not_stated_makes_no_fail(left_out: str) -> None:
-    """What is not stated may be as large as the limit: 11.5 of 10 µm is undecided, 40 µm fails whatever it is."""
-    stated = under(**{left_out: {"u_cte_per_k": 1e-3, "u_temperature_k": 0.5}.get(left_out, 3.0)})
-    for error, outcome in ((11.5, "undecided"), (40.0, "fail")):
+@pytest.mark.parametrize(
+    ("line", "most"), [("u_cte_per_k", 1e-6), ("u_temperature_k", 0.3), ("u_alignment_um", 1.0), ("u_fixturing_um", 1.0)]
+)
+def test_by_iso_14253_1_a_line_that_is_not_stated_makes_no_fail(line: str, most: float) -> None:
+    """Stated up to 0.3 K, 10⁻⁶/K or 1 µm and then left out, it leaves no value failed that was not."""
+    for error in np.arange(10.0, 14.0, 0.25):
         artefact = gauge(errors={(1, r, 20.0): error for r in (1, 2, 3)})
-        for circumstances in (stated, under(**{left_out: None})):
-            found = decided(artefact, circumstances)
-            assert found.finding in ("undecided", "fail")
-            if circumstances is not stated or error > 30:
-                assert found.finding == outcome
+        if decided(artefact, under(**{line: most})).finding != "fail":
+            assert decided(artefact, under(**{line: None})).finding != "fail", error
+
+
+def test_what_is_not_stated_is_no_larger_than_a_laboratory_may_have_it() -> None:
+    """Of a length of 500 mm of steel at 22 °C: 0.3 K is 1.725 µm, 10⁻⁶/K over 2 K 1.0 µm, alignment and fixturing 1 µm each."""
+    warm = gauge()
+    warm.points.columns["temp_artefact_c"][:] = 22.0
+    alone = {
+        "temperature": 500e3 * 11.5e-6 * 0.3, "expansion": 500e3 * 2 * 1e-6, "alignment": 1.0, "fixturing": 1.0,
+    }  # fmt: skip
+    keys = {"temperature": "u_temperature_k", "expansion": "u_cte_per_k", "alignment": "u_alignment_um",
+            "fixturing": "u_fixturing_um"}  # fmt: skip
+    for line, u in alone.items():
+        assert u_of_unstated(LENGTH_LINES, warm, under(**{keys[line]: None}), 500.0) == pytest.approx(u)
+    none = under(**dict.fromkeys(keys.values()))
+    assert u_of_unstated(LENGTH_LINES, warm, none, 500.0) == pytest.approx(np.sqrt(sum(u**2 for u in alone.values())))
+    assert u_of_unstated(LENGTH_LINES, warm, under(), 500.0) == 0.0
+
+
+def test_two_and_a_half_limits_fail_whatever_is_not_stated() -> None:
+    none = under(**dict.fromkeys(("u_cte_per_k", "u_temperature_k", "u_alignment_um", "u_fixturing_um")))
+    artefact = gauge(errors={(1, r, 20.0): 25.0 for r in (1, 2, 3)})
+    assert decided(artefact, none).finding == "fail"
 
 
 def test_a_line_is_not_stated_and_declared_at_once() -> None:
