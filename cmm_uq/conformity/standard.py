@@ -40,7 +40,7 @@ from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Floats, Ints
 from cmm_uq.uncertainty.budget import Budget, Line
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
+from cmm_uq.units import MICROMETRE, unit
 
 NOT_CONSIDERED = say(
     "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."

@@ -164,7 +164,8 @@ def test_a_length_with_one_repeat_has_no_range_and_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "most"), [("u_cte_per_k", 1e-6), ("u_temperature_k", 0.3), ("u_alignment_um", 1.0), ("u_fixturing_um", 1.0)]
+    ("line", "most"),
+    [("u_cte_per_k", 1e-6), ("u_temperature_k", 0.3), ("u_alignment_um", 1.0), ("u_fixturing_um", 1.0)],
 )
 def test_by_iso_14253_1_a_line_that_is_not_stated_makes_no_fail(line: str, most: float) -> None:
     """Stated up to 0.3 K, 10⁻⁶/K or 1 µm and then left out, it leaves no value failed that was not."""
@@ -175,7 +176,7 @@ def test_by_iso_14253_1_a_line_that_is_not_stated_makes_no_fail(line: str, most:
 
 
 def test_what_is_not_stated_is_no_larger_than_a_laboratory_may_have_it() -> None:
-    """Of a length of 500 mm of steel at 22 °C: 0.3 K is 1.725 µm, 10⁻⁶/K over 2 K 1.0 µm, alignment and fixturing 1 µm each."""
+    """Of 500 mm of steel at 22 °C: 0.3 K is 1.725 µm, 10⁻⁶/K over 2 K 1 µm; alignment and fixturing are 1 µm each."""
     warm = gauge()
     warm.points.columns["temp_artefact_c"][:] = 22.0
     alone = {
