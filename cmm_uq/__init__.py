@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cmm_uq.api.recertification import due, history
     from cmm_uq.errors import CmmUqError
 
-__version__ = "0.14.0"
+__version__ = "0.15.0"
 
 __all__ = [
     "CmmUqError", "__version__", "budget", "check", "compensate", "diagnose", "due", "history", "job", "new", "part",
