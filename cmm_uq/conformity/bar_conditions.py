@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from cmm_uq.conformity.plans import BarPlan, Condition
 from cmm_uq.messages import Text, at_key, commas, number, plural, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.points import Floats, Points
+
+_SEARCHED = 60
+"""Bars that hang together, each near another of them."""
 
 
 def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
@@ -21,14 +24,14 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     wanted = plan.positions_in(np.ptp(travel, axis=1)) if known else plan.positions
     numbers, ends = _one_a_measurement(artefact)
     same = _same_places(plan, points, numbers, ends, copies)
-    distinct = [i for i, number in enumerate(numbers) if number not in same]
-    count = len(distinct)
+    count = sum(number not in same for number in numbers)
     missing = _lacking(wanted, count, _in_words(same)) if count < wanted else ()
     unknown = () if known else (
         say("the travel of all three axes{key}, by whose proportions the number of positions goes",
             key=at_key("[machine] travel_mm")),
     )  # fmt: skip
-    taken = {position_of(ends[i, 1] - ends[i, 0]) for i in distinct}
+    copied = {number for number, (apart, _) in same.items() if apart is None}
+    taken = {position_of(b - a) for (a, b), number in zip(ends, numbers, strict=True) if number not in copied}
     directions = tuple(say("position {along}", along=_along(d)) for d in plan.directions if d not in taken)
     return (
         Condition(
@@ -70,16 +73,49 @@ def _same_places(
         (one, _), (two, _) = points.run_of(original), points.run_of(later)
         if one != two:
             found[two] = None, one
-    kept: list[int] = []
-    for i, own in enumerate(numbers):
-        if own in found:
-            continue
-        near = next((j for j in kept if _apart(ends[i], ends[j]) < plan.apart_mm), None)
-        if near is None:
-            kept.append(i)
-        else:
-            found[own] = plan.apart_mm, numbers[near]
-    return found
+    left = [i for i, own in enumerate(numbers) if own not in found]
+    near = {i: {j for j in left if j != i and _apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
+    kept = most_apart(near)
+    return found | {numbers[i]: (plan.apart_mm, numbers[min(near[i] & kept)]) for i in left if i not in kept}
+
+
+def most_apart(near: Mapping[int, Collection[int]]) -> set[int]:
+    """A largest set of which none is near another, of equally large ones that with the earlier members.
+
+    A choice in the order of the recording could grow when one is taken away that lies between two others. Groups of more than
+    ``_SEARCHED`` that hang together are chosen from in that order all the same.
+    """
+    left, chosen = set(near), set[int]()
+    while left:
+        group, further = set[int](), {min(left)}
+        while further:
+            group |= further
+            further = {j for i in further for j in near[i]} - group
+        chosen |= _largest(near, group) if len(group) <= _SEARCHED else _in_order(near, group)
+        left -= group
+    return chosen
+
+
+def _largest(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
+    left, chosen = set(group), set[int]()
+    while left:
+        degree = {i: len(left.intersection(near[i])) for i in sorted(left)}
+        single = next((i for i, count in degree.items() if count <= 1), None)
+        if single is None:
+            most = max(degree, key=lambda i: degree[i])
+            with_it, without = (_largest(near, left - {most, *gone}) for gone in (near[most], ()))
+            return chosen | ({most, *with_it} if len(with_it) + 1 >= len(without) else without)
+        chosen.add(single)
+        left -= {single, *near[single]}
+    return chosen
+
+
+def _in_order(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
+    chosen = set[int]()
+    for i in sorted(group):
+        if chosen.isdisjoint(near[i]):
+            chosen.add(i)
+    return chosen
 
 
 def _in_words(same: dict[int, tuple[float | None, int]]) -> list[Text]:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from cmm_uq.conformity.bar_conditions import most_apart
 from cmm_uq.conformity.plan_conditions import conditions
 from cmm_uq.conformity.plans import BarPlan
 from cmm_uq.kinds.ballbar.observe import Ballbar
@@ -90,3 +95,21 @@ def test_the_travel_of_two_axes_does_not_tell_how_many_positions_are_asked() -> 
     assert missing == [
         "the travel of all three axes ([machine] travel_mm), by whose proportions the number of positions goes"
     ]
+
+
+def test_a_bar_between_two_others_does_not_take_the_place_of_both() -> None:
+    """The first is 9 mm from the second and from the third, which are 18 mm apart: two positions, with it as without it."""
+    with_it, _ = said(X, moved(X, 0, 9), moved(X, 0, -9))
+    without, _ = said(moved(X, 0, 9), moved(X, 0, -9))
+    assert with_it[0] == without[0] == "at least 3 positions of the bar: 2"
+
+
+@given(st.integers(1, 8), st.data())
+def test_no_other_set_of_bars_far_from_each_other_is_larger(count: int, data: st.DataObject) -> None:
+    """By trying all sets."""
+    pairs = data.draw(st.sets(st.sampled_from(list(combinations(range(8), 2)))))
+    near = {i: {b if a == i else a for a, b in pairs if i in (a, b) and max(a, b) < count} for i in range(count)}
+    chosen = most_apart(near)
+    assert all(chosen.isdisjoint(near[i]) for i in chosen)
+    sets = (set(c) for k in range(count + 1) for c in combinations(range(count), k))
+    assert len(chosen) == max(len(each) for each in sets if all(each.isdisjoint(near[i]) for i in each))
