@@ -68,7 +68,7 @@ def test_verbose_says_every_warning_to_its_last_word() -> None:
 def test_away_from_a_terminal_every_fact_is_one_whole_line() -> None:
     lines = text(screen("iota-1102-20C", None))
     found = outcome("iota-1102-20C").summary
-    assert [line for line in lines if line.startswith("FAIL  ASME B89.4.1-1997, volumetric performance: 339.9")]
+    assert [line for line in lines if line.startswith("FAIL  ASME B89.4.1-1997, volumetric performance: 340 µm")]
     for i, warning in enumerate(found.warnings):
         assert f"  {i + 1}. {warning}" in lines
     for name, value, k in found.figures:
