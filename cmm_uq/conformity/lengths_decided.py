@@ -199,15 +199,19 @@ def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
     others = int((~copied).sum()) - len(rows)
     if not others:
         return []
-    one = say(
-        "{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
-        count=others,
-    )
-    many = say(
-        "{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
-        count=others,
-    )
-    return [plural(others, one=one, many=many)]
+    return [
+        plural(
+            others,
+            one=say(
+                "{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
+                count=others,
+            ),
+            many=say(
+                "{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
+                count=others,
+            ),
+        )
+    ]
 
 
 def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:

@@ -190,13 +190,17 @@ def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[T
 
 
 def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty) -> Budget:
-    """The budget of which each declared line says so; ``lines`` are its first, in their order."""
+    """The budget of which each declared line says so: those of a length are its first, in their order.
+
+    That of a form begins with the form deviation itself, of which nothing is declared; that of repeats has lines of its own.
+    """
+    own = () if lines == REPEAT_LINES else ("", *lines) if lines == FORM_LINES else lines
     named = [
         replace(line, name=say("{line} (declared negligible)", line=line.name))
-        if getattr(stated.negligible, name, None)
+        if name and getattr(stated.negligible, name, None)
         else replace(line, name=say("{line} (declared the machine's own)", line=line.name))
-        if getattr(stated.machine, name, None)
+        if name and getattr(stated.machine, name, None)
         else line
-        for line, name in zip(budget.lines, lines, strict=False)
+        for line, name in zip(budget.lines, own, strict=False)
     ]
     return replace(budget, lines=[*named, *budget.lines[len(named) :]])

@@ -34,11 +34,11 @@ def decision_block(statement: Statement) -> Decision:
     """One statement: what was compared with what, by which rule, and what follows."""
     decision = statement.decision
     value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
-    known = say(" (k = 2)") if statement.u_um > 0 else NOTHING
+    measured = say("{value} µm (k = 2)", value=value) if statement.u_um > 0 else say("{value} µm", value=value)
     return Decision(
         named(statement),
         statement.quantity,
-        say("{value} µm{known}", value=value, known=known),
+        measured,
         _limit(statement),
         decision.rule,
         statement.outcome,

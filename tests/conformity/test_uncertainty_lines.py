@@ -83,6 +83,14 @@ def test_a_line_is_declared_negligible_or_the_machine_s_own_by_name_and_reason()
     assert "Temperature of the artefact: declared the machine's own by A. Muster: worked out by hand." in found.remarks
 
 
+def test_of_a_form_its_calibration_is_what_is_declared_and_not_the_form_itself() -> None:
+    found = decided(sphere(), under(u_form_um=None, negligible={"form": BY}), ISO_5, "P_Form")
+    assert found.budget is not None
+    assert [line.name for line in found.budget.lines][:2] == [
+        "form of the test sphere, F/2", "calibration of the form (declared negligible)",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(("columns", "lack"), [
     (("temp_artefact_c",), "temperature of the artefact during the test was not recorded"),
     (("approach_x", "approach_y", "approach_z"), "from which side each end was reached is not recorded"),
