@@ -135,3 +135,32 @@ def test_what_the_tutorial_adds_completes_the_certificate(project: Path) -> None
     checked = run(["cmm-uq", "check", "iota"], project)
     assert checked.returncode == 0
     assert "17025" not in checked.stdout
+
+
+def test_the_job_of_a_laboratory_with_everything_stated_passes(project: Path) -> None:
+    """Readings are simulated, with a temperature beside them; on the form every clause is answered."""
+    page = ROOT / "docs" / "howto" / "laboratory.md"
+    (text,) = [block.text for block in snippets(page, "toml", excerpt=True) if "[recording]" in block.text]
+    job, form = tomllib.loads(text), project / "stated" / tomllib.loads(text)["conformity"][0]["clauses"]
+    assert run(["cmm-uq", "new", "step_gauge", "readings", "--quiet"], project).returncode == 0
+    form.parent.mkdir()
+    assert run(["cmm-uq", "standards", job["conformity"][0]["standard"], "--form", str(form)], project).returncode == 0
+    answers = {"checked_by = \"\"": "checked_by = \"A. Example\"", "edition = \"\"": "edition = \"2009\"",
+               "# on =": "on =", "# agrees =": "agrees ="}  # fmt: skip
+    filled = form.read_text(encoding="utf-8")
+    for blank, answer in answers.items():
+        filled = filled.replace(blank, answer)
+    form.write_text(filled, encoding="utf-8")
+    (form.parent / "job.toml").write_text(text, encoding="utf-8")
+    (form.parent / job["laboratory"]["logo"]).write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>')
+    simulated, heading, *rows = (project / "readings" / "recording.csv").read_text(encoding="utf-8").splitlines()
+    assert simulated.startswith("# simulated")
+    recorded = [f"{heading},temp_artefact_c", *(f"{row},20.1" for row in rows), ""]
+    (form.parent / job["recording"]["file"]).write_text("\n".join(recorded), encoding="utf-8")
+    assert run(["cmm-uq", "check", "stated"], project).stdout.startswith("SOUND  stated: nothing would stop report\n")
+    done = run(["cmm-uq", "report", "stated"], project)
+    assert re.findall(r"^([A-Z]+)  ISO 10360-2:2009, (\w+): ", done.stdout, re.MULTILINE) == [
+        ("PASS", "E0"),
+        ("PASS", "R0"),
+    ]
+    assert "Not complete" not in done.stdout
