@@ -18,7 +18,7 @@ from tests.recordings import bar_facts
 
 
 def left_out(model: MeasurementModel, row: int, sigma: float) -> tuple[float, float]:
-    """One observation less what a fit of all others predicts, and its standard deviation, by normal equations, µm."""
+    """One observation less what a fit of all others predicts, and its standard deviation, µm: a fit without it."""
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     place = linear.freedoms.dense()
     whole = np.hstack([linear.design, place]) / linear.noise_scale[:, None]
@@ -26,11 +26,14 @@ def left_out(model: MeasurementModel, row: int, sigma: float) -> tuple[float, fl
     keep = np.arange(len(y)) != row
     rows, known = linear.priors
     prior = np.hstack([rows, np.zeros((len(rows), place.shape[1]))]) * sigma
-    normal = whole[keep].T @ whole[keep] + prior.T @ prior
-    inverse = np.linalg.pinv(normal, rcond=1e-13, hermitian=True)
-    values = inverse @ (whole[keep].T @ y[keep] + prior.T @ (known * sigma))
+    rest = np.vstack([whole[keep], prior])
+    size = np.linalg.norm(rest, axis=0)
+    inverse = (
+        np.linalg.pinv(rest / size, rcond=1e-10) / size[:, None]
+    )  # of the rows: their squares would lose half the digits
+    values = inverse @ np.concatenate([y[keep], known * sigma])
     scale = linear.noise_scale[row] / MICROMETRE
-    variance = sigma**2 * (1 + whole[row] @ inverse @ whole[row])
+    variance = sigma**2 * (1 + np.sum((whole[row] @ inverse) ** 2))
     return float((y[row] - whole[row] @ values) * scale), float(np.sqrt(variance) * scale)
 
 

@@ -73,7 +73,14 @@ def test_only_listed_nothing_is_computed_and_nothing_is_wrong_yet(archive: Path)
     assert (done.returncode, done.stderr) == (0, "")
     (one,) = json.loads(done.stdout)["certificates"]
     assert (one["certificate"], one["version"], one["computed"], one["changed"]) == ("K-1", "0.4.0", False, False)
-    assert {each["version"] for each in one["corrections"]} == {"0.5.0", "0.9.0", "0.11.0", "0.13.0", "0.14.0", "0.15.0"}
+    assert {each["version"] for each in one["corrections"]} == {
+        "0.5.0",
+        "0.9.0",
+        "0.11.0",
+        "0.13.0",
+        "0.14.0",
+        "0.15.0",
+    }
     assert not any("time_s" in each["what"] for each in one["corrections"])  # no reading has a time
     assert run("affected", "--version", "0.4.0", "--list", "--quiet", "--records", "lab.db", cwd=archive).stdout == ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from functools import cache
 from pathlib import Path
@@ -25,8 +26,11 @@ SCALES = ("scale_x", "scale_y", "scale_z")
 def stated(job: str, at: Path, text: str = TEMPERATURE) -> Result:
     folder = at / job
     shutil.copytree(ROOT / "examples" / job, folder)
-    with (folder / "job.toml").open("a", encoding="utf-8") as file:
-        file.write(f"\n[test_uncertainty]\n{text}\n")
+    path = folder / "job.toml"
+    declared = path.read_text(encoding="utf-8")
+    for line in ("temperature", "fixturing"):  # what a simulation declares negligible is stated here
+        declared = re.sub(rf"^{line} = .*\n", "", declared, flags=re.MULTILINE)
+    path.write_text(f"{declared}\n[test_uncertainty]\n{text}\n", encoding="utf-8")
     found = analyse(folder)
     assert isinstance(found, Result)
     return found

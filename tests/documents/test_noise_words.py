@@ -21,7 +21,7 @@ def noise(components: dict[str, Component], *, apart: float = 0.2, wider: float 
 def test_white_noise_is_said_to_be_nothing_else_and_what_could_not_show_is_named() -> None:
     assert noise_found(noise({}), heavy_tails=False) == (
         "independent readings, nothing else; not to be seen in this recording: "
-        "set-up offsets (no repeats) and slow noise (no time_s)"
+        "set-up offsets (no repeats) and slow noise (no times)"
     )
 
 
