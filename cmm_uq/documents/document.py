@@ -215,20 +215,19 @@ def _measure(table: dict[str, Any], *, english: bool) -> None:
     for index, column in enumerate(table["columns"]):
         cells = [line for row in table["rows"] for line in row[index].split("\n")]
         head = [column["heading"], column["unit"]]
-        column["need"] = max(4, *map(_letters, head), *map(_letters, cells), 0)
-        longest = column["need"] if english else max(map(_letters, cells), default=0)
+        column["need"] = max(4, *map(letters, head), *map(letters, cells), 0)
+        longest = column["need"] if english else max(map(letters, cells), default=0)
         column["numeric"] = column["numeric"] and longest <= _LONGEST_FIGURE
         column["longest"] = max(cells, key=_width, default="")
         column["word"] = max((part for line in cells for part in _parts(line, " ")), key=_width, default="")
         column["heading_word"] = max((part for line in head for part in _parts(line, None)), key=_width, default="")
     kept = [
-        max(_letters(c["longest"] if c["numeric"] else c["word"]), _letters(c["heading_word"]))
-        for c in table["columns"]
+        max(letters(c["longest"] if c["numeric"] else c["word"]), letters(c["heading_word"])) for c in table["columns"]
     ]
     table["least"] = sum(kept) + 2 * len(kept)
 
 
-def _letters(line: str) -> int:
+def letters(line: str) -> int:
     """Of a line, in letters; a Chinese or Japanese character has the room of two."""
     return len(line) + _wide(line)
 

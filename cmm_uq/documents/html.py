@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.documents import plot_style
 from cmm_uq.documents.document import Document
+from cmm_uq.documents.fitting import fitted, picture_share, tightness
 from cmm_uq.documents.templates import template_folder
 from cmm_uq.documents.view_words import view_words
 from cmm_uq.languages.language import code_of
@@ -22,11 +23,15 @@ if TYPE_CHECKING:
 
 def render_html(document: Document) -> str:
     """The document as one self-contained page, plots inline."""
+    shown = fitted(document)
     return (
         _environment()
         .get_template("document.html")
-        .render(document=document.as_data(), words=view_words(code_of(document.language)), colour=plot_style.COLOURS)
-    )
+        .render(
+            document=shown.as_data(), words=view_words(code_of(document.language)), colour=plot_style.COLOURS,
+            picture=picture_share(shown), tight=tightness(shown),
+        )
+    )  # fmt: skip
 
 
 def style_sheet(heading: str, banner: str, language: str) -> str:

@@ -16,6 +16,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from cmm_uq.documents.document import Document
+from cmm_uq.documents.fitting import SMALLEST, fitted
 from cmm_uq.documents.fonts import JAPANESE, fonts_of
 from cmm_uq.documents.plot_style import COLOURS
 from cmm_uq.documents.templates import template_folder
@@ -56,7 +57,8 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     """
     language = code_of(document.language)
     content = {
-        "document": document.as_data(),
+        "document": fitted(document).as_data(),
+        "smallest": SMALLEST,
         "words": view_words(language),
         "fonts": [FACE, JAPANESE] if language == "ja" else [FACE],
         "colour": COLOURS,

@@ -25,6 +25,9 @@ from cmm_uq.messages import Text, say
 _FARTHEST = 3.0
 """Times the tolerance that the picture reaches; what lies beyond is drawn at its edge with its figure."""
 
+_MANY = 8
+"""Rows beyond which they stand closer together."""
+
 
 def tolerance_plot(
     names: Sequence[Text], ratio: ArrayLike, low: ArrayLike, high: ArrayLike, *, caption: Text, alternative: Text
@@ -43,7 +46,7 @@ def tolerance_plot(
     out = np.minimum(np.abs(ends[0]), np.abs(ends[1])) > 1
     out &= np.sign(ends[0]) == np.sign(ends[1])
     with house_style():
-        height = 14 + 5.5 * len(value)
+        height = 14 + (5.5 if len(value) <= _MANY else 4.5) * len(value)
         figure = new_figure(height)
         ax = figure.subplots()
         figure.subplots_adjust(left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height)
