@@ -12,7 +12,7 @@ from cmm_uq.documents.document import Block, Column, Decision, Plot, Section, Ta
 from cmm_uq.documents.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, in_a_row, number, plural, say, sentences, signed
-from cmm_uq.uncertainty.rounding import nominal, significant
+from cmm_uq.uncertainty.rounding import limit_in_full, nominal, significant
 from cmm_uq.units import unit
 
 _LISTED = 250
@@ -59,17 +59,17 @@ def formula(facts: ConformityFacts) -> Text:
     """The maximum permissible error as the job states it; L in mm, the result in µm."""
     mpe = facts.mpe
     if mpe is None:
-        return say("{limit:.4g} µm", limit=facts.limit_um or 0.0)
+        return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0))
     if mpe.a_um is None or mpe.k is None:
-        return say("{b:.4g} µm", b=mpe.b_um or 0.0)
-    line = say("({a:.4g} + L/{k:.6g}) µm", a=mpe.a_um, k=mpe.k)
+        return say("{b} µm", b=limit_in_full(mpe.b_um or 0.0))
+    line = say("({a} + L/{k}) µm", a=limit_in_full(mpe.a_um), k=limit_in_full(mpe.k))
     if mpe.b_um is None:
         return say("{line}, L in mm", line=line)
-    return say("the lesser of {line} and {b:.4g} µm, L in mm", line=line, b=mpe.b_um)
+    return say("the lesser of {line} and {b} µm, L in mm", line=line, b=limit_in_full(mpe.b_um))
 
 
 def _limit(statement: Statement) -> Text:
-    here = say("{limit:.4g} µm", limit=statement.limit_um)
+    here = say("{limit} µm", limit=limit_in_full(statement.limit_um))
     if statement.facts.mpe is None:
         return here
     length = statement.named.length_mm
@@ -227,6 +227,6 @@ def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: b
         *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()),
         values,
         *((significant(2 * worst.u_um), DASH if chance is None else probability(chance)) if known else ()),
-        number(worst.limit_um, ".4g"),
+        limit_in_full(worst.limit_um),
         say("{decision}, {standing}", decision=decision, standing=standing) if standing else decision,
     )

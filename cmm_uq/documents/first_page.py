@@ -11,9 +11,9 @@ from cmm_uq.documents.conformity_section import has_picture, named, picture
 from cmm_uq.documents.document import Overview, Plot, Section, Table
 from cmm_uq.documents.result import Result
 from cmm_uq.documents.summary import subject_of
-from cmm_uq.documents.wording import OUTCOME_WORDS, stated_value
+from cmm_uq.documents.wording import OUTCOME_WORDS, stated_row, stated_value
 from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
-from cmm_uq.messages import Text, number, plural, say, semicolons
+from cmm_uq.messages import Text, plural, say, semicolons
 
 _MOST = 8
 """Statements in the box; of more the gravest, all are behind the page."""
@@ -66,14 +66,12 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
 
 
 def _row(one: Verdict, *, signed: bool) -> Text:
-    outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
     if one.value is None:
+        outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
         return say("{outcome}: not determined by this recording", outcome=outcome)
-    value = stated_value(one.value, one.U, signed=signed)
-    if one.by and one.limit is not None:
-        return say("{outcome}: {value} {unit}, limit {limit} {unit}", outcome=outcome, value=value, unit=one.unit,
-                   limit=number(one.limit, ".4g"))  # fmt: skip
-    return say("{outcome}: {value} {unit}", outcome=outcome, value=value, unit=one.unit)
+    return stated_row(
+        one.outcome, stated_value(one.value, one.U, signed=signed), one.unit, one.limit if one.by else None
+    )
 
 
 def _lacking(verdicts: Sequence[Verdict]) -> list[tuple[Text, Text]]:

@@ -9,7 +9,7 @@ from typing import Any
 from cmm_uq.messages import DASH, NOTHING, Text, Verbatim, day, number, say
 from cmm_uq.recertification.drift import HORIZON, PARTS
 from cmm_uq.recertification.history import MachineHistory, ValueHistory
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import limit_in_full, rounded
 from cmm_uq.units import unit_as_written
 
 SCHEMA = "cmm-uq/history/1"
@@ -33,7 +33,7 @@ def value_row(history: MachineHistory, one: ValueHistory) -> tuple[Text, ...]:
     """A value under :data:`HEADINGS`; U has k = 2."""
     series = one.series
     value, expanded = rounded(float(series.value[-1]), COVERAGE * float(series.u[-1]))
-    limit = DASH if series.limit is None else number(series.limit, ".4g")
+    limit = DASH if series.limit is None else limit_in_full(series.limit)
     return (
         Verbatim(series.quantity), value, expanded, unit_as_written(series.unit), *_change(history, one), *_trend(one), limit,
         meets(one, history.on),

@@ -258,7 +258,7 @@ def _identifiability(result: Result) -> dict[str, Any]:
 def _statement(statement: Statement) -> dict[str, Any]:
     return {
         "standard": statement.facts.standard, "characteristic": statement.characteristic,
-        "quantity": statement.quantity, "value_um": statement.value_um,
+        "quantity": statement.quantity, "value_um": statement.value_um, "signed": statement.signed,
         "limit_um": statement.limit_um, "u_um": statement.u_um, "rule": rule_name(statement.facts.rule),
         "guard_band_um": statement.decision.guard_band, "decision": statement.outcome, "finding": statement.finding,
         "probability_conforming": statement.decision.probability_conforming, "scope": statement.scope,

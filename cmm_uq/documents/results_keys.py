@@ -103,6 +103,7 @@ RESULTS: Mapping[str, str] = MappingProxyType(
         "conformity[].characteristic": "What of it is decided.",
         "conformity[].quantity": "What was compared, in words.",
         "conformity[].value_um": "The least favourable value.",
+        "conformity[].signed": "Whether limits hold on both sides of zero; if not, an interval is stated where U exceeds it.",
         "conformity[].limit_um": "Its limit.",
         "conformity[].u_um": "Its standard uncertainty.",
         "conformity[].rule": "Decision rule.",

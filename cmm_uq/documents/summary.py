@@ -11,7 +11,7 @@ from cmm_uq.documents.result import Result
 from cmm_uq.documents.wording import CERTAIN, measured, probability, title_of
 from cmm_uq.jobs.verdicts import Verdict as Stated
 from cmm_uq.messages import Text, Verbatim, commas, day, number, say, semicolons
-from cmm_uq.uncertainty.rounding import rounded, significant
+from cmm_uq.uncertainty.rounding import limit_in_full, rounded, significant
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> Summary:
@@ -41,7 +41,9 @@ def subject_of(one: Stated) -> Text:
     """What is decided: standard and characteristic, or a parameter with its tolerance."""
     if one.by:
         return say("{standard}, {what}", standard=Verbatim(one.by), what=Verbatim(one.name))
-    return say("{title}, tolerance {limit} {unit}", title=one.title, limit=number(one.limit or 0.0, "g"), unit=one.unit)
+    return say(
+        "{title}, tolerance {limit} {unit}", title=one.title, limit=limit_in_full(one.limit or 0.0), unit=one.unit
+    )
 
 
 def tolerances_of(result: Result) -> list[Stated]:
@@ -60,7 +62,7 @@ def _remarks(statement: Statement) -> list[Text]:
     """Value, limit, uncertainty and probability of a statement; what its test lacks."""
     value, _ = measured(statement)
     chance = statement.decision.probability_conforming
-    told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=number(statement.limit_um, ".4g"))]
+    told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=limit_in_full(statement.limit_um))]
     if statement.u_um > 0:
         told.append(say("test uncertainty U = {u} µm (k = 2)", u=significant(2 * statement.u_um)))
     if chance is not None:

@@ -10,12 +10,12 @@ import numpy as np
 from cmm_uq.documents.document import Plot
 from cmm_uq.documents.history_words import COVERAGE, meets
 from cmm_uq.documents.plot_style import ACCENT, BAD, BAND, INK, MUTED, TINY, bars, dots, drawn, house_style, new_figure
-from cmm_uq.messages import NOTHING, Text, Verbatim, number, say, semicolons
+from cmm_uq.messages import NOTHING, Text, Verbatim, say, semicolons
 from cmm_uq.points import Floats, Ints
 from cmm_uq.recertification.history import MachineHistory, ValueHistory
 from cmm_uq.recertification.trend import epochs
 from cmm_uq.records.facts import Series
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import limit_in_full, rounded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -138,5 +138,5 @@ def _told(history: MachineHistory, one: ValueHistory) -> Text:
     if series.limit is None:
         return say("{what}.", what=what)
     return say(
-        "{what}; limit {limit}: {meets}.", what=what, limit=number(series.limit, ".4g"), meets=meets(one, history.on)
+        "{what}; limit {limit}: {meets}.", what=what, limit=limit_in_full(series.limit), meets=meets(one, history.on)
     )

@@ -10,7 +10,7 @@ from cmm_uq.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.model.measurement import ARTEFACT
 from cmm_uq.points import Floats
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import limit_in_full, rounded
 
 if TYPE_CHECKING:
     from cmm_uq.conformity.statement import Statement
@@ -85,6 +85,15 @@ def stated_value(value: float, U: float | None, *, signed: bool) -> Text:
     if not signed and value < U:
         return say("{low} to {high}", low=rounded(0.0, U)[0], high=rounded(value + U, U)[0])
     return say("{value} ± {U}", value=shown, U=expanded_)
+
+
+def stated_row(outcome: str, value: Text, unit: Text, limit: float | None = None) -> Text:
+    """A statement of conformity in a line: outcome, value with what it is known to, limit."""
+    word = OUTCOME_WORDS.get(outcome, say("undecided"))
+    if limit is None:
+        return say("{outcome}: {value} {unit}", outcome=word, value=value, unit=unit)
+    return say("{outcome}: {value} {unit}, limit {limit} {unit}", outcome=word, value=value, unit=unit,
+               limit=limit_in_full(limit))  # fmt: skip
 
 
 def title_of(key: tuple[str, str], result: Result) -> Text:

@@ -9,7 +9,7 @@ is a tie and the noise of binary arithmetic behind the 13th digit decides nothin
 from __future__ import annotations
 
 from decimal import ROUND_HALF_UP, ROUND_UP, Decimal
-from math import ceil, isfinite, isinf, isnan, log10
+from math import ceil, floor, isfinite, isinf, isnan, log10
 
 from cmm_uq.errors import CmmUqError
 from cmm_uq.messages import Number
@@ -101,6 +101,19 @@ def nominal(length: float) -> Number:
     """
     _check(length, 0.0, 1)
     return _plain(Decimal(f"{length:.6f}").normalize())
+
+
+def limit_in_full(limit: float) -> Number:
+    """A limit that is stated, in full; what a formula makes of a length, to four digits and at least two decimals.
+
+    Examples
+    --------
+    >>> limit_in_full(1080.0012), limit_in_full(2.5 + 800 / 300)
+    ('1080.0012', '5.167')
+    """
+    if not limit or abs(limit - round(limit, 6)) <= 1e-12 * abs(limit):
+        return nominal(limit)
+    return nominal(round(limit, max(2, 3 - floor(log10(abs(limit))))))
 
 
 def figure(number: float, digits: int = 4) -> Number:

@@ -13,7 +13,7 @@ from typing import Any
 
 from cmm_uq.records.content import unit_of
 from cmm_uq.uncertainty.quantity import Quantity
-from cmm_uq.uncertainty.rounding import rounded
+from cmm_uq.uncertainty.rounding import limit_in_full, rounded
 from cmm_uq.units import UNITS
 from cmm_uq.verification.consistent import quantities
 from cmm_uq.verification.found import Inquiry
@@ -148,9 +148,10 @@ def _check_decisions(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, 
             inquiry.wrong("figures", name, f"statement of conformity {i + 1}", f"is another decision than in {source}",
                           shown.outcome, entry["decision"])  # fmt: skip
         text = shown.text.replace(",", ".")
-        # before 0.15.0 a decision had u instead of U, and a value to the digits of it
+        # before 0.15.0 a decision had u instead of U, a value to the digits of it, and a limit to four
         for what, figures in (
-            ("value", [_measured(entry, 2), _measured(entry, 1), *_from_zero(entry)]), ("limit", [f"{entry['limit_um']:.4g}"]),
+            ("value", [_measured(entry, 2), _measured(entry, 1), *_from_zero(entry)]),
+            ("limit", [str.__str__(limit_in_full(entry["limit_um"])), f"{entry['limit_um']:.4g}"]),
             ("standard", [entry["standard"].replace(",", ".")]),
         ):  # fmt: skip
             if not any(re.search(".{1,14}".join(map(re.escape, figure.split(" ± "))), text) for figure in figures):

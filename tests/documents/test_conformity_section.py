@@ -35,7 +35,8 @@ def blocks(found: Statement) -> tuple[Decision, Plot, Table]:
 
 
 @pytest.mark.parametrize(("wish", "words"), [
-    ({"limit_um": 4.5, "mpe": None}, "4.5 µm"), ({"mpe": MPE}, "(2.5 + L/300) µm, L in mm"),
+    ({"limit_um": 4.5, "mpe": None}, "4.5 µm"), ({"limit_um": 1080.0012, "mpe": None}, "1080.0012 µm"),
+    ({"mpe": MPE}, "(2.5 + L/300) µm, L in mm"),
     ({"mpe": MaximumPermissibleError(a_um=2.5, k=300.0, b_um=4.0)}, "the lesser of (2.5 + L/300) µm and 4 µm, L in mm"),
     ({"mpe": MaximumPermissibleError(b_um=4.0)}, "4 µm"),
 ])  # fmt: skip

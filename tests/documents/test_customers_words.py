@@ -37,7 +37,7 @@ def keys() -> re.Pattern[str]:
             for part in schema:
                 yield from names(part)
 
-    every = set(names(json.loads(shipped("job"))))
+    every = {name for schema in ("job", "part") for name in names(json.loads(shipped(schema)))}
     joined = [*sorted(name for name in every if "_" in name), "job.toml", "temp_artefact_c", "time_s", "tip_x_mm"]
     tables = sorted(name for name in every if "_" not in name)
     return re.compile(rf"\b({'|'.join(map(re.escape, joined))})\b|\[\[?({'|'.join(map(re.escape, tables))})\b")

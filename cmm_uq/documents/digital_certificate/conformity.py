@@ -19,6 +19,7 @@ from cmm_uq.documents.digital_certificate.figures import Figures, Part
 from cmm_uq.documents.digital_certificate.shapes import decimal
 from cmm_uq.documents.digital_certificate.units import ONE, dsi_of, ratio
 from cmm_uq.documents.digital_certificate.words import SayIn, english, one_line, rich_of, words_of
+from cmm_uq.documents.wording import stated_row, stated_value
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.units import UNITS
@@ -100,13 +101,19 @@ def _statement(i: int, one: Mapping[str, Any], say_in: SayIn, figures: Figures, 
         norms=(one_line(one["standard"]),),
         references=(one_line(one["rule"]),),
         declaration=rich_of(
-            (say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(one["quantity"])),
+            (say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(one["quantity"])), _in_words(one),
              *((_WHY[decision],) if decision in _WHY else ())), say_in,
         ),
         conformity=IN_THE_SCHEMA[decision] if certifies else None,
         data=Data(parts=tuple(_figures(("conformity", str(i)), one, say_in, figures))),
         ref_type=("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",),
     )  # fmt: skip
+
+
+def _in_words(one: Mapping[str, Any]) -> Text:
+    """The line of the first page; a size that may be zero by its interval, beside which no U is stated."""
+    value = stated_value(one["value_um"], 2 * one["u_um"], signed=one.get("signed", True))
+    return stated_row(one["decision"], value, UNITS["µm"], one["limit_um"])
 
 
 def _described(one: Mapping[str, Any]) -> Rich | None:

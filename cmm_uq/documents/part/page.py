@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from cmm_uq.documents.certificate import grouped, identified, issuer_of, performed, signatures_of, statements_of
+from cmm_uq.documents.certificate import (
+    grouped,
+    identified,
+    in_words,
+    issuer_of,
+    performed,
+    signatures_of,
+    statements_of,
+)
 from cmm_uq.documents.clauses import DRAFT, Clause, asked, of_every_report
 from cmm_uq.documents.completeness import not_stated
 from cmm_uq.documents.document import Document, Facts
@@ -49,7 +57,7 @@ def part_document(found: PartFound) -> Document:
     )
     date = day(facts.job.date)
     came = say("measured on {date}", date=date) if measured else say("planned for {date}", date=date)
-    return Document(
+    return in_words(Document(
         title=TITLE if measured else PLANNED,
         number=Verbatim(facts.job.number or facts.job.id),
         subject=say("{part}, {came}", part=part_words(found), came=came),
@@ -67,7 +75,7 @@ def part_document(found: PartFound) -> Document:
         banner=DRAFT if lacking else NOTHING,
         overview=overview_of(found),
         draft=bool(lacking),
-    )
+    ))  # fmt: skip
 
 
 def lacking_of(found: PartFound) -> tuple[Clause, ...]:

@@ -289,6 +289,19 @@ def test_a_statement_names_standard_rule_limits_and_probability() -> None:
     assert isclose(float(value.uncertainty.probability), stats.norm.cdf(2) - stats.norm.cdf(-2), abs_tol=5e-5)
 
 
+def test_a_range_that_may_be_zero_is_stated_in_words_by_its_interval_as_on_the_page() -> None:
+    """3 µm with U = 8 µm against 10 µm: 0 to 11 µm, and no ± U; 340 ± 14 µm where U is the smaller."""
+    data = results(MEASURED)
+    near = {**data["conformity"][0], "value_um": 3.0, "u_um": 4.0, "limit_um": 10.0005, "decision": "undecided"}
+    stated = str(conformity(digital_certificate({**data, "conformity": [near]}, complete(), html=None)).declaration)
+    assert data["conformity"][0]["signed"] is False
+    assert "undecided: 0.0 to 11.0 µm, limit 10.0005 µm" in stated
+    assert "fail: 340 ± 14 µm, limit 60 µm" in str(conformity(certificate(MEASURED)).declaration)
+    both = {**near, "signed": True}
+    stated = str(conformity(digital_certificate({**data, "conformity": [both]}, complete(), html=None)).declaration)
+    assert "undecided: 3.0 ± 8.0 µm, limit 10.0005 µm" in stated
+
+
 def complete() -> Job:
     """The measured example with all that ISO/IEC 17025 asks for."""
     job = job_of(MEASURED)

@@ -35,6 +35,7 @@ from cmm_uq.parts.displaced import Displaced
 from tests.documents.parts_found import ERRORS, found_of, measured_points
 from tests.documents.parts_found import STANDING as CERTIFICATE
 from tests.documents.saying import leaves, strangers
+from tests.documents.test_customers_words import mentioned
 from tests.documents.test_html_layout import LABELS_COLLIDING, OVERLAPS
 from tests.jobs.part.parts import plate
 
@@ -450,3 +451,14 @@ def test_of_many_characteristics_those_nearest_to_their_limits_are_told_of_in_de
     assert "66 of 66 correlations" in said(section(page(found), "Correlations").blocks)
     without = replace(found, judged=(None,) * 12)
     assert in_section(ways_section(without))[0].notes[-1] == "Shown are the first 6 characteristics."
+
+
+def test_no_key_of_a_job_file_stands_on_the_report_of_a_part(
+    planned: PartFound, measured: PartFound, every_kind: PartFound
+) -> None:
+    """Nor where the job does not state what every report must: the page says it in words, without ``[part] serial``."""
+    job = plate()
+    bare = found_of(job, points=measured_points(job))
+    assert "serial number of the part (7.8.2.1 g)" in page(bare).warnings[-1]
+    assert [mentioned(page(one)) for one in (planned, measured, every_kind, bare)] == [[], [], [], []]
+    assert all("[part]" not in text for text in leaves(page(bare)))
