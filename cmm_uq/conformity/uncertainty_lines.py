@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from cmm_uq.conformity.plans import Condition
-from cmm_uq.jobs.circumstances import LINE_KEYS, Circumstances, TestUncertainty
+from cmm_uq.jobs.circumstances import LINE_KEYS, Circumstances, Declared, TestUncertainty
 from cmm_uq.messages import Text, Verbatim, say
 from cmm_uq.model.artefact import Artefact
 from cmm_uq.uncertainty.budget import Budget
@@ -179,14 +179,26 @@ def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[T
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
         negligible, own = getattr(stated.negligible, line, None), getattr(stated.machine, line, None)
         if negligible:
-            words = {"by": Verbatim(negligible.by), "reason": Verbatim(negligible.reason.rstrip(". "))}
-            told.append(say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line], **words))
-        if own:
-            words = {"by": Verbatim(own.by), "reason": Verbatim(own.reason.rstrip(". "))}
+            by, reason = _answer(negligible)
             told.append(
-                say("{line:capital}: declared the machine's own by {by}: {reason}.", line=_NAMES[line], **words)
+                say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line], by=by, reason=reason)
+            )
+        if own:
+            by, reason = _answer(own)
+            told.append(
+                say(
+                    "{line:capital}: declared the machine's own by {by}: {reason}.",
+                    line=_NAMES[line],
+                    by=by,
+                    reason=reason,
+                )
             )
     return told
+
+
+def _answer(declared: Declared) -> tuple[Text, Text]:
+    """Name and reason, without the full stop that a sentence sets."""
+    return Verbatim(declared.by), Verbatim(declared.reason.rstrip(". "))
 
 
 def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty) -> Budget:

@@ -71,11 +71,12 @@ def test_it_comes_before_what_the_results_rest_on(outcome: Outcome) -> None:
 
 
 def test_a_machine_found_after_it_was_left_is_told() -> None:
+    """The key of the job stands beside it for the laboratory, not on the certificate."""
     late = FOUND | {"job": {**FOUND["job"], "date": "2004-09-02"}}
-    told = adjusted(analysed_iota(), late).document.warnings
-    assert any(
-        "found as it was after it was left, 2004-09-01 against 2004-09-02 ([job] as_found)" in text for text in told
-    )
+    outcome = adjusted(analysed_iota(), late)
+    said = "Dates out of order: the machine was found as it was after it was left, 2004-09-01 against 2004-09-02"
+    assert f"{said}." in outcome.document.warnings
+    assert f"{said} ([job] as_found)." in outcome.warnings
 
 
 def analysed_iota() -> Any:

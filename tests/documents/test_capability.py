@@ -56,7 +56,7 @@ def test_lengths_take_the_formula_at_the_artefact_s_length(result: Result) -> No
     capability = Capability(length=LengthCapability(a_um=10.0, k=100.0))
     rows = {row[0]: row for row in tables(stated(result, capability).document)["Figures of performance"].rows}
     assert rows["Mean length"][1:4] == ("404.205", "0.014", "2.00")
-    assert rows["Range of the lengths (ASME B89.4.1 volumetric performance)"][2] == "40"
+    assert rows["Range of the lengths, on average over repeats"][2] == "40"
 
 
 def test_single_lengths_and_the_second_way_have_no_smaller_uncertainty(result: Result) -> None:
