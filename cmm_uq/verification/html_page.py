@@ -203,6 +203,8 @@ class _Reader(HTMLParser):
         names = [name for name, _ in attrs]
         if len(set(names)) < len(names):
             self._problem(f"has an attribute of <{tag}> twice")
+        if tag == "img" and "src" not in names:
+            self._problem("has an <img> without a picture, which shows words instead")
         for name, value in attrs:
             if name not in allowed:
                 self._problem(f"has the attribute {name!r} in <{tag}>, which the template has not")

@@ -167,6 +167,16 @@ def test_a_document_that_states_another_figure_is_named(
     assert place in [one.place for one in inquiry.findings]
 
 
+def test_a_picture_that_is_no_input_is_named(made: Path, data: dict[str, Any]) -> None:
+    content = (made / "certificate.html").read_text(encoding="utf-8")
+    picture = '<img src="data:image/png;base64,iVBORw0KGgo=" alt="">'
+    page = read_html(content.replace("</main>", f"{picture}</main>", 1).encode(), "certificate.html")
+    assert not page.problems
+    inquiry = Inquiry()
+    check_stated(inquiry, data, page, files=("certificate.html", "results.json"))
+    assert [one.place for one in inquiry.findings] == ["logo"]
+
+
 def test_rows_in_another_order_and_units_are_named(made: Path, data: dict[str, Any]) -> None:
     content = (made / "certificate.html").read_bytes()
     page = read_html(content.replace(b">ppm<", b">mm<"), "certificate.html")

@@ -39,7 +39,10 @@ def test_results_are_written_again_to_the_byte(made: Path) -> None:
 
 
 @pytest.mark.parametrize(("piece", "told"), [
-    ("<script>1</script>", "a <script>"), ('<img src="http://example.org">', "a <img>"), ("<!-- 1 -->", "a comment"),
+    ("<script>1</script>", "a <script>"), ('<video src="http://example.org">', "a <video>"), ("<!-- 1 -->", "a comment"),
+    ('<img src="http://example.org">', "refers to 'http://example.org'"), ('<img alt="PASS">', "an <img> without a picture"),
+    ('<img src="data:text/html;base64,UEFTUw==">', "refers to 'data:text/html"),
+    ('<img src="data:image/png;base64,%">', "refers to"), ('<img src="data:," onerror="x()">', "attribute 'onerror'"),
     ('<p onclick="x()">1</p>', "attribute 'onclick'"), ('<p style="display:none">1</p>', "attribute 'style'"),
     ("</p>", "closes <p>"), ("<p>", "is not the last"), ('<table style="display:none"></table>', "the style"),
     ('<link rel="stylesheet" href="x.css">', "refers to 'x.css'"), ('<p class="a" class="b">1</p>', "twice"),
