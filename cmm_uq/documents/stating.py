@@ -10,7 +10,7 @@ import numpy as np
 
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.laboratory import Capability
-from cmm_uq.messages import Text, at_key, commas, names, say
+from cmm_uq.messages import Text, at_key, say
 from cmm_uq.uncertainty.quantity import Quantity
 
 AtLeast = Callable[..., tuple[float, float]]
@@ -86,9 +86,9 @@ class Stating:
             return []
         return [
             say(
-                "U is stated as the laboratory's calibration and measurement capability (k = 2){key}, "
-                "which is larger than what was evaluated, of: {names}.",
-                names=commas(names(self.raised)),
+                "U is stated as the laboratory's calibration and measurement capability (k = 2){key} where that is larger "
+                "than what was evaluated{names}.",
+                names=at_key(", ".join(self.raised)),
                 key=at_key("[laboratory.cmc]"),
             )
         ]
