@@ -127,7 +127,7 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
     if "date" not in given.get("job", {}):
         raise CmmUqError("an export does not say when it was measured", where="[job] date",
                          fix="Give the date of measurement: --set job.date=2026-05-31")  # fmt: skip
-    bare = replace(begin, artefact={}, conformity=None)
+    bare = replace(begin, artefact={}, conformity=None, test={})
     whole = _tables(found, bare, given, id, origin=MEASURED) | {"machine": dict(given.get("machine", {}))}
     return job_files(found.name, whole, files, begin=begin)
 
@@ -250,6 +250,7 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
         **({"recording": {"file": RECORDING}} if recorded else {}),
         "model": {"effects": list(begin.effects)},
         **({"conformity": [dict(begin.conformity)]} if begin.conformity else {}),
+        **{table: dict(keys) for table, keys in begin.test.items() if table not in given},
     }
     for table, keys in given.items():
         if table == "conformity":
@@ -277,7 +278,8 @@ def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
     else:
         points = joined(ready_plan(Setting.of(job, kind))[1])
         wanted = {name: values for name, values in points.columns.items() if name != "time_s"}
-        points = replace(points, columns=wanted)
+        constant = {name: np.full(len(points), value) for name, value in begin.recorded.items()}
+        points = replace(points, columns=wanted | constant)
     if kind.observe is None:
         noise = np.random.default_rng(SEED).normal(0.0, begin.noise_um * MICROMETRE, points.xyz.shape)
         return points.at(points.xyz + noise)

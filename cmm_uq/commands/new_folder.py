@@ -76,11 +76,11 @@ def read_new(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
 
 
 def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
-    """Dotted keys of machine, artefact and limits that nobody gave, and the date of a measurement that nobody has made yet."""
+    """Dotted keys of machine, artefact, test and limits that nobody gave, and the date of a measurement that nobody has made yet."""
     dated = set() if "date" in given.get("job", {}) else {"job.date"}
     return dated | {
         f"{table}.{key}"
-        for table in ("machine", "artefact", "conformity")
+        for table in ("machine", "artefact", "conformity", "test_uncertainty", "rated_conditions")
         for key in (tables[table][0] if table == "conformity" and table in tables else tables.get(table, {}))
         if key not in (*given.get(table, ()), "kind", "error_map")
     }

@@ -24,6 +24,8 @@ class Beginning:
     artefact : keys of ``[artefact]`` beside its kind.
     effects : that the model names.
     conformity : one statement, or none.
+    test : tables of the circumstances that a pass needs beside it.
+    recorded : columns of the first recording at a constant value.
     plan : keys of ``[plan]`` by which the kind's usual plan makes the set-ups of the first recording.
     columns : that the recording must have beside those of every kind, with a sentence for those that are the kind's own.
     further : that it may have, likewise.
@@ -39,6 +41,8 @@ class Beginning:
     artefact: Mapping[str, Any] = field(default_factory=dict)
     effects: tuple[str, ...] = SIX
     conformity: Mapping[str, Any] | None = None
+    test: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    recorded: Mapping[str, float] = field(default_factory=dict)
     plan: Mapping[str, Any] = field(default_factory=dict)
     columns: Mapping[str, str] = field(default_factory=dict)
     further: Mapping[str, str] = field(default_factory=dict)
@@ -53,3 +57,11 @@ MACHINE: Mapping[str, Any] = MappingProxyType({
     "name": "Bridge machine", "travel_mm": {"x": [0.0, 700.0], "y": [0.0, 1000.0], "z": [-600.0, 0.0]},
 })  # fmt: skip
 """``[machine]`` of a new job of any kind."""
+
+AT_20_C: Mapping[str, float] = MappingProxyType({"temp_artefact_c": 20.0})
+"""The artefact's temperature in a first recording."""
+
+
+def circumstances(**uncertainty: float) -> Mapping[str, Mapping[str, Any]]:
+    """Tables that a pass needs: these lines of the test uncertainty, and rated temperatures."""
+    return {"test_uncertainty": uncertainty, "rated_conditions": {"temperature_c": [18.0, 22.0]}}

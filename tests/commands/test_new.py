@@ -135,6 +135,8 @@ def test_it_becomes_a_measured_job_when_every_mark_is_taken_away_and_not_before(
         "date",
         "length_mm",
         "u_um",
+        "u_form_um",
+        "temperature_c",
         "standard",
         "limit_um",
         "rule",

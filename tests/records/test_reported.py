@@ -46,7 +46,8 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     toml = toml.replace('manufacturer = "DEA"', 'manufacturer = "DEA"\nserial = "1102"')
     stated = 'issued = 2004-09-02\ncustomer = "C"\naddress = "D"\n'  # what a certificate must state to be released
     toml = toml.replace("[job]\n", f'[job]\nadjusted_since = 2004-03-01\noperator = "J. Harris"\n{stated}')
-    toml = toml.replace("[recording]", "due = 2005-01-01\n\n[recording]")
+    issuer = 'issuer = "national institute"\narrangement = "CIPM MRA"\ndate = 2004-01-05\ndue = 2005-01-01\n'
+    toml = toml.replace('machine = "DEA Iota 1102"\n', issuer)  # which certified the bar on this machine: no traceability
     (job / "job.toml").write_text(toml + LABORATORY, encoding="utf-8")
     write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db", language="fr")
     return folder / "reports"
@@ -92,12 +93,18 @@ def test_what_the_artefact_adds_to_a_scale_is_its_relative_uncertainty(records: 
 def test_two_persons_release_where_the_laboratory_says_so_and_none_is_the_operator(records: Records) -> None:
     with pytest.raises(CmmUqError, match="made the certificate"):
         release(records, "iota-1102-20C", by="J.  HARRIS")
-    assert release(records, "iota-1102-20C", by="A. Huber", reason="checked").waiting == 1
+    with pytest.raises(CmmUqError, match="iota-1102-20C states fail"):
+        release(records, "iota-1102-20C", by="A. Huber", reason="checked")
+    first = release(records, "iota-1102-20C", by="A. Huber", reason="checked", despite="the customer asked for it")
+    assert first.waiting == 1
     assert records.certificates()[0].state == "draft"
     with pytest.raises(CmmUqError, match="signed the certificate"):
         release(records, "iota-1102-20C", by="a. huber")
-    assert release(records, "1", by="B. Kern").certificate.state == "released"
-    assert [(one.by, one.reason) for one in records.signatures(1)] == [("A. Huber", "checked"), ("B. Kern", "")]
+    last = release(records, "1", by="B. Kern", despite="the customer asked for it")
+    assert last.certificate.state == "released"
+    assert [(one.by, one.reason) for one in records.signatures(1)] == [
+        ("A. Huber", "checked; fail: the customer asked for it"), ("B. Kern", "fail: the customer asked for it"),
+    ]  # fmt: skip
     with pytest.raises(CmmUqError, match="released already"):
         release(records, "1", by="C. Dorn")
     with pytest.raises(CmmUqError, match="for a reason"):
