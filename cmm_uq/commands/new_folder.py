@@ -76,7 +76,7 @@ def read_new(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
 
 
 def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
-    """Dotted keys of machine, artefact, test and limits that nobody gave, and the date of a measurement that nobody has made yet."""
+    """Dotted keys of machine, artefact, test and limits that nobody gave, and the date of what nobody has measured yet."""
     dated = set() if "date" in given.get("job", {}) else {"job.date"}
     return dated | {
         f"{table}.{key}"

@@ -23,8 +23,12 @@ from cmm_uq.screening.screened import Finding, screened
 from cmm_uq.screening.shape import Screening
 
 
-def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+def recorded_model(job: Job, *, placings: bool = False) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     """The model that a job names, of what the screening leaves of its recording, and what it found.
+
+    Parameters
+    ----------
+    placings : whether nothing but the placings is of interest, for which nominal coordinates serve as well.
 
     Raises
     ------
@@ -40,7 +44,8 @@ def recorded_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     )  # fmt: skip
     artefact = observe(job.facts.artefact, recording.points, where=where)
     model = model_of(job, artefact)
-    _refuse_exact(job, model)
+    if not placings:
+        _refuse_exact(job, model)
     return model, (*recording.findings, *_unread(artefact))
 
 
@@ -81,11 +86,11 @@ def _unread(artefact: Artefact) -> list[Finding]:
 
 
 def refuse_unfit(job: Job) -> None:
-    """Refuse a recording that no certificate could be made of; one that holds planned coordinates, or none, is let through.
+    """Refuse a damaged recording; one that holds planned coordinates, or none, is let through, and so are nominal ones.
 
     Raises
     ------
     CmmUqError : see :func:`recorded_model`.
     """
     if len(job.points) and not job.planned and kind_of(job).observe is not None:
-        recorded_model(job)
+        recorded_model(job, placings=True)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from cmm_uq.commands.analysis import analyse_job
+from cmm_uq.commands.check import check_job
 from cmm_uq.commands.planning import RECORDED, Plan, make_plan
 from cmm_uq.commands.reading import read_job
+from cmm_uq.commands.simulate import simulate
+from cmm_uq.errors import CmmUqError
+from cmm_uq.jobs.truth import Truth
 from cmm_uq.points import Points
 from tests.commands.test_planning import planned
 from tests.conformity.recorded import SEVEN, gauge
@@ -32,13 +39,20 @@ standard = "ISO 10360-2:2009"
 limit_um = 5.0
 """
 
+DIRECTED = ("approach_x", "approach_y", "approach_z")
 
-def after(folder: Path, points: Points) -> Plan:
+
+def after(folder: Path, points: Points, further: Sequence[str] = DIRECTED) -> Plan:
+    """The plan of a recording of nominal points, with these columns."""
     columns = np.column_stack([
-        points.measurement, points.point, points.repeat, points.xyz, points.columns["reference_mm"]
+        points.measurement, points.point, points.repeat, points.xyz, points.columns["reference_mm"],
+        *(np.sign(points.columns[name]) for name in further),
     ])  # fmt: skip
-    rows = ["measurement,point,repeat,x_mm,y_mm,z_mm,reference_mm"]
-    rows += [f"{m:.0f},{p:.0f},{r:.0f},{x:.7f},{y:.7f},{z:.7f},{d:g}" for m, p, r, x, y, z, d in columns]
+    rows = [",".join(["measurement,point,repeat,x_mm,y_mm,z_mm,reference_mm", *further])]
+    rows += [
+        ",".join([f"{m:.0f},{p:.0f},{r:.0f},{x:.7f},{y:.7f},{z:.7f}", *map(str, others)])
+        for m, p, r, x, y, z, *others in columns.tolist()
+    ]
     (folder / "recording.csv").write_text("\n".join(rows), encoding="utf-8")
     (folder / "job.toml").write_text(JOB, encoding="utf-8")
     return make_plan(read_job(folder, recorded=False), power=False)
@@ -57,6 +71,24 @@ def test_where_nothing_is_missing_nothing_is_placed(tmp_path: Path) -> None:
     plan = after(tmp_path, gauge(SEVEN).points)
     assert plan.to_measure == ()
     assert all(condition.met for condition in plan.conditions)
+
+
+def test_without_directions_the_lengths_are_not_shown_to_be_bidirectional(tmp_path: Path) -> None:
+    plan = after(tmp_path, gauge(SEVEN).points, ())
+    assert [condition.missing for condition in plan.conditions if not condition.met] == [
+        ("bidirectional lengths: from which side each end was reached is not recorded",)
+    ]
+
+
+def test_nominal_points_serve_for_a_plan_and_a_simulation_and_for_no_certificate(tmp_path: Path) -> None:
+    after(tmp_path, gauge(SEVEN).points)
+    job = read_job(tmp_path)
+    drawn = simulate(job, Truth.model_validate({"seed": 1, "noise": {"coordinate_um": 1.0}}))
+    assert np.std(drawn.xyz - job.points.xyz) == pytest.approx(1e-3, rel=0.1)
+    (problem,) = check_job(tmp_path).problems
+    assert "the readings have no scatter at all" in problem.problem
+    with pytest.raises(CmmUqError, match="the readings have no scatter at all"):
+        analyse_job(job)
 
 
 def test_copies_of_a_line_are_placed_again(tmp_path: Path) -> None:
