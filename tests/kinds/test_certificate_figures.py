@@ -102,7 +102,12 @@ def of_test_value(results: Results) -> list[Record]:
     return [[line | {"contribution": scale * line["contribution"]}] for line in lines if line["contribution"]]
 
 
-STATED = ("ASME B89.4.1-1997, volumetric performance", "ISO 10360-2:2009, E0", "ISO 10360-5:2010, P_FTU", "VDI/VDE 2617, E0")
+STATED = (
+    "ASME B89.4.1-1997, volumetric performance",
+    "ISO 10360-2:2009, E0",
+    "ISO 10360-5:2010, P_FTU",
+    "VDI/VDE 2617, E0",
+)
 
 RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
     "Figures of performance": lambda r: [[quantity] for quantity in r["accuracy_uncertainty"].values()],
