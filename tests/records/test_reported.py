@@ -47,7 +47,9 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
     stated = 'issued = 2004-09-02\ncustomer = "C"\naddress = "D"\n'  # what a certificate must state to be released
     toml = toml.replace("[job]\n", f'[job]\nadjusted_since = 2004-03-01\noperator = "J. Harris"\n{stated}')
     issuer = 'issuer = "national institute"\narrangement = "CIPM MRA"\ndate = 2004-01-05\ndue = 2005-01-01\n'
-    toml = toml.replace('machine = "DEA Iota 1102"\n', issuer)  # which certified the bar on this machine: no traceability
+    toml = toml.replace(
+        'machine = "DEA Iota 1102"\n', issuer
+    )  # which certified the bar on this machine: no traceability
     (job / "job.toml").write_text(toml + LABORATORY, encoding="utf-8")
     write_report(job, folder / "reports" / "iota", records=folder / "reports" / "records.db", language="fr")
     return folder / "reports"
