@@ -43,6 +43,7 @@ _MASSES = (0.95, 0.5)  # probability inside the outer and the inner contour
 _SCALE = 0.9  # part of a panel's place that it fills
 _HEADROOM = 0.92  # part of a panel's height that its density fills
 _LEFT, _BELOW, _ABOVE = 14.0, 11.0, 4.5  # least room for figures and names, mm
+_HEIGHT = 80.0  # of all panels, mm, as long as none is smaller than 10 mm: text and tables stand on the same page
 _SLANT = 40  # of the figures under the panels, degrees
 
 
@@ -153,7 +154,7 @@ class _Panels:
         longest = max(width_mm(text, TINY) for _, texts in self.ticks for text in texts)
         self.left = max(_LEFT, longest + 3.0)
         below = max(_BELOW, longest * np.sin(np.radians(_SLANT)) + 4.0)
-        self.panel_mm = min(42.0, (WIDTH_MM - self.left - 1) / self.count, 120.0 / self.count)
+        self.panel_mm = min(30.0, (WIDTH_MM - self.left - 1) / self.count, max(_HEIGHT / self.count, 10.0))
         height = self.count * self.panel_mm + below + _ABOVE
         self.figure = new_figure(height)
         ax = self.figure.add_axes((0, 0, 1, 1))

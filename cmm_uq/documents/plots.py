@@ -114,7 +114,7 @@ def _panels(
     size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
     with house_style():
         two = len(series) == 2
-        figure = new_figure(96 if two else 62)
+        figure = new_figure(84 if two else 62)
         axes = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
         figure.subplots_adjust(
             left=0.082, right=0.995, bottom=0.105 if two else 0.16, top=0.945 if two else 0.92, hspace=0.27
