@@ -24,10 +24,13 @@ SMALLEST = 0.66
 _PAGE = 256.0
 """Height of the text."""
 
+_BROWSER = 1.3
+"""Times as high as in the PDF is what a browser prints."""
+
 _MEASURED = 0.85
 """Of the height that is reckoned from letters, what Typst makes of it."""
 
-_LONG, _NAME = 160, 45
+_LONG, _NAME = 120, 45
 """Letters from which a text is given by its beginning, and least letters of that."""
 
 _CUT = re.compile(r"(?<=[.;:])\s|(?<=[。；：])")
@@ -53,14 +56,14 @@ def fitted(document: Document) -> Document:
 def picture_share(document: Document) -> int:
     """Part of the width that the picture of the first page has room for in print, per cent."""
     tall = sum(_picture(block) for block in _first(document) if isinstance(block, Plot))
-    room = 100 * SMALLEST + (100 * (_PAGE - _height(document)) / tall if tall else 0)
+    room = 100 * SMALLEST + (100 * (_PAGE / _BROWSER - _height(document)) / tall if tall else 0)
     return max((share for share in (75, 85, 100) if share <= room), default=66)
 
 
 def tightness(document: Document) -> int:
-    """How much smaller the first page is set in print where no smaller picture makes room enough, per cent."""
-    share = 100 * _PAGE / _height(document) if document.decides else 100
-    return max((part for part in (80, 85, 90, 95, 100) if part <= share), default=80)
+    """Size of the first page as a browser prints it, per cent; smaller letters make longer lines, too."""
+    share = 100 * (_PAGE / (_BROWSER * _height(document))) ** 0.8 if document.decides else 100
+    return max((part for part in range(70, 105, 5) if part <= share), default=70)
 
 
 def _remarks_behind(document: Document) -> Document:
