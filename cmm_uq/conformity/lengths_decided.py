@@ -19,9 +19,9 @@ from cmm_uq.conformity.shared_causes import Causes, causes_of_lengths, length_bu
 from cmm_uq.conformity.short_gauge import added_in_words
 from cmm_uq.conformity.standard import NOT_STATED, Test
 from cmm_uq.conformity.statement import Decided, Statement, least_favourable
-from cmm_uq.conformity.uncertainty_lines import WARM, away_from_20, u_of_repeats
+from cmm_uq.conformity.uncertainty_lines import LENGTH_LINES, WARM, away_from_20, u_of_repeats
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.circumstances import TestUncertainty
+from cmm_uq.jobs.circumstances import LINE_KEYS, TestUncertainty
 from cmm_uq.messages import NOTHING, Text, at_key, plural, say, semicolons
 from cmm_uq.model.artefact import Artefact, Indications
 from cmm_uq.points import Ints
@@ -215,8 +215,8 @@ def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
 
 
 def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
-    further = (stated.u_cte_per_k, stated.u_temperature_k, stated.u_alignment_um, stated.u_fixturing_um)
-    if worst.u_um > 0 and any(further):
+    further = any(getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in LENGTH_LINES[1:])
+    if worst.u_um > 0 and further:
         return say("u is the test uncertainty (ISO/TS 23165), {u_um:.3g} µm for the length named.", u_um=worst.u_um)
     if worst.u_um > 0:
         return say(
