@@ -149,7 +149,7 @@ class _Panels:
     def __init__(self, ranges: Floats, draws: Floats) -> None:
         self.ranges, self.count = ranges, len(ranges)
         self.ticks = [
-            _ticks(low, high, most=1 if self.count > 8 else 2 if self.count > 5 else 4) for low, high in ranges
+            _ticks(low, high, most=1 if self.count > 5 else 2 if self.count > 3 else 4) for low, high in ranges
         ]
         longest = max(width_mm(text, TINY) for _, texts in self.ticks for text in texts)
         self.left = max(_LEFT, longest + 3.0)

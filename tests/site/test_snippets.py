@@ -155,7 +155,8 @@ def test_the_job_of_a_laboratory_with_everything_stated_passes(project: Path) ->
     (form.parent / job["laboratory"]["logo"]).write_text('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"/>')
     simulated, heading, *rows = (project / "readings" / "recording.csv").read_text(encoding="utf-8").splitlines()
     assert simulated.startswith("# simulated")
-    recorded = [f"{heading},temp_artefact_c", *(f"{row},20.1" for row in rows), ""]
+    assert heading.endswith(",temp_artefact_c")
+    recorded = [heading, *(f"{row.rpartition(',')[0]},20.1" for row in rows), ""]
     (form.parent / job["recording"]["file"]).write_text("\n".join(recorded), encoding="utf-8")
     assert run(["cmm-uq", "check", "stated"], project).stdout.startswith("SOUND  stated: nothing would stop report\n")
     done = run(["cmm-uq", "report", "stated"], project)
