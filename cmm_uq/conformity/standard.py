@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -252,12 +252,7 @@ class Test:
     @cached_property
     def _u_of_unstated(self) -> Callable[[float], float]:
         """Standard uncertainty, µm, that what is not stated may well have, of a length in mm."""
-
-        @cache
-        def of(length_mm: float) -> float:
-            return u_of_unstated(self.characteristic.lines, self.recorded, self.circumstances, length_mm)
-
-        return of
+        return cache(partial(u_of_unstated, self.characteristic.lines, self.recorded, self.circumstances))
 
     def least_u(self, lengths_mm: Floats) -> Floats:
         """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.
