@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.conformity.decision import decide
-from cmm_uq.conformity.risk import Known
+from cmm_uq.analysis.conformity.decision import decide
+from cmm_uq.analysis.conformity.risk import Known
 from cmm_uq.jobs.conformity import FalseAccept, GuardBand, PosteriorProbability, Rule, UnconditionalRisk
 
 DRAWS = 100_000

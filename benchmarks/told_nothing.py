@@ -16,10 +16,10 @@ from multiprocessing import Pool
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.diagnosis.diagnosis import diagnose
-from cmm_uq.kinds import artefact_facts, artefact_of
-from cmm_uq.model import MeasurementModel
-from cmm_uq.points import Machine, Points
+from cmm_uq.analysis.diagnosis.diagnosis import diagnose
+from cmm_uq.artefacts import artefact_facts, artefact_of
+from cmm_uq.base.points import Machine, Points
+from cmm_uq.machine.model import MeasurementModel
 
 TRAVEL = np.array([[0.0, 1200.0], [0.0, 900.0], [-700.0, 0.0]])
 LENGTH, BARS, NOISE_UM, SEED = 500.0, 60, 1.0, 2026

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # typing alone would cost ten times as much as all of this
 if TYPE_CHECKING:
-    from cmm_uq.api.beginning import check, new
-    from cmm_uq.api.calls import budget, compensate, diagnose, job, part, plan, prove, read, report, simulate
-    from cmm_uq.api.recertification import due, history
-    from cmm_uq.errors import CmmUqError
+    from cmm_uq.app.api.beginning import check, new
+    from cmm_uq.app.api.calls import budget, compensate, diagnose, job, part, plan, prove, read, report, simulate
+    from cmm_uq.app.api.recertification import due, history
+    from cmm_uq.base.errors import CmmUqError
 
 __version__ = "0.15.0"
 
@@ -30,9 +30,9 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    places = {"CmmUqError": "cmm_uq.errors", "check": "cmm_uq.api.beginning", "new": "cmm_uq.api.beginning",
-              "due": "cmm_uq.api.recertification", "history": "cmm_uq.api.recertification"}  # fmt: skip
-    found = getattr(import_module(places.get(name, "cmm_uq.api.calls")), name)
+    places = {"CmmUqError": "cmm_uq.base.errors", "check": "cmm_uq.app.api.beginning", "new": "cmm_uq.app.api.beginning",
+              "due": "cmm_uq.app.api.recertification", "history": "cmm_uq.app.api.recertification"}  # fmt: skip
+    found = getattr(import_module(places.get(name, "cmm_uq.app.api.calls")), name)
     globals()[name] = found
     return found
 

@@ -1,5 +1,5 @@
 """``python -m cmm_uq`` is the command ``cmm-uq``."""
 
-from cmm_uq.cli import main
+from cmm_uq.app.cli import main
 
 main()

@@ -1,7 +1,7 @@
 """The catalogues in step with the sentences of the program: ``python -m tests.catalogues`` brings in what is new.
 
 A sentence that was changed keeps its translation, marked fuzzy; a new one is empty; what is no longer said is dropped. Both
-are found by ``tests/languages/test_catalogues.py`` until somebody has translated them, and stay English in documents.
+are found by ``tests/base/languages/test_catalogues.py`` until somebody has translated them, and stay English in documents.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import get_args
 
 import polib
 
-from cmm_uq.languages.catalogue import file_of
-from cmm_uq.languages.language import ENGLISH, Code
+from cmm_uq.base.languages.catalogue import file_of
+from cmm_uq.base.languages.language import ENGLISH, Code
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "cmm_uq"

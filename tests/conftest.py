@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from cmm_uq.cli import _NEW_OBJECTS
-from cmm_uq.points import Machine, Points
+from cmm_uq.app.cli import _NEW_OBJECTS
+from cmm_uq.base.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Workers of one run share what takes long to make: see tests/kinds/simulated.py."""
+    """Workers of one run share what takes long to make: see tests/artefacts/simulated.py."""
     os.environ["CMM_UQ_RECORDS"] = "none"  # what is tested of records names them
     gc.disable()  # nothing of what is collected goes again
     if hasattr(config, "workerinput"):

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.report import REPORT, report_outcome
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import REPORT, report_outcome
+from cmm_uq.base.files.toml_file import as_toml
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.job import PartJob, part_of
-from cmm_uq.jobs.toml_file import as_toml
-from cmm_uq.points import Floats
 from tests.conftest import ROOT
 from tests.jobs.part.parts import tables
 

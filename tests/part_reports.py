@@ -12,21 +12,21 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.commands.part import part_found
-from cmm_uq.commands.part_written import Asked, contents_of, found_of
-from cmm_uq.commands.written import Stage, silent
-from cmm_uq.documents.part.found import PartFound
-from cmm_uq.inference.least_squares import LeastSquares
-from cmm_uq.inference.linear_model import LinearModel
-from cmm_uq.inference.noise import Components
-from cmm_uq.inference.posterior import NoisyPosterior
-from cmm_uq.inference.sampling import sample_with_noise
+from cmm_uq.analysis.parts.plan import Plan
+from cmm_uq.analysis.parts.reducing import Way, spread
+from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.app.commands.part import part_found
+from cmm_uq.app.commands.part_written import Asked, contents_of, found_of
+from cmm_uq.app.commands.written import Stage, silent
+from cmm_uq.base.messages import say
+from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.verify.pdf_file import PdfFile
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.messages import say
-from cmm_uq.parts.plan import Plan
-from cmm_uq.parts.reducing import Way, spread
-from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.verification.pdf_file import PdfFile
+from cmm_uq.maths.inference.least_squares import LeastSquares
+from cmm_uq.maths.inference.linear_model import LinearModel
+from cmm_uq.maths.inference.noise import Components
+from cmm_uq.maths.inference.posterior import NoisyPosterior
+from cmm_uq.maths.inference.sampling import sample_with_noise
 from tests.part_machines import by_certificate, plate_of
 
 TRIALS = 1000

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.parts.machine import MachineState, StatedNoise
-from cmm_uq.parts.placing import Pose
-from cmm_uq.parts.plan import Association, Characteristic, Feature, Nominal
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.points import Floats, Machine
+from cmm_uq.analysis.parts.machine import MachineState, StatedNoise
+from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.plan import Association, Characteristic, Feature, Nominal
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.machine.physics.catalogue import effects
 
 UP = np.array([0.0, 0.0, 1.0])
 MACHINE = Machine("m", travel_mm=np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]]))

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.analysis.planning.advice import Suggestion, suggestions
+from cmm_uq.analysis.planning.setting import Planning
+from cmm_uq.analysis.planning.suggestion import next_plan
+from cmm_uq.analysis.screening import screened as screening
+from cmm_uq.analysis.screening.screened import Screened
+from cmm_uq.analysis.screening.shape import Screening
+from cmm_uq.artefacts import artefact_facts, kind_named
+from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.kinds import artefact_facts, kind_named
-from cmm_uq.planning.advice import Suggestion, suggestions
-from cmm_uq.planning.setting import Planning
-from cmm_uq.planning.suggestion import next_plan
-from cmm_uq.points import Floats, Machine, Points
-from cmm_uq.screening import screened as screening
-from cmm_uq.screening.screened import Screened
-from cmm_uq.screening.shape import Screening
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]])
 """Of the DEA Iota 1102, mm."""

@@ -11,15 +11,16 @@ from typing import Any, get_type_hints
 
 from typer.models import ArgumentInfo, CommandInfo
 
-from cmm_uq.cli.commands import app
-from cmm_uq.commands.new import known
-from cmm_uq.commands.schemas import SCHEMAS, as_text, schema_named
-from cmm_uq.documents.part.results_keys import PART_RESULTS
-from cmm_uq.documents.proof.results import KEYS as PROOF
-from cmm_uq.documents.proof.results import RATE
-from cmm_uq.documents.results_keys import QUANTITY, RESULTS
-from cmm_uq.instruments.library import profile_named, ready
-from cmm_uq.instruments.profile import ProfileFile
+from cmm_uq.analysis.planning.setting import Planning
+from cmm_uq.app.cli.commands import app
+from cmm_uq.app.commands.new import known
+from cmm_uq.app.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.artefacts import kind_named
+from cmm_uq.base.files.sentences import unit_of
+from cmm_uq.certificate.part.results_keys import PART_RESULTS
+from cmm_uq.certificate.proof.results import KEYS as PROOF
+from cmm_uq.certificate.proof.results import RATE
+from cmm_uq.certificate.results_keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.part import drawing_dmis, drawing_qif
@@ -29,13 +30,12 @@ from cmm_uq.jobs.part.drawing_qif import PROGRAM as QIF
 from cmm_uq.jobs.part.feature import FEWEST, PATTERNS
 from cmm_uq.jobs.recording import REQUIRED
 from cmm_uq.jobs.schema import keys_of
-from cmm_uq.jobs.sentences import unit_of
 from cmm_uq.jobs.toml_text import without_place, written
-from cmm_uq.kinds import kind_named
-from cmm_uq.physics.catalogue import EVERY
-from cmm_uq.planning.setting import Planning
-from cmm_uq.uncertainty.budgets.tables import TABLES
-from cmm_uq.uncertainty.input_keys import KINDS as DISTRIBUTIONS
+from cmm_uq.laboratory.live.instruments.library import profile_named, ready
+from cmm_uq.laboratory.live.instruments.profile import ProfileFile
+from cmm_uq.machine.physics.catalogue import EVERY
+from cmm_uq.maths.uncertainty.budgets.tables import TABLES
+from cmm_uq.maths.uncertainty.input_keys import KINDS as DISTRIBUTIONS
 from tests.conftest import ROOT
 
 SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"
@@ -244,7 +244,7 @@ def ready_profiles() -> str:
     rows = [(f"[`{one.name}`](#{one.name})", one.title, _spoken(one)) for one in found]
     parts = [
         "What is not found is assumed, and said. None was tried on real hardware. `cmm-uq instruments list` lists them; a "
-        "profile of your own may begin as a copy of one, from `cmm_uq/instruments/profiles`.",
+        "profile of your own may begin as a copy of one, from `cmm_uq/laboratory/live/instruments/profiles`.",
         table(("profile", "instrument", "line"), rows),
     ]  # fmt: skip
     for one in found:

@@ -1,54 +1,74 @@
-"""The rooms of the package stand in the order of docs/layout.md, and every import goes to a room above."""
+"""The package is laid out as docs/layout.md says: domains in their order, and kinds known by name only where they may be."""
 
 from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
-import pytest
-
-from cmm_uq.kinds import BUILT_IN
+from cmm_uq.artefacts import BUILT_IN
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "cmm_uq"
-ROWS = [line.split("|")[1] for line in (ROOT / "docs" / "layout.md").read_text(encoding="utf-8").splitlines()
-        if line.startswith("| `")]  # fmt: skip
-ORDER = {name.removesuffix(".py"): place for place, row in enumerate(ROWS) for name in re.findall(r"`([^`]+)`", row)}
-KNOW_KINDS = ("kinds", "commands", "geometry", "parts")
-MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name not in ("__main__.py", "__init__.py"))
+PAGE = (ROOT / "docs" / "layout.md").read_text(encoding="utf-8").partition("A domain imports")[0]
+TABLE = re.findall(r"^\| `(\w+)` \| (.*) \|$", PAGE, re.MULTILINE)
+DOMAINS = [name for name, _ in TABLE]
+FILES = sorted(PACKAGE.rglob("*.py"))
+KNOW_KINDS = {"artefacts", "app"}
+"""Domains that know all kinds; a plane and a sphere are features of geometry, of parts and of plans of parts too."""
+SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
 
 
-def room_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+def module_of(path: Path) -> str:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def imported(path: Path) -> set[str]:
-    names = [node.module for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-             if isinstance(node, ast.ImportFrom) and node.module]  # fmt: skip
-    return {name.split(".")[1] for name in names if name.startswith("cmm_uq.")}
+MODULES = {module_of(path): path for path in FILES}
 
 
-def test_every_room_is_in_the_table() -> None:
-    assert {room_of(path) for path in MODULES} <= set(ORDER)
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_from_its_own_room_and_those_above(path: Path) -> None:
-    room = room_of(path)
-    below = {name for name in imported(path) - {room} if ORDER[name] > ORDER[room]}
+def for_types_only(tree: ast.Module) -> set[ast.AST]:
+    blocks = (node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test))
+    return {node for block in blocks for node in ast.walk(block)}
+
+
+@cache
+def imports(module: str) -> frozenset[str]:
+    """The modules of the package that a module imports, anywhere in it but for types."""
+    tree = tree_of(MODULES[module])
+    passed = for_types_only(tree)
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("cmm_uq") and node not in passed:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in MODULES else str(node.module) for name in inner}
+    return frozenset(found - {module})
+
+
+def domain_of(module: str) -> str:
+    return [*module.split("."), ""][1]
+
+
+def test_every_domain_is_in_the_table() -> None:
+    assert {domain_of(module) for module, path in MODULES.items() if path.parent != PACKAGE} == set(DOMAINS)
+
+
+def test_a_domain_imports_from_those_above_it() -> None:
+    inside = [module for module in MODULES if domain_of(module) in DOMAINS]
+    below = [f"{module} imports {other}" for module in inside for other in imports(module)
+             if domain_of(other) in DOMAINS and DOMAINS.index(domain_of(other)) > DOMAINS.index(domain_of(module))]  # fmt: skip
     assert not below
 
 
-def constants(tree: ast.AST) -> set[object]:
-    return {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
-
-
-@pytest.mark.parametrize("path", [path for path in PACKAGE.rglob("*.py")
-                                  if room_of(path) not in KNOW_KINDS and path.parent != PACKAGE / "jobs" / "part"],
-                         ids=lambda path: str(path.relative_to(PACKAGE)))  # fmt: skip
-def test_no_room_below_knows_a_kind_by_name(path: Path) -> None:
-    """Only the kinds themselves, their registry and the commands do; a plane and a sphere are features of geometry too."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    assert not constants(tree) & set(BUILT_IN)
-    assert "kinds" not in imported(path)
+def test_no_domain_below_knows_a_kind_by_name() -> None:
+    """Only the kinds themselves, their registry and the commands do."""
+    asked = [path for path in FILES if domain_of(module_of(path)) not in KNOW_KINDS
+             and not path.relative_to(PACKAGE).as_posix().startswith(SHAPES_TOO)]  # fmt: skip
+    named = {path: {node.value for node in ast.walk(tree_of(path)) if isinstance(node, ast.Constant)} for path in asked}
+    assert not {module_of(path): names & set(BUILT_IN) for path, names in named.items() if names & set(BUILT_IN)}

@@ -23,48 +23,48 @@ import numpy as np
 import pytest
 import typer
 
-from cmm_uq.cli.printing import conclude
-from cmm_uq.commands.batch_jobs import conforming
-from cmm_uq.commands.batch_table import COLUMNS, rows
-from cmm_uq.commands.due import due_in
-from cmm_uq.commands.fleet import _members
-from cmm_uq.commands.history import history_of
-from cmm_uq.commands.release import release
-from cmm_uq.commands.written import Written
-from cmm_uq.conformity.decision import decide
-from cmm_uq.conformity.statement import Decided, Statement
-from cmm_uq.dcc import written
-from cmm_uq.documents import first_page
-from cmm_uq.documents.compose import certified
-from cmm_uq.documents.digital_certificate.certificate import digital_certificate
-from cmm_uq.documents.history_page import overview_of
-from cmm_uq.documents.html import render_html
-from cmm_uq.documents.outcome import Outcome, Page
-from cmm_uq.documents.qif_file import qif
-from cmm_uq.documents.result import Result
-from cmm_uq.documents.results_file import as_json
-from cmm_uq.documents.summary import subject_of
+from cmm_uq.analysis.conformity.decision import decide
+from cmm_uq.analysis.conformity.statement import Decided, Statement
+from cmm_uq.app.cli.printing import conclude
+from cmm_uq.app.commands.batch_jobs import conforming
+from cmm_uq.app.commands.batch_table import COLUMNS, rows
+from cmm_uq.app.commands.due import due_in
+from cmm_uq.app.commands.fleet import _members
+from cmm_uq.app.commands.history import history_of
+from cmm_uq.app.commands.release import release
+from cmm_uq.app.commands.written import Written
+from cmm_uq.app.serve.certificate_page import _notices
+from cmm_uq.app.serve.due import by_rule
+from cmm_uq.app.serve.overview import groups
+from cmm_uq.base.messages import say
+from cmm_uq.certificate import first_page
+from cmm_uq.certificate.compose import certified
+from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
+from cmm_uq.certificate.history_page import overview_of
+from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.outcome import Outcome, Page
+from cmm_uq.certificate.qif_file import qif
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.summary import subject_of
+from cmm_uq.certificate.verify.consistent import check_verdicts
+from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.dcc import written
 from cmm_uq.jobs.reported import Reported
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.messages import say
-from cmm_uq.recertification.fleet_found import OfValue
-from cmm_uq.records import open_records
-from cmm_uq.records.content import certificate_content
-from cmm_uq.records.listing import outcomes_of, standing_of_all
-from cmm_uq.records.store import Records
-from cmm_uq.scheduling.found import Found
-from cmm_uq.scheduling.notices import of_results
-from cmm_uq.scheduling.work import REPORTED, Ended
-from cmm_uq.serving.certificate_page import _notices
-from cmm_uq.serving.due import by_rule
-from cmm_uq.serving.overview import groups
-from cmm_uq.verification.consistent import check_verdicts
-from cmm_uq.verification.found import Inquiry
-from tests.cli.laboratory import CHAIN, STATED
-from tests.cli.process import run
+from cmm_uq.laboratory.due.fleet_found import OfValue
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.content import certificate_content
+from cmm_uq.laboratory.records.listing import outcomes_of, standing_of_all
+from cmm_uq.laboratory.records.store import Records
+from cmm_uq.laboratory.schedule.found import Found
+from cmm_uq.laboratory.schedule.notices import of_results
+from cmm_uq.laboratory.schedule.work import REPORTED, Ended
+from tests.app.cli.laboratory import CHAIN, STATED
+from tests.app.cli.process import run
+from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
-from tests.kinds.simulated import analysed
 
 JOB = "iota-1102-20C"
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.instruments.library import ready
+from cmm_uq.laboratory.live.instruments.library import ready
 from tests.catalogues import TRANSLATED
 from tests.conftest import ROOT
 
@@ -33,15 +33,17 @@ def test_the_wheel_holds_the_templates_the_catalogues_its_type_marker_and_the_pr
     packed = {path.name for path in (unpacked / "cmm_uq" / "templates").iterdir()}
     assert packed == {path.name for path in (ROOT / "templates").iterdir()}
     assert (unpacked / "cmm_uq" / "py.typed").is_file()
-    assert {path.stem for path in (unpacked / "cmm_uq" / "instruments" / "profiles").iterdir()} == set(ready())
-    assert {path.stem for path in (unpacked / "cmm_uq" / "languages").glob("*.po")} == set(TRANSLATED)
+    assert {
+        path.stem for path in (unpacked / "cmm_uq" / "laboratory" / "live" / "instruments" / "profiles").iterdir()
+    } == set(ready())
+    assert {path.stem for path in (unpacked / "cmm_uq" / "base" / "languages").glob("*.po")} == set(TRANSLATED)
     assert not (unpacked / "tests").exists()
 
 
 def test_it_reports_from_an_empty_folder(unpacked: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "iota-1102-20C", tmp_path / "job")
     script = (
-        "import sys, cmm_uq; assert 'site' in cmm_uq.__file__, cmm_uq.__file__; from cmm_uq.cli import main; main()"
+        "import sys, cmm_uq; assert 'site' in cmm_uq.__file__, cmm_uq.__file__; from cmm_uq.app.cli import main; main()"
     )
     done = subprocess.run(
         [sys.executable, "-c", script, "report", "job"], cwd=tmp_path, capture_output=True, text=True, check=False,

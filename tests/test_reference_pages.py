@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.commands.new import known
+from cmm_uq.app.commands.new import known
+from cmm_uq.artefacts import kind_named
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.recording import OPTIONAL, REQUIRED
-from cmm_uq.kinds import kind_named
-from cmm_uq.physics.catalogue import EVERY
+from cmm_uq.machine.physics.catalogue import EVERY
 from tests.conftest import ROOT
 from tests.reference_pages import files
 

@@ -17,12 +17,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from cmm_uq.acquisition.folder import read_story, sessions_in
-from cmm_uq.acquisition.journal import lines_in
-from cmm_uq.commands import acquire
-from cmm_uq.commands.reading import read_job
-from cmm_uq.instruments.reading import Reading
-from cmm_uq.instruments.source import SYSTEM
+from cmm_uq.app.commands import acquire
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.laboratory.live.folder import read_story, sessions_in
+from cmm_uq.laboratory.live.instruments.reading import Reading
+from cmm_uq.laboratory.live.instruments.source import SYSTEM
+from cmm_uq.laboratory.live.journal import lines_in
 
 EACH = 40
 """Kills of one job, whose plan has so many bars that none is ever complete."""

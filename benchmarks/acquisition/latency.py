@@ -21,11 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.acquisition.folder import read_story
-from cmm_uq.instruments.ipp.server import SimulatedMachine
-from cmm_uq.instruments.simulated.line import simulated
-from cmm_uq.instruments.simulated.speakers import Lines
-from tests.acquisition.session import job_folder
+from cmm_uq.laboratory.live.folder import read_story
+from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
+from cmm_uq.laboratory.live.instruments.simulated.line import simulated
+from cmm_uq.laboratory.live.instruments.simulated.speakers import Lines
+from tests.laboratory.live.session import job_folder
 
 TERMINAL = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "110", "LINES": "45"}
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.points import Machine, Points
+from cmm_uq.base.points import Machine, Points
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 600.0], [-500.0, 0.0]])
 MACHINE = Machine("simulated", "XYZ", TRAVEL)

@@ -30,11 +30,11 @@ from benchmarks.artefact_faults.recordings import (
     triangle,
     twisted,
 )
-from cmm_uq.diagnosis.diagnosis import Diagnosis, diagnose
-from cmm_uq.kinds import artefact_facts, artefact_of
-from cmm_uq.model import MeasurementModel
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.points import Points
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
+from cmm_uq.artefacts import artefact_facts, artefact_of
+from cmm_uq.base.points import Points
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.physics.catalogue import effects
 
 IN_PLANE = ("scale_x", "scale_y", "squareness_xy")
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")

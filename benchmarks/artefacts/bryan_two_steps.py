@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.artefacts import artefact_facts
+from cmm_uq.artefacts.bryan.observe import Bryan
+from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.kinds import artefact_facts
-from cmm_uq.kinds.bryan.observe import Bryan
-from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.points import Floats, Machine, Points
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.physics.catalogue import effects
 
 NAMES = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
 TRUTH = np.array([100.0, -60.0, 20.0, 30.0, -12.0, 80.0])

@@ -15,17 +15,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from cmm_uq.inference.marginal import Marginal
-from cmm_uq.inference.sampling import sample_with_noise
+from cmm_uq.artefacts import artefact_facts
+from cmm_uq.artefacts.digitizer.observe import Digitizer
+from cmm_uq.artefacts.digitizer.plan import THREE, scan
+from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.kinds import artefact_facts
-from cmm_uq.kinds.digitizer.observe import Digitizer
-from cmm_uq.kinds.digitizer.plan import THREE, scan
-from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.model.noise import noise_of
-from cmm_uq.physics.digitizer import euler_313
-from cmm_uq.points import Floats, Machine, Points
-from cmm_uq.units import MICROMETRE
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.physics.digitizer import euler_313
+from cmm_uq.maths.inference.marginal import Marginal
+from cmm_uq.maths.inference.sampling import sample_with_noise
 
 OFFSET = np.array([1.001, 264.505, 129.575])
 SPHERE = np.array([350.0, 350.0, -330.0])

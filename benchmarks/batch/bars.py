@@ -14,9 +14,9 @@ import time
 from pathlib import Path
 
 from benchmarks.batch.measuring import Watch
-from cmm_uq.commands.batch import Asked, write_batch
-from cmm_uq.commands.batch_job import reported
-from cmm_uq.commands.reading import read_job
+from cmm_uq.app.commands.batch import Asked, write_batch
+from cmm_uq.app.commands.batch_job import reported
+from cmm_uq.app.commands.reading import read_job
 from tests.conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "iota-1102-20C"

@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Self
 from unittest import mock
 
-from cmm_uq.scheduling.talking import Talk
+from cmm_uq.laboratory.schedule.talking import Talk
 
 PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 2**20 if hasattr(os, "sysconf") else 4096 / 2**20
 

@@ -15,14 +15,14 @@ from pathlib import Path
 
 from benchmarks.batch.cluster import local_cluster
 from benchmarks.batch.measuring import Watch
-from cmm_uq.commands import batch_asked
-from cmm_uq.commands.batch import Asked, write_batch
-from cmm_uq.scheduling.cluster import cluster_answers
-from cmm_uq.scheduling.pool import answers
-from cmm_uq.scheduling.talking import Work
-from tests.scheduling.small_jobs import small_job
+from cmm_uq.app.commands import batch_asked
+from cmm_uq.app.commands.batch import Asked, write_batch
+from cmm_uq.laboratory.schedule.cluster import cluster_answers
+from cmm_uq.laboratory.schedule.pool import answers
+from cmm_uq.laboratory.schedule.talking import Work
+from tests.laboratory.schedule.small_jobs import small_job
 
-NOTHING, CANNED = "benchmarks.batch.nothing", "tests.scheduling.canned"
+NOTHING, CANNED = "benchmarks.batch.nothing", "tests.laboratory.schedule.canned"
 
 
 def nothing(count: int, workers: int, address: str | None) -> None:

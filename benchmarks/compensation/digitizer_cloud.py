@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from cmm_uq.physics.compensation import Compensation
-from cmm_uq.physics.digitizer import Digitizer, euler_313
-from cmm_uq.physics.error_map import ErrorMap, read_error_map
-from cmm_uq.physics.map_interpolation import ErrorMaps
-from cmm_uq.physics.point_cloud import transform_cloud
+from cmm_uq.machine.physics.compensation import Compensation
+from cmm_uq.machine.physics.digitizer import Digitizer, euler_313
+from cmm_uq.machine.physics.error_map import ErrorMap, read_error_map
+from cmm_uq.machine.physics.map_interpolation import ErrorMaps
+from cmm_uq.machine.physics.point_cloud import transform_cloud
 
-MAPS = Path(__file__).parents[2] / "tests/physics/harris2004"
+MAPS = Path(__file__).parents[2] / "tests/machine/physics/harris2004"
 OFFSET = np.array([1.001, 264.505, 129.575])
 ATTITUDE = euler_313(np.pi / 2, np.pi / 2, -np.pi / 3)
 N = 1_000_000

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import differential_evolution, minimize
 
-from cmm_uq.physics.compensation import Circumstances, Compensation
-from cmm_uq.physics.digitizer import euler_313
-from cmm_uq.physics.error_map import read_error_map
-from cmm_uq.physics.map_interpolation import ErrorMaps
+from cmm_uq.machine.physics.compensation import Circumstances, Compensation
+from cmm_uq.machine.physics.digitizer import euler_313
+from cmm_uq.machine.physics.error_map import read_error_map
+from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 
 ROOT = Path(__file__).parents[2]
 MAPS = ErrorMaps(
-    [read_error_map(ROOT / "tests/physics/harris2004/error_map_20C.csv").with_squareness_arcsec(-173, -19, 21)]
+    [read_error_map(ROOT / "tests/machine/physics/harris2004/error_map_20C.csv").with_squareness_arcsec(-173, -19, 21)]
 )
 OFFSET = np.array([1.001, 264.505, 129.575])
 GROUPS = np.array([0] * 4 + [1] * 6 + [0] * 4 + [1, 2, 2, 0, 3, 3])

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from cmm_uq.commands.diagnosing import screened_model
-from cmm_uq.commands.reading import read_job
-from cmm_uq.diagnosis.comparison.explanations import known
-from cmm_uq.diagnosis.comparison.search import comparison_of
+from cmm_uq.analysis.diagnosis.comparison.explanations import known
+from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.reading import read_job
 
 ALPHA, MOST = 0.01, 5
 

@@ -12,9 +12,9 @@ import time
 import numpy as np
 from rich.progress import track
 
-from cmm_uq.kinds.error_maps.columns import columns_of
-from cmm_uq.kinds.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
-from cmm_uq.physics.error_map import AxisErrors, ErrorMap
+from cmm_uq.artefacts.error_maps.columns import columns_of
+from cmm_uq.artefacts.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
+from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 
 TRAVEL = ((0, 900), (0, 550), (-500, 0))
 ARCSECOND = np.pi / 648000

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 import cmm_uq
-from cmm_uq.jobs.toml_file import as_toml
-from cmm_uq.points import Floats, Points
+from cmm_uq.base.files.toml_file import as_toml
+from cmm_uq.base.points import Floats, Points
 
 ROOT = Path(__file__).parents[2]
 FOLDER, MACHINE = ROOT / "examples" / "part-iota", ROOT / "examples" / "iota-1102-20C"

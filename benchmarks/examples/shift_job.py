@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from written_job import write
 
-from cmm_uq.points import Floats
+from cmm_uq.base.points import Floats
 
 SEED = 20260102
 SHIFTS = (0.0, 20.0, 50.0)

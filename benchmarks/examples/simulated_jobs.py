@@ -15,15 +15,15 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.kinds import artefact_facts, artefact_of
-from cmm_uq.kinds.digitizer.plan import THREE, scan
-from cmm_uq.kinds.triangle.placings import placed_triangle
-from cmm_uq.kinds.triangle.standard import TriangleStandard
-from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.model.artefact import Size
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.physics.digitizer import euler_313
-from cmm_uq.points import Floats, Ints, Machine, Points
+from cmm_uq.artefacts import artefact_facts, artefact_of
+from cmm_uq.artefacts.digitizer.plan import THREE, scan
+from cmm_uq.artefacts.triangle.placings import placed_triangle
+from cmm_uq.artefacts.triangle.standard import TriangleStandard
+from cmm_uq.base.points import Floats, Ints, Machine, Points
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.artefact import Size
+from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.digitizer import euler_313
 
 SEED = 20260101
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])

@@ -14,8 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from scipy.optimize import least_squares, linprog
 
-from cmm_uq.geometry import Repeated, associate, cap_directions
-from cmm_uq.geometry.placed import FeatureKind, Placed
+from cmm_uq.maths.geometry import Repeated, associate, cap_directions
+from cmm_uq.maths.geometry.placed import FeatureKind, Placed
 
 CORES, BLOCK, SCATTER = 2, 5000, 2e-3
 MINIMUM_ZONES = 10_000

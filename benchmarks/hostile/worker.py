@@ -29,13 +29,13 @@ MEMORY = 4 * 2**30
 
 def read(kind: str, path: Path) -> None:
     """Read what a command would read first, and no more."""
-    from cmm_uq.commands.reading import read_job
-    from cmm_uq.files.content import content_of
-    from cmm_uq.files.limits import JOB_BYTES
-    from cmm_uq.jobs.toml_file import checked
+    from cmm_uq.app.commands.reading import read_job
+    from cmm_uq.base.files.content import content_of
+    from cmm_uq.base.files.limits import JOB_BYTES
+    from cmm_uq.base.files.toml_file import checked
     from cmm_uq.jobs.truth import Truth
-    from cmm_uq.model.machine_maps import maps_of
-    from cmm_uq.uncertainty.model_file import read_model_file
+    from cmm_uq.machine.model.machine_maps import maps_of
+    from cmm_uq.maths.uncertainty.model_file import read_model_file
 
     if kind == "budget":
         read_model_file(path)
@@ -51,9 +51,9 @@ class Runner:
     """Runs the command in this process, with what it says caught by descriptor, and a fault shown where it happened."""
 
     def __init__(self, stdout: TextIO, stderr: TextIO) -> None:
-        from cmm_uq.cli import commands, main
-        from cmm_uq.errors import CmmUqError
-        from cmm_uq.writing import interruption
+        from cmm_uq.app.cli import commands, main
+        from cmm_uq.base.errors import CmmUqError
+        from cmm_uq.base.output import interruption
 
         commands.app.command("read")(read)
         inner = commands.run

@@ -19,7 +19,7 @@ OUTSIDE = (
     "tests/hostile",
     "tests/test_packaging.py",
     "tests/test_contributing.py",
-    "tests/documents/test_html_layout.py",
+    "tests/certificate/test_html_layout.py",
 )
 """Tests that start other processes or a browser: they would run the code without the fault."""
 QUIET = ["-q", "-p", "no:cacheprovider", "-o", "tmp_path_retention_policy=none", "--hypothesis-profile=ci",

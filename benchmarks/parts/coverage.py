@@ -18,15 +18,15 @@ from dataclasses import replace
 import numpy as np
 
 import cmm_uq
-from cmm_uq.kinds.ballbar.observe import Ballbar
-from cmm_uq.model import MeasurementModel
-from cmm_uq.model.drawn_noise import Noise
-from cmm_uq.parts.conditional import given_recording, joint_posterior
-from cmm_uq.parts.machine import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.parts.placing import Pose
-from cmm_uq.parts.plan import Plan, Stylus
-from cmm_uq.parts.virtual import AtPose, Circumstances
-from cmm_uq.physics.catalogue import effects
+from cmm_uq.analysis.parts.conditional import given_recording, joint_posterior
+from cmm_uq.analysis.parts.machine import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.plan import Plan, Stylus
+from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.drawn_noise import Noise
+from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.parts_drawn import block
 

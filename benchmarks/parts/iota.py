@@ -18,13 +18,13 @@ import numpy as np
 
 import cmm_uq
 from benchmarks.examples.part_iota import COPY, FOLDER, MACHINE, ROOT, chosen, ends
-from cmm_uq.kinds.ballbar.observe import Ballbar
-from cmm_uq.model import MeasurementModel
-from cmm_uq.parts.conditional import given_recording, joint_posterior
-from cmm_uq.parts.machine import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.parts.plan import Characteristic, Plan
-from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.physics.catalogue import effects
+from cmm_uq.analysis.parts.conditional import given_recording, joint_posterior
+from cmm_uq.analysis.parts.machine import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.plan import Characteristic, Plan
+from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.physics.catalogue import effects
 from tests.parts_drawn import spot
 
 COMPENSATED = ROOT / "examples" / "iota-1102-20C-compensated"

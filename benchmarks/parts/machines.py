@@ -25,20 +25,20 @@ from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.study import measure, waiting
 from benchmarks.parts import truth
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, U_TIP_UM, WORDS, as_points, joined, plan
+from cmm_uq.analysis.parts.conditional import given_recording, joint_posterior
+from cmm_uq.analysis.parts.evaluating import Evaluator, Known
+from cmm_uq.analysis.parts.machine import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.result import evaluated, stated
+from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
-from cmm_uq.kinds.ballbar.observe import Ballbar
-from cmm_uq.kinds.gauge_lines.observe import StepGauge
-from cmm_uq.model import MeasurementModel
-from cmm_uq.model.artefact import Artefact
-from cmm_uq.parts.conditional import given_recording, joint_posterior
-from cmm_uq.parts.evaluating import Evaluator, Known
-from cmm_uq.parts.machine import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.parts.of_temperature import Expansion, Surroundings
-from cmm_uq.parts.placing import Pose
-from cmm_uq.parts.result import evaluated, stated
-from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.uncertainty.monte_carlo import Source, from_source
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
 
 PAGE = Path(__file__).parents[2] / "docs" / "parts-study.md"
 BEGIN, END = "<!-- written by benchmarks.parts.machines -->", "<!-- end -->"

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.geometry import fit_circle
-from cmm_uq.parts.machine import MachineState, StatedNoise
-from cmm_uq.parts.placing import Pose
-from cmm_uq.parts.plan import Characteristic, Feature, Nominal, Plan
-from cmm_uq.parts.virtual import AtPose, Circumstances
-from cmm_uq.points import Floats, Machine
+from cmm_uq.analysis.parts.machine import MachineState, StatedNoise
+from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.maths.geometry import fit_circle
 
 TRIALS = 100_000
 

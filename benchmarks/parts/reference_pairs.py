@@ -2,7 +2,7 @@
 
 *Least squares*: deviations orthogonal to every motion and growth of the feature leave it the least-squares feature.
 *Minimum zone*: contact points whose motions balance with positive weights, half of the width to either side, all others
-inside. Both are constructions without any fit (:mod:`cmm_uq.geometry.reference_sets`); the rest is the engine of parts itself:
+inside. Both are constructions without any fit (``reference_sets``); the rest is the engine of parts itself:
 plans, features, characteristics. Pairs are turned and carried to a random place.
 
 Run: ``python -m benchmarks.parts.reference_pairs [SETS]``
@@ -16,12 +16,12 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.geometry.association import Association
-from cmm_uq.geometry.reference_sets import points_with_known_fit, points_with_known_zone
-from cmm_uq.parts.evaluating import Evaluator, characteristics_of
-from cmm_uq.parts.plan import DIRECTED, FORMS, Characteristic, Feature, FeatureKind, Nominal, Plan
-from cmm_uq.points import Floats
-from tests.geometry.surfaces import surface
+from cmm_uq.analysis.parts.evaluating import Evaluator, characteristics_of
+from cmm_uq.analysis.parts.plan import DIRECTED, FORMS, Characteristic, Feature, FeatureKind, Nominal, Plan
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry.association import Association
+from cmm_uq.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone
+from tests.maths.geometry.surfaces import surface
 
 KINDS: tuple[FeatureKind, ...] = ("line", "plane", "circle", "sphere", "cylinder", "cone")
 FORM_OF = dict(zip(("line", "plane", "circle", "cylinder", "sphere"), FORMS, strict=True))

@@ -17,11 +17,11 @@ from contextlib import contextmanager
 import numpy as np
 from scipy.optimize import least_squares
 
-from cmm_uq.parts.machine import StatedNoise, unmodelled_errors
-from cmm_uq.parts.of_temperature import Expansion, Surroundings
-from cmm_uq.parts.plan import Characteristic, Feature, Plan, Stylus
-from cmm_uq.parts.virtual import Circumstances, Virtual
-from cmm_uq.points import Floats
+from cmm_uq.analysis.parts.machine import StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Plan, Stylus
+from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.base.points import Floats
 from tests.parts_drawn import POSE, block, circle, machine, plane
 
 NAMES = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from benchmarks.parts import truth
-from cmm_uq.parts.plan import Characteristic, Feature, FeatureKind, Nominal, Plan, Stylus
-from cmm_uq.points import Floats, Machine, Points
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, FeatureKind, Nominal, Plan, Stylus
+from cmm_uq.base.points import Floats, Machine, Points
 
 KINDS: Mapping[str, FeatureKind] = {
     "A": "plane", "B": "plane", "C": "plane", "D": "plane", "h1": "cylinder", "h2": "cylinder", "S": "sphere",

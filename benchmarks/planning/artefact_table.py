@@ -11,18 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.analysis.planning.identifiability import NOT_TOLD_APART, identifiability
+from cmm_uq.analysis.planning.information import certified, gram
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.separation import FAINT, cosines, imitators, left_of, visible
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.artefacts import artefact_facts, kind_named
+from cmm_uq.base.points import Machine
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.kinds import artefact_facts, kind_named
-from cmm_uq.model.measurement import ARTEFACT
-from cmm_uq.physics.catalogue import CATALOGUE, effects
-from cmm_uq.planning.identifiability import NOT_TOLD_APART, identifiability
-from cmm_uq.planning.information import certified, gram
-from cmm_uq.planning.placing import joined
-from cmm_uq.planning.ready import ready_plan
-from cmm_uq.planning.separation import FAINT, cosines, imitators, left_of, visible
-from cmm_uq.planning.setting import Planning, Setting
-from cmm_uq.planning.volume import Volume
-from cmm_uq.points import Machine
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
 
 BEGIN, END = "<!-- generated: artefact × factor -->", "<!-- end of generated -->"
 MACHINE = Machine("bridge machine", "XYZ", np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]]))

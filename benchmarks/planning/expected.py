@@ -12,12 +12,12 @@ import argparse
 import numpy as np
 from settings import SETTINGS
 
-from cmm_uq.kinds import artefact_of
-from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.model.measurement import ARTEFACT
-from cmm_uq.planning.identifiability import identifiability
-from cmm_uq.planning.placing import joined
-from cmm_uq.planning.ready import ready_plan
+from cmm_uq.analysis.planning.identifiability import identifiability
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.measurement import ARTEFACT
 
 
 def main() -> None:

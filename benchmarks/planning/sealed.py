@@ -19,18 +19,18 @@ from pathlib import Path
 import numpy as np
 from settings import SETTINGS
 
-from cmm_uq.diagnosis.comparison.search import search
-from cmm_uq.diagnosis.diagnosis import _indistinguishable
-from cmm_uq.diagnosis.power import powers, without_fault
-from cmm_uq.errors import CmmUqError
-from cmm_uq.kinds import artefact_of
-from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.physics.catalogue import CATALOGUE
-from cmm_uq.planning.candidates import candidates
-from cmm_uq.planning.exchange import choose, score_of
-from cmm_uq.planning.information import told, whole
-from cmm_uq.planning.placing import joined
-from cmm_uq.planning.ready import ready_plan
+from cmm_uq.analysis.diagnosis.comparison.search import search
+from cmm_uq.analysis.diagnosis.diagnosis import _indistinguishable
+from cmm_uq.analysis.diagnosis.power import powers, without_fault
+from cmm_uq.analysis.planning.candidates import candidates
+from cmm_uq.analysis.planning.exchange import choose, score_of
+from cmm_uq.analysis.planning.information import told, whole
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.physics.catalogue import CATALOGUE
 
 ALPHA = 0.01
 

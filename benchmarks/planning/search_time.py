@@ -7,11 +7,11 @@ import time
 import numpy as np
 from settings import MACHINE, SIX, setting
 
-from cmm_uq.kinds import artefact_facts
-from cmm_uq.planning.candidates import candidates
-from cmm_uq.planning.exchange import CRITERIA, choose, score_of, step
-from cmm_uq.planning.information import told
-from cmm_uq.planning.placing import joined
+from cmm_uq.analysis.planning.candidates import candidates
+from cmm_uq.analysis.planning.exchange import CRITERIA, choose, score_of, step
+from cmm_uq.analysis.planning.information import told
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.artefacts import artefact_facts
 
 
 def main() -> None:

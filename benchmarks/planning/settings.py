@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.artefacts import artefact_facts, kind_named
+from cmm_uq.base.points import Machine
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.kinds import artefact_facts, kind_named
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning.setting import Planning, Setting
-from cmm_uq.planning.volume import Volume
-from cmm_uq.points import Machine
+from cmm_uq.machine.physics.catalogue import effects
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
 MACHINE = Machine("bridge machine", "XYZ", np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]]))

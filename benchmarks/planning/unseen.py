@@ -1,7 +1,7 @@
 """How far the closed form of a recording's power is from recordings drawn and tested one by one.
 
 For artefacts in their ready plans, noise stated or not, white or with set-up offsets: the visible length found with 90 % by
-``cmm_uq.diagnosis.unseen`` over that of ``cmm_uq.diagnosis.power`` (40 draws a size).
+``cmm_uq.analysis.diagnosis.unseen`` over that of ``cmm_uq.analysis.diagnosis.power`` (40 draws a size).
 
     python -m benchmarks.planning.unseen
 """
@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.diagnosis.comparison.search import Found, model_comparison
-from cmm_uq.diagnosis.power import DrawnNoise, powers, without_fault
-from cmm_uq.diagnosis.unseen import POWER, smallest_effects
+from cmm_uq.analysis.diagnosis.comparison.search import Found, model_comparison
+from cmm_uq.analysis.diagnosis.power import DrawnNoise, powers, without_fault
+from cmm_uq.analysis.diagnosis.unseen import POWER, smallest_effects
+from cmm_uq.analysis.planning.noise import PlannedNoise
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.ready import ready_plan
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.planning.noise import PlannedNoise
-from cmm_uq.planning.placing import joined
-from cmm_uq.planning.ready import ready_plan
-from tests.planning.plans import BALLBAR, EVERY_KIND, GAUGE, setting
+from cmm_uq.machine.physics.catalogue import effects
+from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, setting
 
 ALPHA, DRAWS, SIGMA = 0.01, 40, 1e-3
 

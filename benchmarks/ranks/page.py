@@ -20,7 +20,7 @@ _FEWEST = 10
 
 EXPLAINED = f"""\
 Written by `python -m benchmarks.ranks.study FOLDER --page`: simulation-based calibration (Talts et al. 2018,
-arXiv:1804.06788) of `cmm_uq/inference/sampling.py`. Parameters are drawn from their priors, sizes of the noise from theirs
+arXiv:1804.06788) of `inference/sampling.py`. Parameters are drawn from their priors, sizes of the noise from theirs
 ([noise.md](noise.md)), the noise of a coordinate from that of a stated {STATED * 1e3:g} µm. The recording follows from the
 linear model and the components of noise of one of the coverage study's, of which every second has the time in it and so
 slow noise; for the digitizer, of its example. The posterior is sampled as a report samples it, and {DRAWS} draws of it, as

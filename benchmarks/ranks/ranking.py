@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from benchmarks.ranks.drawn import Drawn
-from cmm_uq.inference.marginal import Marginal
-from cmm_uq.inference.noise import AXES, SLOW, Components, Sizes
-from cmm_uq.inference.posterior import NoisyPosterior
+from cmm_uq.maths.inference.marginal import Marginal
+from cmm_uq.maths.inference.noise import AXES, SLOW, Components, Sizes
+from cmm_uq.maths.inference.posterior import NoisyPosterior
 
 DRAWS = 99
 """Of a posterior, so that there are a hundred ranks."""

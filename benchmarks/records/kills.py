@@ -23,10 +23,10 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.records import open_records
-from cmm_uq.writing import Owner, finish_interrupted, sha256_of, staged
-from tests.records.histories import certificate
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output import Owner, finish_interrupted, sha256_of, staged
+from cmm_uq.laboratory.records import open_records
+from tests.laboratory.records.histories import certificate
 
 KILLS, WRITERS, FOLDERS = 1000, 2, 5
 LONGEST_S = 0.25

@@ -21,8 +21,8 @@ from collections import Counter
 from pathlib import Path
 
 from benchmarks.scheduled.scheduler import JOB, begin
-from cmm_uq.scheduling.state import InFolder
-from tests.scheduling.servers import Taken, web_server
+from cmm_uq.laboratory.schedule.state import InFolder
+from tests.laboratory.schedule.servers import Taken, web_server
 
 PAUSE_S = 0.004
 

@@ -17,10 +17,10 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from cmm_uq.records import open_records
-from cmm_uq.scheduling.state import InRecords
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.schedule.state import InRecords
 from tests.conftest import ROOT
-from tests.scheduling.servers import Taken, web_server
+from tests.laboratory.schedule.servers import Taken, web_server
 
 IOTA = ROOT / "examples" / "iota-1102-20C"
 ENVIRONMENT = {key: value for key, value in os.environ.items() if key != "CMM_UQ_RECORDS"}

@@ -14,14 +14,14 @@ import sys
 import time
 from pathlib import Path
 
-from cmm_uq.scheduling.channels import channels
-from cmm_uq.scheduling.found import Found
-from cmm_uq.scheduling.outbox import Outbox
-from cmm_uq.scheduling.run import Clock, Run
-from cmm_uq.scheduling.settings import RunTable, ScheduleFile
-from cmm_uq.scheduling.state import InFolder
-from cmm_uq.scheduling.work import Work
-from cmm_uq.writing import Owner, staged
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.laboratory.schedule.channels import channels
+from cmm_uq.laboratory.schedule.found import Found
+from cmm_uq.laboratory.schedule.outbox import Outbox
+from cmm_uq.laboratory.schedule.run import Clock, Run
+from cmm_uq.laboratory.schedule.settings import RunTable, ScheduleFile
+from cmm_uq.laboratory.schedule.state import InFolder
+from cmm_uq.laboratory.schedule.work import Work
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
 

@@ -14,11 +14,11 @@ import time
 from pathlib import Path
 
 from benchmarks.scheduled.scheduler import begin
-from cmm_uq.records import open_records
-from cmm_uq.scheduling.state import InFolder, InRecords, State
-from cmm_uq.writing import MANIFEST, Manifest, Owner
-from tests.records.histories import certificate
-from tests.scheduling.runs import Jobs
+from cmm_uq.base.output import MANIFEST, Manifest, Owner
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.schedule.state import InFolder, InRecords, State
+from tests.laboratory.records.histories import certificate
+from tests.laboratory.schedule.runs import Jobs
 
 
 def main(count: int = 10_000) -> None:

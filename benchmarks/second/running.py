@@ -78,7 +78,7 @@ def diagnosed(job: Path, *, whole: bool = False) -> dict[str, Any]:
     which is two thirds of the time, unless ``whole``.
     """
     import cmm_uq
-    from cmm_uq.diagnosis import diagnosis
+    from cmm_uq.analysis.diagnosis import diagnosis
 
     sampled = diagnosis.joint_posterior
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from cmm_uq.points import Floats, Points
+from cmm_uq.base.points import Floats, Points
 
 LENGTH, SHIFT, RANGE = 440.0, 20.0, 460.0
 PEAK_TO_VALLEY = 27e-3

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.examples.shift_job import error as example_error
-from cmm_uq.commands.analysis import analyse
-from cmm_uq.documents.plot_style import ACCENT, INK, MUTED, as_svg, house_style, new_figure
-from cmm_uq.kinds.shift_axis.analysis import ShiftResult
-from cmm_uq.points import Floats
+from cmm_uq.app.commands.analysis import analyse
+from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.plot_style import ACCENT, INK, MUTED, as_svg, house_style, new_figure
 
 ROOT = Path(__file__).parents[2]
 PITCH, SHIFT = 40.0, 20.0

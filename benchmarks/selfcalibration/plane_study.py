@@ -19,12 +19,12 @@ import numpy as np
 
 from benchmarks.examples.shift_plate_job import PLACINGS
 from benchmarks.selfcalibration.machines import RANGE, machine
-from cmm_uq.kinds.shift_axis.curve import Curve
-from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
-from cmm_uq.kinds.shift_plate.placed_plate import placed_plate
-from cmm_uq.kinds.shift_plate.plane import PlaneEstimate, estimate_plane
-from cmm_uq.points import Floats, Points
-from cmm_uq.units import ARCSECOND, PPM
+from cmm_uq.artefacts.shift_axis.curve import Curve
+from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
+from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.units import ARCSECOND, PPM
 
 NOISE, REPEATS, U_LENGTH = 0.7e-3, 3, 0.5e-3
 START = 145.0

@@ -30,11 +30,11 @@ from benchmarks.selfcalibration.machines import (
     machine,
     record,
 )  # fmt: skip
-from cmm_uq.kinds.shift_axis.curve import estimate_curve
-from cmm_uq.kinds.shift_axis.integration_uncertainty import KnownSpan
-from cmm_uq.kinds.shift_axis.series import shifted_series
-from cmm_uq.kinds.shift_axis.shift_integration import calibration_curve, position_error, with_known_length
-from cmm_uq.points import Floats
+from cmm_uq.artefacts.shift_axis.curve import estimate_curve
+from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.series import shifted_series
+from cmm_uq.artefacts.shift_axis.shift_integration import calibration_curve, position_error, with_known_length
+from cmm_uq.base.points import Floats
 
 DESIGNS = {"23 points": FULL, "12 equal": EQUAL_40, "12 unequal": UNEQUAL}
 EVERYWHERE = np.arange(0.0, LENGTH + SHIFT + 1, 20.0)

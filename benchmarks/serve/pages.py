@@ -15,10 +15,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from cmm_uq.cli import _NEW_OBJECTS as NEW_OBJECTS
-from cmm_uq.serving import Site
-from cmm_uq.serving.exchange import Asked, read_address
-from tests.records.histories import made
+from cmm_uq.app.cli import _NEW_OBJECTS as NEW_OBJECTS
+from cmm_uq.app.serve import Site
+from cmm_uq.app.serve.exchange import Asked, read_address
+from tests.laboratory.records.histories import made
 
 TIMES = 7
 ADDRESSES = {

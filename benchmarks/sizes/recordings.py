@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.kinds import artefact_facts, artefact_of
-from cmm_uq.model import MeasurementModel, Noise
-from cmm_uq.physics.catalogue import effects
-from cmm_uq.points import Floats, Ints, Machine, Points
+from cmm_uq.artefacts import artefact_facts, artefact_of
+from cmm_uq.base.points import Floats, Ints, Machine, Points
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.physics.catalogue import effects
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
 MIDDLE = TRAVEL.mean(axis=1)

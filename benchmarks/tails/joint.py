@@ -23,11 +23,18 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.inference.draws import Draws
-from cmm_uq.inference.noise import AXES, GROWTH, PLACING, Components, Sizes
-from cmm_uq.model.measurement import MeasurementModel
-from cmm_uq.model.noise import axis_variances, growing_lengths, machine_axes, noise_of, repeated_quantity, sensitivities
-from cmm_uq.units import unit
+from cmm_uq.base.units import unit
+from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.machine.model.noise import (
+    axis_variances,
+    growing_lengths,
+    machine_axes,
+    noise_of,
+    repeated_quantity,
+    sensitivities,
+)
+from cmm_uq.maths.inference.draws import Draws
+from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, Components, Sizes
 
 DOF = np.array([2.5, 3.0, 4.0, 6.0, 10.0, 20.0, np.inf])
 """Degrees of freedom that are weighed; the last is a normal distribution."""

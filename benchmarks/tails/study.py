@@ -21,12 +21,12 @@ from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.recordings import Recording, recording
 from benchmarks.coverage.study import measure
 from benchmarks.tails.joint import DOF, Found, Readings, prior, sample
-from cmm_uq.commands.diagnosing import screened_model
-from cmm_uq.commands.estimation import with_noise
-from cmm_uq.commands.reading import read_job
-from cmm_uq.inference.sampling import sample_with_noise
-from cmm_uq.model.measurement import MeasurementModel
-from cmm_uq.model.noise import noise_of
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.estimation import with_noise
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.maths.inference.sampling import sample_with_noise
 
 HALF, FEW = 0.5, 0.05
 """Probabilities of tails beforehand; that of diagnoses is the second."""

@@ -19,8 +19,8 @@ ROOT, OTHER = "root.pem", "signed-by-another"
 
 def signed(folder: Path, made: Path) -> None:
     """Put PDF and DCC of a report into a folder, signed by somebody known, and by somebody else."""
-    from cmm_uq.signing import sign_pdf, sign_xml
-    from tests.signing.authority import curve_key, issued, root
+    from cmm_uq.certificate.sign import sign_pdf, sign_xml
+    from tests.certificate.sign.authority import curve_key, issued, root
 
     anchor = root()
     folder.mkdir(parents=True, exist_ok=True)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from cmm_uq.jobs.table import Column, Table, at_least
+from cmm_uq.base.files.table import Column, Table, at_least
 
 
 class DeclaredSource(Table):

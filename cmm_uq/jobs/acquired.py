@@ -15,10 +15,10 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, commas, names, plural, say, sentences
 from cmm_uq.jobs.circumstances import TestUncertainty
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
-from cmm_uq.messages import Text, Verbatim, commas, names, plural, say, sentences
 
 SCHEMA = "cmm-uq/acquired/1"
 ARTEFACT, TIME = "temp_artefact_c", "time_s"

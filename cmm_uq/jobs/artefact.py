@@ -8,12 +8,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import PrivateAttr, model_validator
 
+from cmm_uq.base.files.table import AnyFloat, Length, Table
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.certified_value import LENGTH, CertifiedValue
 from cmm_uq.jobs.expanded import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
 from cmm_uq.jobs.importing.keys import FileKeys
-from cmm_uq.jobs.table import AnyFloat, Length, Table
 from cmm_uq.jobs.traceability import Traceability
-from cmm_uq.points import Floats, Ints
 
 
 class CertificateFile(FileKeys, Traceability):

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.origin import Origin
 from cmm_uq.jobs.results_named import Part, read_results
 from cmm_uq.jobs.verdicts import Verdicts

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from cmm_uq.points import Machine, Points
+from cmm_uq.base.points import Machine, Points
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
 """Effects that a length standard in many places determines."""

@@ -17,11 +17,14 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import ValidationError
 
-from cmm_uq.dcc import Certificate, read
-from cmm_uq.dcc.figures import Figures, figures
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.artefact import ArtefactFacts, CertificateFile, ReferencedFacts
 from cmm_uq.jobs.certified_value import CertifiedValue
+from cmm_uq.jobs.dcc import Certificate, read
+from cmm_uq.jobs.dcc.figures import Figures, figures
 from cmm_uq.jobs.expanded import Growing, growing_of, with_standard_uncertainty
 from cmm_uq.jobs.importing.dcc import Dcc, heading
 from cmm_uq.jobs.importing.imported import imported_references
@@ -29,9 +32,6 @@ from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.importing.sheet import Fact
 from cmm_uq.jobs.traceability import ACCREDITED, CIPM, NATIONAL, Arrangement
-from cmm_uq.messages import Verbatim, say
-from cmm_uq.points import AXES, Floats, Points
-from cmm_uq.units import UNITS
 
 _METRES = {unit.dsi: Decimal(str(unit.si)) for unit in UNITS.values() if unit.dsi.endswith(r"\metre")}
 _NO_RESULT = ("nominal", "nenn", "deviation", "abweichung", "error", "écart")

@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, day, names, say, semicolons, sentences
 from cmm_uq.jobs.acquired import ARTEFACT
 from cmm_uq.jobs.as_found import KEY
 from cmm_uq.jobs.column_words import in_words
@@ -28,7 +29,6 @@ from cmm_uq.jobs.traceability import (
     OTHER,
     Traceability,
 )
-from cmm_uq.messages import NOTHING, Text, Verbatim, at_key, commas, day, names, say, semicolons, sentences
 
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
 """What a statement of traceability says; the last where nothing that is certified enters."""

@@ -9,10 +9,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from cmm_uq.base.files.table import Table, Temperature, Uncertainty
 from cmm_uq.jobs.laboratory import Capability
 from cmm_uq.jobs.short_gauge import ShortGauge
 from cmm_uq.jobs.standard_clauses import ClausesForm
-from cmm_uq.jobs.table import Table, Temperature, Uncertainty
 
 
 def _says_something(text: str) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from cmm_uq.messages import NOTHING, Text, Verbatim, say
-from cmm_uq.units import unit
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.base.units import unit
 
 _AXES = {a: Verbatim(a.upper()) for a in "xyz"}
 

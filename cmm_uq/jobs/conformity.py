@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal, Protocol, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
+from cmm_uq.base.files.toml_file import checked
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.circumstances import TEST_KEYS, TestUncertainty
 from cmm_uq.jobs.mpe_text import FLATTEST, mpe_of
 from cmm_uq.jobs.standard_clauses import ClausesForm
-from cmm_uq.jobs.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
-from cmm_uq.jobs.toml_file import checked
 
 
 class MaximumPermissibleError(Table):

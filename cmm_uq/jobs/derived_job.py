@@ -14,7 +14,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
 from cmm_uq import __version__
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job

@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import LISTED
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import LISTED
 from cmm_uq.jobs.machine import DigitizerFacts, Pose
 from cmm_uq.jobs.origin import SIMULATED, Origin
 from cmm_uq.jobs.results_named import Part, read_results, results_named

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.points import AXES, Floats, Ints, Points
-from cmm_uq.units import REFERENCE_TEMPERATURE
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import REFERENCE_TEMPERATURE
 
 NOISE_RATIO = "noise_ratio"
 """Column: standard uncertainty of a difference over that of one coordinate."""

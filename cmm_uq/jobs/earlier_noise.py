@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.table import LARGEST_UM, SMALLEST_UM
 from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.jobs.table import LARGEST_UM, SMALLEST_UM
 
 _FIX = "Name the results.json that cmm-uq report wrote of an earlier recording of such an artefact"
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from pydantic import Field, WithJsonSchema, WrapValidator
 
+from cmm_uq.base.files.table import LARGEST_UM, LONGEST_MM, Uncertainty
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.mpe_text import mpe_of
-from cmm_uq.jobs.table import LARGEST_UM, LONGEST_MM, Uncertainty
-from cmm_uq.points import Floats
 
 HOW = (
     'is no uncertainty of a length: write it as "0.2 + 0.5·L/1000", "0.2 + L/2000", "0.2 + 0.5·10^-6·L" or '

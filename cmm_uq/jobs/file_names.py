@@ -7,8 +7,8 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import FILE_NAME
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import FILE_NAME
 
 _WRITTEN = re.compile(
     r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|(certificate|diagnosis|plan).*\.(html|pdf)"

@@ -7,10 +7,10 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from cmm_uq.base.files.table import Table
+from cmm_uq.base.languages.language import ENGLISH, Code
 from cmm_uq.jobs.file_names import device_name
 from cmm_uq.jobs.replaced import Replaced
-from cmm_uq.jobs.table import Table
-from cmm_uq.languages.language import ENGLISH, Code
 
 
 class Identification(Table):

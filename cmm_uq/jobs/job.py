@@ -12,8 +12,18 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field_validator, model_validator
 
-from cmm_uq.errors import suggestion
-from cmm_uq.files.limits import CONFORMITY, EFFECTS, LISTED
+from cmm_uq.base.errors import suggestion
+from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED
+from cmm_uq.base.files.table import (
+    Limit,
+    Names,
+    Number,
+    Table,
+    at_least,
+)
+from cmm_uq.base.notebook import html_table
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.base.points import Points
 from cmm_uq.jobs.acquire import AcquireFacts
 from cmm_uq.jobs.acquired import Provenance
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -32,17 +42,7 @@ from cmm_uq.jobs.prove import ProveFacts
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.standard_clauses import ClausesForm
-from cmm_uq.jobs.table import (
-    Limit,
-    Names,
-    Number,
-    Table,
-    at_least,
-)
 from cmm_uq.jobs.traceability import ThermometerFacts
-from cmm_uq.notebook import html_table
-from cmm_uq.points import Points
-from cmm_uq.writing import Owner, staged
 
 Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]
 """A permissible size of an effect in its own unit."""

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cmm_uq.jobs.table import Limit, Table, at_least
+from cmm_uq.base.files.table import Limit, Table, at_least
 
 _LENGTHS = {"mm": 1e-3, "µm": 1.0}
 """Units of lengths, and how many of each a micrometre is."""

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Points
 from cmm_uq.jobs.machine import MachineFacts
 from cmm_uq.jobs.temperature_log import TemperatureLog, parse_temperature_log
-from cmm_uq.points import AXES, Points
 
 COLUMNS = tuple(f"temp_{axis}_c" for axis in AXES)
 """What a log gives the recording."""

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NoReturn, Protocol
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import LOGO_BYTES, LOGO_ELEMENTS, LOGO_PIXELS
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import LOGO_BYTES, LOGO_ELEMENTS, LOGO_PIXELS
 from cmm_uq.jobs.importing.xml_files import local, root_of
 from cmm_uq.jobs.laboratory import Laboratory
 

@@ -7,9 +7,9 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from cmm_uq.files.limits import COLUMNS, LISTED, MAPS
+from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
+from cmm_uq.base.files.table import Column, Number, Range, Table, Temperature, Triple, at_least
 from cmm_uq.jobs.recalibration import Recalibration
-from cmm_uq.jobs.table import Column, Number, Range, Table, Temperature, Triple, at_least
 
 HOTTEST_C = 100.0
 """°C at which a machine may be mapped: far beyond any, and far below any temperature in kelvin."""

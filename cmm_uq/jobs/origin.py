@@ -14,8 +14,8 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from cmm_uq.errors import CmmUqError, Gathered
-from cmm_uq.writing import MANIFEST, read_manifest
+from cmm_uq.base.errors import CmmUqError, Gathered
+from cmm_uq.base.output import MANIFEST, read_manifest
 
 Origin = Literal["measured", "simulated", "compensated"]
 MEASURED: Final = "measured"

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.files.limits import COLUMNS, LISTED
-from cmm_uq.jobs.table import AnyFloat, Column, Duration, Length, Names, Range, Table, Uncertainty, at_least
+from cmm_uq.base.files.limits import COLUMNS, LISTED
+from cmm_uq.base.files.table import AnyFloat, Column, Duration, Length, Names, Range, Table, Uncertainty, at_least
 
 Criterion = Literal["separation", "D", "A", "worst"]
 

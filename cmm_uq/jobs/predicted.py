@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.prediction import Prediction, is_error_map, read_prediction
 from cmm_uq.jobs.simulation import KEY as SIMULATION

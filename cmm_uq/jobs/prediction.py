@@ -14,14 +14,14 @@ from functools import partial
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.files.cells import Cells, cells_of
-from cmm_uq.files.content import text_of
-from cmm_uq.files.numbers import numbers
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.cells import Cells, cells_of
+from cmm_uq.base.files.content import text_of
+from cmm_uq.base.files.numbers import numbers
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.recording import COORDINATES, WHOLE, largest
 from cmm_uq.jobs.simulation import KEY, UNIT_MM, SimulationFacts
-from cmm_uq.points import Floats, Ints
-from cmm_uq.units import MICROMETRE
 
 LENGTH, UNCERTAINTY = "length_mm", "u_um"
 KNOWN = (*WHOLE, *COORDINATES, LENGTH, UNCERTAINTY)

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.jobs.table import Table
+from cmm_uq.base.files.table import Table
 
 Percent = Annotated[float, Field(ge=0, le=100)]
 

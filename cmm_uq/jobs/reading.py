@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import create_model
 
-from cmm_uq.errors import CmmUqError, Gathered
-from cmm_uq.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
+from cmm_uq.base.errors import CmmUqError, Gathered
+from cmm_uq.base.files.limits import JOB_BYTES, LOGO_BYTES, MAP_BYTES, TABLE_BYTES, Limit
+from cmm_uq.base.files.toml_file import checked
+from cmm_uq.base.output import finish_interrupted
+from cmm_uq.base.points import AXES, Machine, Points
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
 from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.as_found import as_found_of
@@ -38,9 +41,6 @@ from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
 from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
 from cmm_uq.jobs.source import InFolder, InMemory, Source
-from cmm_uq.jobs.toml_file import checked
-from cmm_uq.points import AXES, Machine, Points
-from cmm_uq.writing import finish_interrupted
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.certified import Read

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.jobs.table import Table
+from cmm_uq.base.files.table import Table
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 

@@ -13,12 +13,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.files.cells import cells_of, column_problem
-from cmm_uq.files.numbers import GIVE, GIVE_OR_REMOVE, LARGEST, MEASURE, numbers
-from cmm_uq.jobs.other_units import conversion
-from cmm_uq.jobs.table import LONGEST_MM
-from cmm_uq.points import Floats, Machine, Points
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.base.files.cells import cells_of, column_problem
+from cmm_uq.base.files.numbers import GIVE, GIVE_OR_REMOVE, LARGEST, MEASURE, numbers
+from cmm_uq.base.files.other_units import conversion
+from cmm_uq.base.files.table import LONGEST_MM
+from cmm_uq.base.points import Floats, Machine, Points
 
 COORDINATES = ("x_mm", "y_mm", "z_mm")
 REQUIRED = ("measurement", "point", *COORDINATES)

@@ -6,10 +6,10 @@ from collections.abc import Collection
 
 import numpy as np
 
+from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.recording import REQUIRED, points_of, read_recording
-from cmm_uq.points import Machine, Points
 
 _HEAD = 16_384
 

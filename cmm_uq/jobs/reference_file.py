@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Points
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.expanded import factor_of
 from cmm_uq.jobs.importing.recognised import Recognised
 from cmm_uq.jobs.importing.vocabulary import COVERAGE
 from cmm_uq.jobs.recording import LARGEST_NUMBER, OPTIONAL, largest
-from cmm_uq.points import AXES, Points
 
 EXPANDED = "reference_U_um"
 STANDARD = "reference_u_um"

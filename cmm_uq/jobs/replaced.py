@@ -8,7 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.jobs.table import Table
+from cmm_uq.base.files.table import Table
 
 Said = Annotated[str, Field(min_length=1, pattern=r"\S")]
 """Words that must not be left out."""

@@ -13,9 +13,9 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
+from cmm_uq.base.files.sentences import sentences, unit_of
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.job import JobFile
-from cmm_uq.jobs.sentences import sentences, unit_of
 
 Schema = dict[str, Any]
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from pydantic import field_validator, model_validator
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.table import AnyFloat, Length, Limit, Table
+from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.expanded import Factor, Freedom, with_standard_uncertainty
 from cmm_uq.jobs.recording import read_recording
-from cmm_uq.jobs.table import AnyFloat, Length, Limit, Table
 from cmm_uq.jobs.traceability import Traceability
-from cmm_uq.points import AXES, Floats, Ints, Machine, Points
-from cmm_uq.units import MICROMETRE, REFERENCE_TEMPERATURE
 
 KEY = "[short_gauge]"
 

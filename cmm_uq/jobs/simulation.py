@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from cmm_uq.files.limits import MAPS
+from cmm_uq.base.files.limits import MAPS
+from cmm_uq.base.files.table import Length, Names, Table, Uncertainty
 from cmm_uq.jobs.machine import ErrorMapFile
-from cmm_uq.jobs.table import Length, Names, Table, Uncertainty
 
 KEY = "[simulation]"
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.content import content_of
-from cmm_uq.files.limits import Limit
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import Limit
 from cmm_uq.jobs.file_names import check_name, inside
 
 

@@ -7,9 +7,9 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.files.limits import LISTED
+from cmm_uq.base.files.limits import LISTED
+from cmm_uq.base.files.table import Table
 from cmm_uq.jobs.replaced import Said
-from cmm_uq.jobs.table import Table
 
 
 class HeldClause(Table):

@@ -15,9 +15,9 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.files.csv_table import CsvTable, csv_table
-from cmm_uq.points import AXES, Floats
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.csv_table import CsvTable, csv_table
+from cmm_uq.base.points import AXES, Floats
 
 _SENSOR = re.compile(r"(?:temp_)?([xyz])_?(\d+)_c")
 

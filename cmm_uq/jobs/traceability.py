@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.jobs.table import Column, Table
+from cmm_uq.base.files.table import Column, Table
 
 NATIONAL, ACCREDITED, OTHER, IN_HOUSE = "national institute", "accredited", "not accredited", "in-house"
 MATERIAL, CONSENSUS = "reference material", "consensus"

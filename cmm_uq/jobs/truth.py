@@ -17,9 +17,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from cmm_uq.files.limits import COLUMNS, EFFECTS
+from cmm_uq.base.files.limits import COLUMNS, EFFECTS
+from cmm_uq.base.files.table import AnyFloat, Column, Table, Uncertainty
 from cmm_uq.jobs.recording import REQUIRED, largest
-from cmm_uq.jobs.table import AnyFloat, Column, Table, Uncertainty
 
 
 class ByAxis(Table):

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal
 
-from cmm_uq.messages import NOTHING, Text, Verbatim
-from cmm_uq.units import UNITS, printed_unit
+from cmm_uq.base.messages import NOTHING, Text, Verbatim
+from cmm_uq.base.units import UNITS, printed_unit
 
 GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
 """Outcomes of statements, the gravest first: findings in their order; incomplete is what would pass, were it whole."""

@@ -12,7 +12,7 @@ from benchmarks.hostile.invariants import Outcome, lost, problems, refusal_probl
 from benchmarks.hostile.page import Tally, load, page
 
 TRACE = """Traceback (most recent call last):
-  File "/x/cmm_uq/points.py", line 12, in f
+  File "/x/cmm_uq/base/points.py", line 12, in f
   File "/lib/json.py", line 3, in g
 ValueError: no
 """
@@ -25,7 +25,7 @@ ValueError: no
         (Outcome(2, "", "cmm-uq: job.toml: is missing. Add it\n", 1.0), []),
         (Outcome(2, "", "cmm-uq: no\n", 11.0), ["refuses only after more than 10 s"]),
         (Outcome(None, "", "", 60.0), ["hangs"]),
-        (Outcome(1, "", TRACE, 1.0), ["traceback: ValueError at cmm_uq/points.py:12"]),
+        (Outcome(1, "", TRACE, 1.0), ["traceback: ValueError at cmm_uq/base/points.py:12"]),
         (Outcome(1, "", "", 1.0), ["exit code 1"]),
         (Outcome(3, "", "cmm-uq: a fault of the program: KeyError: 'x'\n", 1.0), ["fault: KeyError"]),
         (Outcome(-11, "", "", 1.0), ["exit code -11"]),

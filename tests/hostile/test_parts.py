@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 
 from benchmarks.hostile.parts import case, outcome, seeds
-from cmm_uq.geometry.repeated import Repeated
+from cmm_uq.maths.geometry.repeated import Repeated
 
 
 def test_what_the_study_starts_from_is_sound() -> None:

@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.commands.reading import read_job
-from cmm_uq.documents.document import Facts
-from cmm_uq.documents.origin import origin_warnings
-from cmm_uq.documents.results_file import head
-from cmm_uq.documents.traceability_section import traceability_section
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.document import Facts
+from cmm_uq.certificate.origin import origin_warnings
+from cmm_uq.certificate.results_file import head
+from cmm_uq.certificate.traceability_section import traceability_section
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import kept_inputs
-from tests.documents.saying import leaves, said
+from tests.certificate.saying import leaves, said
 
 SAID: dict[str, Any] = {
     "schema": "cmm-uq/acquired/1", "program": "cmm-uq 1", "simulated": False,

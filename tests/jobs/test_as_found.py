@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.commands.reading import read_job
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.derived_job import derived_toml
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 import tomlkit
 
-from cmm_uq.commands.reading import job_of, read_job
-from cmm_uq.commands.simulate import simulated_job
-from cmm_uq.dcc import Certificate, written
-from cmm_uq.dcc.results import Statement
-from cmm_uq.dcc.texts import rich
-from cmm_uq.documents.traceability_section import claimed
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.reading import job_of, read_job
+from cmm_uq.app.commands.simulate import simulated_job
+from cmm_uq.artefacts import kind_named
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.jobs.dcc import Certificate, written
+from cmm_uq.jobs.dcc.results import Statement
+from cmm_uq.jobs.dcc.texts import rich
 from cmm_uq.jobs.job import Job
-from cmm_uq.kinds import kind_named
-from cmm_uq.model.artefact import Artefact
+from cmm_uq.machine.model.artefact import Artefact
 from tests.conftest import ROOT
-from tests.dcc.artefacts import BALL_BAR, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, listed, value
+from tests.jobs.dcc.artefacts import BALL_BAR, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, listed, value
 from tests.jobs.test_reference_file import GAUGE
 from tests.jobs.test_reference_file import PLATE as PLATE_RECORDING
 

@@ -14,16 +14,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from cmm_uq.documents.clauses import clauses, clauses_data, draft
-from cmm_uq.documents.digital_certificate.administration import formal_statements
-from cmm_uq.documents.digital_certificate.words import speaking
-from cmm_uq.documents.document import Paragraph
-from cmm_uq.documents.traceability_section import claimed, traceability_section
+from cmm_uq.certificate.clauses import clauses, clauses_data, draft
+from cmm_uq.certificate.digital_certificate.administration import formal_statements
+from cmm_uq.certificate.digital_certificate.words import speaking
+from cmm_uq.certificate.document import Paragraph
+from cmm_uq.certificate.traceability_section import claimed, traceability_section
 from cmm_uq.jobs.acquired import Acquired, Provenance
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
 from cmm_uq.jobs.traceability import ThermometerFacts, Traceability
-from tests.documents.test_completeness import changed, measured
+from tests.certificate.test_completeness import changed, measured
 
 DAY = dt.date(2026, 3, 2)
 NATIONAL: dict[str, Any] = {

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.commands.reading import read_job
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.earlier_noise import noise_found
-from tests.commands.test_planning import JOB, SIX
+from tests.app.commands.test_planning import JOB, SIX
 
 RESULTS: dict[str, Any] = {
     "schema": "cmm-uq/results/1",

@@ -12,14 +12,14 @@ import numpy as np
 import pikepdf
 import pytest
 
-from cmm_uq.commands.compensate import write_compensated
-from cmm_uq.commands.plan import write_plan
-from cmm_uq.commands.reading import read_job
-from cmm_uq.commands.report import write_report
-from cmm_uq.commands.simulate import write_simulation
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.compensate import write_compensated
+from cmm_uq.app.commands.plan import write_plan
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import write_report
+from cmm_uq.app.commands.simulate import write_simulation
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.temperature_log import parse_temperature_log
-from tests.commands.test_map_squareness import TABLE_7, at, stated, with_maps
+from tests.app.commands.test_map_squareness import TABLE_7, at, stated, with_maps
 from tests.conftest import ROOT
 
 RATE = np.array([1.0, 2.0, -0.5]) / 3600

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.commands.reading import read_job
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError
 
 
 def with_plan(job: Path, plan: str) -> Path:

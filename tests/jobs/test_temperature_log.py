@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.temperature_log import parse_temperature_log
 
 LOG = b"""time_s,x1_c,x2_c,x3_c,y1_c,y2_c,z1_c,table_c

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.toml_file import checked
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.toml_file import checked
 from cmm_uq.jobs.truth import Truth
 
 

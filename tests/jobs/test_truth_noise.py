@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.jobs.toml_file import checked
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.toml_file import checked
 from cmm_uq.jobs.truth import Truth
 
 TRUTH = Path("truth.toml")
@@ -32,8 +32,8 @@ def test_components_are_drawn_in_their_sizes(ballbar_points) -> None:  # type: i
     """Standard deviations over many drawings; slow noise needs a time; a display shows multiples of its steps."""
     from dataclasses import replace
 
-    from cmm_uq.model import Noise
-    from cmm_uq.model.drawn_noise import distances_in_placing
+    from cmm_uq.machine.model import Noise
+    from cmm_uq.machine.model.drawn_noise import distances_in_placing
 
     random = np.random.default_rng(1)
     timed = replace(ballbar_points, columns={"time_s": 10.0 * np.arange(len(ballbar_points))})

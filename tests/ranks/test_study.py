@@ -17,9 +17,9 @@ from benchmarks.ranks.measuring import Case, ranked
 from benchmarks.ranks.page import gathered, page
 from benchmarks.ranks.ranking import DRAWS, of_noise
 from benchmarks.ranks.uniformity import RANKS
-from cmm_uq.inference.linear_model import LinearModel, Unknown
-from cmm_uq.inference.noise import AXES, GROWTH, PLACING, Components
-from cmm_uq.units import unit
+from cmm_uq.base.units import unit
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, Components
 
 
 def components(*possible: str) -> Components:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import cmm_uq
-from cmm_uq.kinds import BUILT_IN
+from cmm_uq.artefacts import BUILT_IN
 from tests.conftest import ROOT
 from tests.site.pages import snippets
 

@@ -17,9 +17,9 @@ import pytest
 
 import cmm_uq
 from benchmarks.examples.screens import PAGE, complete
-from cmm_uq.instruments.library import profile_of
-from cmm_uq.uncertainty.model_file import read_model_file
-from tests.cli.process import run as run_here
+from cmm_uq.laboratory.live.instruments.library import profile_of
+from cmm_uq.maths.uncertainty.model_file import read_model_file
+from tests.app.cli.process import run as run_here
 from tests.conftest import ROOT
 from tests.site.pages import PAGES, Snippet, snippets
 
@@ -114,7 +114,7 @@ def test_an_excerpt_of_toml_keeps_to_its_form(page: Path) -> None:
 
 @pytest.mark.parametrize("page", having("console", excerpt=True))
 def test_an_excerpt_of_commands_names_commands_that_exist(page: Path) -> None:
-    names = {path.stem for path in (ROOT / "cmm_uq" / "cli").glob("*.py")} | {"import"}
+    names = {path.stem for path in (ROOT / "cmm_uq" / "app" / "cli").glob("*.py")} | {"import"}
     for snippet in snippets(page, "console", excerpt=True):
         for command in re.findall(r"^\$ cmm-uq (\S+)", snippet.text, re.MULTILINE):
             assert command in names or command.startswith("--"), f"{snippet}: {command}"

@@ -12,11 +12,11 @@ from scipy import stats
 from benchmarks.coverage.cells import Cell
 from benchmarks.coverage.recordings import recording
 from benchmarks.tails.joint import DOF, Readings, log_tails, prior
-from cmm_uq.commands.diagnosing import screened_model
-from cmm_uq.commands.reading import read_job
-from cmm_uq.inference.marginal import Marginal
-from cmm_uq.inference.noise import Sizes
-from cmm_uq.model.measurement import MeasurementModel
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.maths.inference.marginal import Marginal
+from cmm_uq.maths.inference.noise import Sizes
 
 SIZES = Sizes(
     1e-3 * np.array([[1.0, 2.0, 0.5], [1.0, 1.0, 1.0]]), 1e-3 * np.array([1.5, 0.0]), 1e-3 * np.array([0.7, 0.4]),

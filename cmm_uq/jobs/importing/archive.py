@@ -7,8 +7,8 @@ import re
 import zipfile
 import zlib
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import UNPACKED
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import UNPACKED
 from cmm_uq.jobs.importing.encodings import head_text
 from cmm_uq.jobs.importing.xml_files import HOSTILE_FIX
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import ROWS
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import ROWS
+from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
 from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
-from cmm_uq.messages import Verbatim, number, say
 
 _AXES = {"xvalue": "X", "yvalue": "Y", "zvalue": "Z"}
 _NEEDED = ("idsymbol", "actual", "featureid")

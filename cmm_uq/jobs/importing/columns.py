@@ -8,9 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import CELLS, COLUMNS, ROWS
-from cmm_uq.files.numbers import GIVE_OR_REMOVE, MEASURE
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import CELLS, COLUMNS, ROWS
+from cmm_uq.base.files.numbers import GIVE_OR_REMOVE, MEASURE
+from cmm_uq.base.messages import Verbatim, commas, names, number, say
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.header import Header
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.lengths import lengths_unit
@@ -20,8 +22,6 @@ from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
 from cmm_uq.jobs.importing.units import FAHRENHEIT, LENGTH, UNITS, WrittenUnit, converted, sort_of
 from cmm_uq.jobs.importing.vocabulary import NAME
 from cmm_uq.jobs.recording import COORDINATES
-from cmm_uq.messages import Verbatim, commas, names, number, say
-from cmm_uq.points import Floats, Ints
 
 SIGNS = {".": say("point"), ",": say("comma")}
 _SHOWN = 15

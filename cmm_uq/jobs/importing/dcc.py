@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import ROWS
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import ROWS
+from cmm_uq.base.messages import say
+from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
 from cmm_uq.jobs.importing.xml_files import begins_with
-from cmm_uq.messages import say
-from cmm_uq.units import UNITS
 
 if TYPE_CHECKING:
-    from cmm_uq.dcc.figures import Figures
+    from cmm_uq.jobs.dcc.figures import Figures
 
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
 
@@ -36,8 +36,8 @@ class Dcc(Format):
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         """See :meth:`Format.read`: a sheet for each result that has more than one value of something."""
-        from cmm_uq.dcc import read  # the model of a certificate is made for who has one
-        from cmm_uq.dcc.figures import figures
+        from cmm_uq.jobs.dcc import read  # the model of a certificate is made for who has one
+        from cmm_uq.jobs.dcc.figures import figures
 
         sheets = []
         for place, of_result in groupby(figures(read(content, where)), key=lambda one: one.place[:2]):

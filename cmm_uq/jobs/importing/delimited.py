@@ -10,9 +10,10 @@ import re
 from collections.abc import Iterable, Sequence
 from itertools import islice
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.cells import lines_within
-from cmm_uq.files.limits import CELL, COLUMNS, LINE, LINES, ROWS
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.cells import lines_within
+from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS
+from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.header import LINES_BEFORE, header_of
@@ -20,7 +21,6 @@ from cmm_uq.jobs.importing.keys import DELIMITERS, ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.vocabulary import understood
 from cmm_uq.jobs.importing.wanted import REFERENCES
-from cmm_uq.messages import Text, Verbatim, say
 
 COLUMNS_OF_TEXT = "  "
 """Two blanks or more between cells, so that single ones may stand in headings."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import codecs
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import LINES
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import LINES
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig", "UTF-8 with a byte-order mark"),

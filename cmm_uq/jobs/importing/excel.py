@@ -8,14 +8,14 @@ import warnings
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import CELL, COLUMNS, ROWS
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import CELL, COLUMNS, ROWS
+from cmm_uq.base.messages import say
 from cmm_uq.jobs.importing.archive import has, opened
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.header import LINES_BEFORE
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
-from cmm_uq.messages import say
 
 _EMPTY_MOST = 5000
 """Empty rows in turn after which a sheet has ended."""

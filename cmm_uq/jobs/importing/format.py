@@ -5,9 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
+from cmm_uq.base.messages import Text
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Sheet
-from cmm_uq.messages import Text
 
 HEAD = 65_536
 """Bytes of a file by which it is recognised."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.keys import ImportKeys, Sources
 from cmm_uq.jobs.importing.numerals import is_number
 from cmm_uq.jobs.importing.sheet import Cell, Sheet

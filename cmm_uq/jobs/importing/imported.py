@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
 
-from cmm_uq.errors import CmmUqError, suggestion
-from cmm_uq.files.limits import TABLE_BYTES
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.messages import Verbatim, commas, names, say
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.columns import columns_of
 from cmm_uq.jobs.importing.header import Header, header_of, no_header
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
@@ -17,8 +19,6 @@ from cmm_uq.jobs.importing.registry import format_of
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.units import length_named
 from cmm_uq.jobs.importing.wanted import POINTS, REFERENCES
-from cmm_uq.messages import Verbatim, commas, names, say
-from cmm_uq.points import Floats, Ints
 
 _UNIT_LINE = re.compile(
     r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",

@@ -9,13 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
 from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
-from cmm_uq.messages import Verbatim, number, say
 
 _LINE = re.compile(r"(?:^|[\s>\]:])(?P<tag>[E\d]\d{4})\s+(?P<what>[#&%!]|[A-Za-z]\w*\s*\()\s*(?P<rest>.*)$")
 _TERM = re.compile(r"\b(X|Y|Z|IJK)\s*\(([^)]*)\)")

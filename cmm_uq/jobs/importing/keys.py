@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from cmm_uq.files.limits import COLUMNS
+from cmm_uq.base.files.limits import COLUMNS
+from cmm_uq.base.files.table import Column, Table
 from cmm_uq.jobs.importing.units import LENGTHS, length_named
-from cmm_uq.jobs.table import Column, Table
 
 Source = str | Annotated[int, Field(ge=1, le=COLUMNS.most)]
 """A column of the file: its heading, or its number from 1."""

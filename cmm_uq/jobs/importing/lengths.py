@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.units import UNITS, WrittenUnit, length_named
 from cmm_uq.jobs.recording import COORDINATES
-from cmm_uq.messages import Text, Verbatim, say
-from cmm_uq.points import Floats
 
 LARGEST_MACHINE_MM = 40_000.0
 """Longest diagonal of a coordinate measuring machine: gantries of 30 m are the largest made."""

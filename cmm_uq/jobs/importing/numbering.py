@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, commas, names, say
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.numerals import is_number, values_of
 from cmm_uq.jobs.importing.sheet import Cell, Fact
 from cmm_uq.jobs.importing.vocabulary import understood
-from cmm_uq.messages import Text, Verbatim, commas, names, say
-from cmm_uq.points import Floats
 
 MEASUREMENT, POINT, REPEAT = "measurement", "point", "repeat"
 NUMBERS = (MEASUREMENT, POINT, REPEAT)

@@ -10,15 +10,15 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element, ParseError
 
-from cmm_uq.errors import CmmUqError
-from cmm_uq.files.limits import COLUMNS
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import COLUMNS
+from cmm_uq.base.messages import say
 from cmm_uq.jobs.importing.archive import opened
 from cmm_uq.jobs.importing.excel import check_row
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
 from cmm_uq.jobs.importing.xml_files import HOSTILE_FIX, local
-from cmm_uq.messages import say
 
 _TABLE = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
 _OFFICE = "{urn:oasis:names:tc:opendocument:xmlns:office:1.0}"

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from cmm_uq.base.messages import Text, Verbatim, commas, say, semicolons
 from cmm_uq.jobs.importing.sheet import Fact
-from cmm_uq.messages import Text, Verbatim, commas, say, semicolons
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import cache, partial
 from importlib import import_module
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.plugins import IMPORTS, Plugin, offered
 from cmm_uq.jobs.importing.format import HEAD, Format
 from cmm_uq.jobs.importing.unread import refuse_unread
-from cmm_uq.plugins import IMPORTS, Plugin, offered
 
 BUILT_IN = (
     "excel.Excel",

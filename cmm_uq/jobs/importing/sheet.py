@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cmm_uq.messages import Text
+from cmm_uq.base.messages import Text
 
 Cell = str | float
 """Text without the blanks around it, empty where there is nothing; or a number, of a format that keeps numbers."""

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cmm_uq.points import Floats
+from cmm_uq.base.points import Floats
 
 
 @dataclass(frozen=True)

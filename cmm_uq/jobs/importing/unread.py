@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 
 _FILES = (
     (

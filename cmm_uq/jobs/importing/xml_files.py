@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element, ParseError
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.encodings import head_text
 
 HOSTILE_FIX = "Export it again; a measuring program writes no DOCTYPE or ENTITY"

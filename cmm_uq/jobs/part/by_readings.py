@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.files.cells import Cells, cells_of
-from cmm_uq.files.numbers import numbers
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.base.files.cells import Cells, cells_of
+from cmm_uq.base.files.numbers import numbers
+from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.part.by_tables import CalibratedPartFacts, OrientationsFacts
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.located import Places
 from cmm_uq.jobs.part.measured import COLUMNS, in_order
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.points import Floats, Ints
 
 _FIX = "Save it as CSV in UTF-8, with commas between the columns"
 _VALUES = ("value_mm", "value_deg")

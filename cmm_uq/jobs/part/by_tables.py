@@ -6,9 +6,9 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.files.limits import INPUTS
-from cmm_uq.jobs.table import Length, Limit, Table, Temperature, Uncertainty
-from cmm_uq.units import REFERENCE_TEMPERATURE
+from cmm_uq.base.files.limits import INPUTS
+from cmm_uq.base.files.table import Length, Limit, Table, Temperature, Uncertainty
+from cmm_uq.base.units import REFERENCE_TEMPERATURE
 
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
 Name = Annotated[str, Field(min_length=1, max_length=100)]

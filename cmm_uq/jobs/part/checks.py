@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.base.points import AXES, beyond_travel
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts, with_article
 from cmm_uq.jobs.part.common import BETWEEN, as_one, members
 from cmm_uq.jobs.part.feature import ASSOCIATIONS, FEWEST
@@ -16,7 +17,6 @@ from cmm_uq.jobs.part.located import Places
 from cmm_uq.jobs.part.not_modelled import material_condition
 from cmm_uq.jobs.part.placing import readings
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.points import AXES, beyond_travel
 
 _NEARLY = np.sin(np.radians(1.0))
 """Of a nominal orientation: what is off by more than a degree is another orientation than the drawing's."""

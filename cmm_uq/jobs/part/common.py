@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, suggestion
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.feature import Kind
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.points import Floats
 
 BETWEEN = "-"
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.part.drawing import NotUnderstoodError
-from cmm_uq.points import AXES, Floats
 
 Nominals = Mapping[str, Mapping[str, Any]]
 """Features that were defined, by name, in the frame of the part."""

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from cmm_uq.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.common import members
 

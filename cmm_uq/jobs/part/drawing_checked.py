@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.checks import unfit
 from cmm_uq.jobs.part.common import members

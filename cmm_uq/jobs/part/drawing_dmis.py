@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.dmis import statements
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
 from cmm_uq.jobs.part.common import BETWEEN

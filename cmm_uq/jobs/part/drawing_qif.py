@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from xml.etree.ElementTree import Element, SubElement
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.qif import child
 from cmm_uq.jobs.importing.xml_files import local, root_of
 from cmm_uq.jobs.part.characteristic import ASKS, What

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, field_validator, model_validator
 
-from cmm_uq.files.limits import LISTED
+from cmm_uq.base.files.limits import LISTED
+from cmm_uq.base.files.table import Length, Table, Triple
 from cmm_uq.jobs.part.form import FormFacts
 from cmm_uq.jobs.part.not_modelled import refuse_not_modelled
-from cmm_uq.jobs.table import Length, Table, Triple
 
 Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cmm_uq.files.limits import INPUTS
+from cmm_uq.base.files.limits import INPUTS
+from cmm_uq.base.files.table import Table
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.part.by_tables import CalibratedPartFacts, OrientationsFacts
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
@@ -24,7 +25,6 @@ from cmm_uq.jobs.part.tables import (
     ProbingFacts,
     StylusFacts,
 )
-from cmm_uq.jobs.table import Table
 
 
 class PartFile(Table):

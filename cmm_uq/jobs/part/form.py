@@ -7,8 +7,8 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.files.limits import INPUTS
-from cmm_uq.jobs.table import Length, Table, Uncertainty
+from cmm_uq.base.files.limits import INPUTS
+from cmm_uq.base.files.table import Length, Table, Uncertainty
 
 _COUNT = re.compile(r"[1-9][0-9]{0,3}")
 FEWEST_UNDULATIONS = 2

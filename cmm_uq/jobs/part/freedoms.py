@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.points import AXES, Floats
 
 _FREE = 1e-3
 """Singular value below which a motion counts as free: datums that lean by less than a twentieth of a degree are one."""

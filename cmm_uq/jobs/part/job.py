@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cmm_uq.errors import CmmUqError, Gathered
-from cmm_uq.files.content import text_of
-from cmm_uq.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES
-from cmm_uq.files.toml import toml_of
+from cmm_uq.base.errors import CmmUqError, Gathered
+from cmm_uq.base.files.content import text_of
+from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES
+from cmm_uq.base.files.toml import toml_of
+from cmm_uq.base.files.toml_file import checked
+from cmm_uq.base.output import finish_interrupted
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.origin import COMPENSATED, SIMULATED, check_examples, check_mark
@@ -23,9 +26,6 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.tables import MachineStateFacts
 from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import InFolder, InMemory, Source
-from cmm_uq.jobs.toml_file import checked
-from cmm_uq.points import Floats
-from cmm_uq.writing import finish_interrupted
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
 _WHOLE = (".pdf", ".xml")

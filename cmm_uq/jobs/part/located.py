@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.jobs.toml_file import line_of
+from cmm_uq.base.files.toml_file import line_of
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.files.cells import Cells, cells_of
-from cmm_uq.files.numbers import numbers
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.base.files.cells import Cells, cells_of
+from cmm_uq.base.files.numbers import numbers
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.probed import Probed
-from cmm_uq.points import Floats
 
 COLUMNS = ("feature", "point", "x_mm", "y_mm", "z_mm")
 FAR_MM = 5.0

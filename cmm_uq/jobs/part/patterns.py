@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.feature import FeatureFacts, Kind, Pattern, Strategy
-from cmm_uq.points import Floats
 
 _GOLDEN = np.pi * (3 - np.sqrt(5))
 """rad: by which a Fibonacci lattice turns from point to point."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.file import PartFile
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import PlacingFacts, StylusFacts
-from cmm_uq.points import Floats
 
 
 def rotation(placing: PlacingFacts) -> Floats:

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.feature import FEWEST, ROUND, FeatureFacts, Strategy
 from cmm_uq.jobs.part.patterns import PATTERNS_OF, angle_of, radius_of
-from cmm_uq.points import Floats
 
 OFF_MM = 0.1
 """From the nominal surface: a contact point farther away from it belongs to another surface, or is a mistake."""

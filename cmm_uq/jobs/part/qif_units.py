@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from xml.etree.ElementTree import Element
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.qif import child, length_unit, three
 from cmm_uq.jobs.importing.units import UNITS, length_named
 from cmm_uq.jobs.importing.xml_files import local

@@ -7,13 +7,13 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.files.limits import LISTED
+from cmm_uq.base.files.limits import LISTED
+from cmm_uq.base.files.table import Table, Temperature, Triple, Uncertainty
 from cmm_uq.jobs.conformity import Prior, Rule, needs_prior
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.machine import Travel, check_carriages
 from cmm_uq.jobs.origin import MEASURED, Origin
 from cmm_uq.jobs.part.feature import Count
-from cmm_uq.jobs.table import Table, Temperature, Triple, Uncertainty
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]
 """A coefficient of expansion, 1/K: steel has 11.5e-6."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.imported import Imported, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ

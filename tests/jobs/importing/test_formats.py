@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.jobs.importing.imported import Imported, imported, imported_references
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.plugins import BrokenPluginError
 from tests.conftest import ROOT
 from tests.plugin.packages import OUTSIDE_IMPORTS, install
 
@@ -135,7 +135,7 @@ def test_a_format_of_another_package_is_read_by_its_own_code(installed: None) ->
 
 
 def test_a_format_of_another_package_that_fails_is_named_with_it(installed: None) -> None:
-    from cmm_uq.plugins import naming_package
+    from cmm_uq.base.plugins import naming_package
 
     with (
         pytest.raises(BrokenPluginError, match=r"package outside-imports 0\.1\.0: the format 'pointlog' fails"),

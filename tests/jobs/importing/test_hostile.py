@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.imported import imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from tests.jobs.importing.exports import EXPORTS, archive, excel, opendocument

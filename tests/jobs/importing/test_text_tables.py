@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.imported import Imported, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from tests.jobs.importing.exports import HEADINGS

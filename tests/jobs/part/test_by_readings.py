@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from tests.jobs.part.parts import plate
 
 NAMES = [one.name for one in plate().facts.characteristic]

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.commands.part_plan import plan_of, refuse_unfit
-from cmm_uq.errors import CmmUqError
+from cmm_uq.app.commands.part_plan import plan_of, refuse_unfit
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.part.common import as_one, members
 from cmm_uq.jobs.part.freedoms import freedoms
 from cmm_uq.jobs.part.probed import Probed

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.part.drawing import Drawing
 from cmm_uq.jobs.part.drawing_dmis import drawing_of_dmis
 

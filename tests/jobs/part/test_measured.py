@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from tests.jobs.part.parts import plate
 
 RECORDING = {"recording": {"file": "points.csv"}}

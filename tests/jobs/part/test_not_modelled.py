@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.part.beginning import TABLES
 from tests.jobs.part.parts import plate
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.errors import CmmUqError
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.jobs.part.job import files_of_the_machine
 from cmm_uq.jobs.part.placing import readings
 from cmm_uq.jobs.part.tables import MachineStateFacts
 from cmm_uq.jobs.source import InMemory
-from cmm_uq.jobs.toml_file import as_toml
 from tests.jobs.part.parts import plate, tables
 
 PLANE_A, *_, BORE = TABLES["feature"]

@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 
-from cmm_uq.messages import say
-from cmm_uq.physics.effect import Effect, Parameter
-from cmm_uq.physics.rigid_body import turned
-from cmm_uq.points import Floats, Points
-from cmm_uq.units import ARCSECOND, unit
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.units import ARCSECOND, unit
+from cmm_uq.machine.physics.effect import Effect, Parameter
+from cmm_uq.machine.physics.rigid_body import turned
 
 
 class BeamTwist(Effect):

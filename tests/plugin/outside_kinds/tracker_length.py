@@ -7,24 +7,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.documents.document import Column, Section, Table
-from cmm_uq.documents.outcome import Page
-from cmm_uq.documents.result import Result
+from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
+from cmm_uq.analysis.planning.directions import words
+from cmm_uq.analysis.planning.patterns import length_of
+from cmm_uq.analysis.planning.placing import Pattern, Placing, along
+from cmm_uq.analysis.planning.ready import MIDDLE, check_allowed
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.screening import shape as screening
+from cmm_uq.base.files.table import Uncertainty
+from cmm_uq.base.messages import number, say
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.units import METRE, MICROMETRE, unit
+from cmm_uq.certificate.document import Column, Section, Table
+from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.artefact import ReferencedFacts
-from cmm_uq.jobs.table import Uncertainty
-from cmm_uq.messages import number, say
-from cmm_uq.model.artefact import Artefact, Size
-from cmm_uq.model.kind import Kind
-from cmm_uq.model.recorded import columns_needed
-from cmm_uq.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
-from cmm_uq.planning.directions import words
-from cmm_uq.planning.patterns import length_of
-from cmm_uq.planning.placing import Pattern, Placing, along
-from cmm_uq.planning.ready import MIDDLE, check_allowed
-from cmm_uq.planning.setting import Planning, Setting
-from cmm_uq.points import Floats, Points
-from cmm_uq.screening import shape as screening
-from cmm_uq.units import METRE, MICROMETRE, unit
+from cmm_uq.machine.model.artefact import Artefact, Size
+from cmm_uq.machine.model.kind import Kind
+from cmm_uq.machine.model.recorded import columns_needed
 
 COLUMN = "tracker_mm"
 

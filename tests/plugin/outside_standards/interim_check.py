@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from cmm_uq.conformity.decision import decide
-from cmm_uq.conformity.plans import Condition
-from cmm_uq.conformity.standard import Characteristic, Standard, Test
-from cmm_uq.conformity.statement import Decided, Statement
+from cmm_uq.analysis.conformity.decision import decide
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test
+from cmm_uq.analysis.conformity.statement import Decided, Statement
+from cmm_uq.base.messages import say
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.messages import say
-from cmm_uq.model.artefact import Artefact
-from cmm_uq.model.kind import LENGTHS
-from cmm_uq.units import MICROMETRE
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.kind import LENGTHS
 
 REPEATS = 3
 

@@ -1,0 +1,1 @@
+"""What a recording says: screening, diagnosis, conformity, planning and the parts that a machine measures."""

@@ -1,0 +1,286 @@
+"""Whether calibrated lengths lie where a standard wants them, and are as many, as long and as often repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
+from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
+from cmm_uq.base.messages import Text, Verbatim, at_key, commas, number, say, semicolons
+from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.maths.uncertainty.rounding import nominal
+
+SAME_LENGTH_MM = 1.0
+"""Lengths no farther from each other than this are one nominal length."""
+
+SPACING = 0.75
+"""Of the distance between equally spaced lengths, how far each may lie from its place: gauges have the lengths that they have.
+This project's figure."""
+
+
+def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
+    """Positions, longest, different and shortest lengths, and repeats; ``copies`` are groups that do not count."""
+    measured: _Places = {}
+    for found in _lines(plan, artefact, copies):
+        measured.setdefault(found.position, []).append(found)
+    absent = tuple(line for line in plan.positions if line not in measured)
+    return (
+        Condition(_positions(plan, absent), absent),
+        _long_enough(plan, artefact.points.machine, measured),
+        _different(plan, measured),
+        _spread(plan, measured),
+        _shortest(plan, measured),
+        _repeated(plan, measured),
+        *_both_sides(plan, artefact, measured),
+        *_offset(plan, artefact),
+    )
+
+
+def _positions(plan: LengthPlan, absent: tuple[Text, ...]) -> Text:
+    asked = commas(plan.positions)
+    if set(plan.positions) == {*SPACE_DIAGONALS, *PARALLELS}:
+        asked = say("four space diagonals and three axes")
+    return say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked
+
+
+def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
+    """Lengths between two points each, (m,), measured with the stylus tip so far across the ram at both ends.
+
+    Without recorded tips they count as measured with none; ``None`` asks for no particular offset.
+    """
+    tips = tip_offsets(points)
+    if offset_mm is None:
+        return np.ones(len(rows), dtype=bool)
+    if tips is None:
+        return np.full(len(rows), offset_mm == 0)
+    across = np.linalg.norm(tips, axis=1)[rows]
+    return np.asarray(np.all(np.abs(across - offset_mm) <= OFFSET_TOLERANCE_MM, axis=1))
+
+
+def tip_offsets(points: Points) -> Floats | None:
+    """Stylus tip offset across the ram, (n, 3) mm, zero along it; ``None`` where none is recorded."""
+    if not all(f"tip_{a}_mm" in points.columns for a in AXES):
+        return None
+    tips = np.column_stack([points.columns[f"tip_{a}_mm"] for a in AXES])
+    tips[:, AXES.index(points.machine.chain.replace("F", "")[-1].lower())] = 0.0
+    return np.asarray(tips, dtype=np.float64)
+
+
+def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
+    """That a tip offset is recorded where the plan asks for one."""
+    if not plan.offset_mm:
+        return ()
+    what = say(
+        "stylus tip {offset_mm:g} mm across the ram{key}",
+        key=at_key("tip_x_mm, tip_y_mm, tip_z_mm"),
+        offset_mm=plan.offset_mm,
+    )
+    found = artefact.indications()
+    there = found is not None and with_offset(artefact.points, found.rows, plan.offset_mm).any()
+    return (Condition(what, () if there else (what,)),)
+
+
+def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[Condition, ...]:
+    """Whether the lengths are bidirectional, where that is asked and known."""
+    if not plan.bidirectional or not places:
+        return ()
+    known = [one for found in places.values() for one in found if one.bidirectional is not None]
+    what = say("ends of each length reached from opposite sides")
+    if not known:
+        unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
+        return (Condition(what, (unknown,), Verbatim("columns approach_x, approach_y, approach_z")),)
+    if not any(one.bidirectional for one in known):
+        short = say(
+            "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
+        )
+        return (Condition(what, (short,)),)
+    counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
+    missing = tuple(
+        say("{lengths} bidirectional lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
+        for line, count in counts.items()
+        if count < min(plan.lengths, len(places[line]))
+    )
+    return (Condition(what, missing),)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """All that was measured of one nominal length in one position."""
+
+    position: Text
+    nominal: int
+    length: float
+    share: float | None
+    repeats: int
+    bidirectional: bool | None = None
+
+
+def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
+    """By position and nominal length."""
+    found = artefact.indications()
+    if found is None:
+        return
+    points = artefact.points
+    group = points.group[found.rows[:, 0]]
+    original = ~np.isin(group, list(copies)) & with_offset(points, found.rows, plan.offset_mm)
+    both = artefact.bidirectional(found.rows)
+    nominal = nominals(found.lengths)
+    middles, along = artefact.lines_of(found.rows)
+    positions = np.array([position_on(points.machine, m, d) for m, d in zip(middles, along, strict=True)], dtype=object)
+    for position in plan.positions:
+        for length in np.unique(nominal):
+            at = np.flatnonzero(original & (positions == position) & (nominal == length))
+            if not len(at):
+                continue
+            shares = [_share(points, middles[i], along[i], found.lengths[i]) for i in at]
+            known = [share for share in shares if share is not None]
+            yield _Measured(position, int(length), float(found.lengths[at].mean()), max(known, default=None),
+                            len(np.unique(group[at])), None if both is None else bool(both[at].any()))  # fmt: skip
+
+
+def _share(points: Points, middle: Floats, along: Floats, length: float) -> float | None:
+    available = crossed_travel(points.machine, middle, along)
+    return None if available is None else float(length / available) if available else 0.0
+
+
+def nominals(lengths: Floats) -> Ints:
+    """Which nominal length each of some lengths (m,), mm, is of, counted from the shortest, (m,)."""
+    order = np.argsort(lengths, kind="stable")
+    found = np.empty(len(lengths), dtype=np.int64)
+    found[order] = np.cumsum(np.diff(lengths[order], prepend=lengths[order][:1]) > SAME_LENGTH_MM)
+    return found
+
+
+_Places = dict[Text, list[_Measured]]
+
+
+def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Condition:
+    least = say("{least_share:.0f} %", least_share=100 * plan.least_share)
+    what = say("longest length at least {least} of the travel along each line", least=least)
+    if not np.all(np.isfinite(machine.travel_mm)):
+        travel = say("the travel of all three axes{key}, without which no length's share of it is known",
+                     key=at_key("[machine] travel_mm"))  # fmt: skip
+        return Condition(say("{what}: not known", what=what), (travel,))
+    shares = {line: max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
+    missing = tuple(
+        say(
+            "length of at least {least} of the travel ({line}: {share:.0f} %)",
+            least=least,
+            line=line,
+            share=100 * share,
+        )
+        for line, share in shares.items()
+        if share < plan.least_share
+    )
+    return Condition(
+        say("{what}: {span}", what=what, span=_percents([100 * share for share in shares.values()])), missing
+    )
+
+
+def _span(counts: Sequence[int]) -> Text:
+    return say("{low:.0f} to {high:.0f}", low=min(counts), high=max(counts)) if counts else say("none")
+
+
+def _percents(shares: Sequence[float]) -> Text:
+    return say("{low:.0f} % to {high:.0f} %", low=min(shares), high=max(shares)) if shares else say("none")
+
+
+def _different(plan: LengthPlan, places: _Places) -> Condition:
+    counts = {line: len(found) for line, found in places.items()}
+    missing = tuple(
+        say("{lengths} different lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
+        for line, count in counts.items()
+        if count < plan.lengths
+    )
+    return Condition(
+        say("{lengths} lengths on each line: {span}", lengths=plan.lengths, span=_span(list(counts.values()))), missing
+    )
+
+
+def _spread(plan: LengthPlan, places: _Places) -> Condition:
+    """That lengths of each line are spaced equally as nearly as their gauge allows; fewer of them are missing otherwise."""
+    missing = tuple(
+        say(
+            "lengths spread over the range ({line}: {lengths} mm)",
+            line=line,
+            lengths=semicolons(number(one.length, ".4g") for one in sorted(found, key=lambda m: m.length)),
+        )
+        for line, found in places.items()
+        if len(found) >= plan.lengths and not _any_spread(plan, found)
+    )
+    return Condition(say("{lengths} lengths spread over the range on each line", lengths=plan.lengths), missing)
+
+
+def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
+    """Whether any choice of so many lengths is: more of them never hinder."""
+    lengths = np.sort([one.length for one in found])
+    starts = lengths[lengths <= plan.shortest_mm]
+    ends = np.array([one.length for one in found if one.share is not None and one.share >= plan.least_share])
+    starts, ends = (starts if len(starts) else lengths[:1]), (ends if len(ends) else lengths[-1:])
+    return any(
+        _spaced(lengths, np.linspace(start, end, plan.lengths)) for start in starts for end in ends if end > start
+    )
+
+
+def _spaced(lengths: Floats, equally: Floats) -> bool:
+    """Whether each of some equally spaced lengths has one of its own (sorted) near it."""
+    reach = SPACING * float(equally[1] - equally[0])
+    at = -1
+    for wanted in equally:
+        near = np.flatnonzero((np.abs(lengths - wanted) <= reach) & (np.arange(len(lengths)) > at))
+        if not len(near):
+            return False
+        at = int(near[0])
+    return True
+
+
+def _shortest(plan: LengthPlan, places: _Places) -> Condition:
+    shortest = {line: min(m.length for m in found) for line, found in places.items()}
+    missing = tuple(
+        say(
+            "length of at most {shortest_mm:g} mm ({line}: {length} mm)",
+            shortest_mm=plan.shortest_mm,
+            line=line,
+            length=nominal(length),
+        )
+        for line, length in shortest.items()
+        if length > plan.shortest_mm
+    )
+    longest = say("{shortest} mm", shortest=nominal(max(shortest.values()))) if shortest else say("none")
+    return Condition(
+        say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=plan.shortest_mm, longest=longest),
+        missing,
+    )
+
+
+def _repeated(plan: LengthPlan, places: _Places) -> Condition:
+    """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks; more do not help."""
+    repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
+    total = sum(min(count, plan.repeats) for counts in repeats.values() for count in counts[: plan.lengths])
+    lost: tuple[Text, ...] = ()
+    if total < plan.total:
+        lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)
+    missing = tuple(
+        say(
+            "{repeats} repetitions of each length ({line}: {counts})",
+            repeats=plan.repeats,
+            line=line,
+            counts=counts[: plan.lengths][-1],
+        )
+        for line, counts in repeats.items()
+        if counts[: plan.lengths][-1] < plan.repeats
+    )
+    return Condition(
+        say(
+            "{repeats} repetitions of each, {wanted} lengths in all: {total}",
+            repeats=plan.repeats,
+            wanted=plan.total,
+            total=total,
+        ),
+        (*missing, *lost),
+    )

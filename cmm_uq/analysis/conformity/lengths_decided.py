@@ -1,0 +1,281 @@
+"""Tests on calibrated lengths: errors of indication, and the range of their repeats.
+
+Every length is decided with its own test uncertainty (ISO/TS 23165) against its own limit; the machine's own scatter is part
+of what is tested. Copies are no measurements and are not decided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.conformity.length_conditions import nominals, with_offset
+from cmm_uq.analysis.conformity.measurement_lines import position_on
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.analysis.conformity.remeasured import Again, with_standing
+from cmm_uq.analysis.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
+from cmm_uq.analysis.conformity.short_gauge import added_in_words
+from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
+from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.analysis.conformity.uncertainty_lines import LENGTH_LINES, WARM, away_from_20, u_of_repeats
+from cmm_uq.base.messages import NOTHING, Text, at_key, plural, say, semicolons
+from cmm_uq.base.points import Ints
+from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.circumstances import LINE_KEYS, TestUncertainty
+from cmm_uq.machine.model.artefact import Artefact, Indications
+from cmm_uq.maths.uncertainty.rounding import nominal
+
+NORMAL_EXPANSION = (8e-6, 13e-6)
+"""1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)."""
+
+Chosen = Callable[[Artefact, Indications], NDArray[np.bool_]]
+"""Which of the lengths of a recording belong to a test, (m,)."""
+
+
+def at_offset(offset_mm: float) -> Chosen:
+    """Lengths measured with the stylus tip so far across the ram."""
+    return lambda artefact, found: with_offset(artefact.points, found.rows, offset_mm)
+
+
+def on_lines(positions: Collection[Text]) -> Chosen:
+    """Lengths in some positions."""
+    return lambda artefact, found: np.array([line in positions for line in lines(artefact, found)], dtype=bool)
+
+
+def short(longest_mm: float) -> Chosen:
+    """Short lengths whose ends are reached from opposite sides, or may be."""
+
+    def chosen(artefact: Artefact, found: Indications) -> NDArray[np.bool_]:
+        both = artefact.bidirectional(found.rows)
+        return np.asarray((found.lengths <= longest_mm) & (True if both is None else both))
+
+    return chosen
+
+
+def lines(artefact: Artefact, found: Indications) -> list[Text]:
+    """Position of each length in words."""
+    middles, along = artefact.lines_of(found.rows)
+    return [position_on(artefact.points.machine, m, d) for m, d in zip(middles, along, strict=True)]
+
+
+def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Again | None = None) -> Statement:
+    """Every error of indication against its own maximum permissible error.
+
+    Parameters
+    ----------
+    test : that is decided.
+    chosen : which lengths belong to it; all by default.
+    again : what may be measured again.
+    """
+    found = test.indications()
+    rows = _of_this_test(test, found, chosen)
+    artefact, first = test.artefact, found.rows[:, 0]
+    points = artefact.points
+    errors, limits = found.errors / MICROMETRE, test.limits_um(found.lengths)
+    causes = causes_of_lengths(found, artefact, test.circumstances).at_least(test.least_u(found.lengths))
+    test.refuse_without_uncertainty(float(causes.u[rows].min()), "u_um")
+    position, aside = lines(artefact, found), test.set_aside(found.rows)
+    items = tuple(
+        Decided(
+            float(errors[i]), float(causes.u[i]), float(limits[i]),
+            test.decide(float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True,
+                        length_mm=float(found.lengths[i])),
+            int(points.measurement[first[i]]), int(points.repeat[first[i]]), float(found.lengths[i]), position[i],
+            set_aside=bool(aside[i]),
+        )
+        for i in rows
+    )  # fmt: skip
+    if again is not None:
+        items = with_standing(items, nominals(found.lengths)[rows], again)
+    worst = least_favourable(items)
+    named = int(rows[items.index(worst)])
+    remarks = [_uncertainty_in_words(worst, test.circumstances.uncertainty), _counted_in_words(items, worst)]
+    remarks += _others_in_words(test, found, rows) + _again_in_words(items, again) + _unshown(test, found)
+    degrees = temperatures(found, artefact)
+    budget = length_budget(
+        float(found.lengths[named]), float(found.u[named]),
+        REFERENCE_TEMPERATURE if degrees is None else float(degrees[named]), test.circumstances,
+        0.0 if found.u_beside is None else float(found.u_beside[named]),
+    )  # fmt: skip
+    return test.stated(
+        say("error of indication of length, worst against its limit"), say("lengths"), items, remarks,
+        causes=causes.of(rows), budget=test.budget_at_least(budget, worst.length_mm or 0.0) if worst.u_um > 0 else None,
+        repeats=None if again is None else again.repeats,
+    )  # fmt: skip
+
+
+def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = None) -> Statement:
+    """Range of the first repeats of each length in each place, against the limit of repeatability.
+
+    What the artefact's certificate leaves uncertain is common to the repeats and cancels: u is what of it changes between.
+    """
+    found = test.indications()
+    rows = _of_this_test(test, found, chosen)
+    least = u_of_repeats(float(found.lengths[rows].min()), test.circumstances)
+    test.refuse_without_uncertainty(least, "u_repeat_um")
+    points, first = test.artefact.points, found.rows[:, 0]
+    position, both = lines(test.artefact, found), test.artefact.bidirectional(found.rows)
+    kind = np.zeros(len(found.rows), dtype=np.int64) if both is None else both.astype(np.int64)
+    aside = test.set_aside(found.rows)
+    keys = np.column_stack([points.measurement[first], nominals(found.lengths), kind])
+    items, single = [], []
+    for key in dict.fromkeys(map(tuple, keys[rows])):
+        own = rows[np.all(keys[rows] == key, axis=1)]
+        own = own[np.isin(points.repeat[first[own]], np.unique(points.repeat[first[own]])[:repeats])]
+        length = float(found.lengths[own].mean())
+        if len(np.unique(points.repeat[first[own]])) < 2:
+            single.append(say("repeats of {length:.5g} mm in measurement {number}", length=length, number=int(key[0])))
+            continue
+        value = float(np.ptp(found.errors[own])) / MICROMETRE
+        limit = float(test.limits_um(np.array([length]))[0])
+        known = test.at_least(u_of_repeats(length, test.circumstances), length)
+        items.append(Decided(
+            value, known, limit, test.decide(value, known, limit, signed=False, length_mm=length), int(key[0]), None,
+            length, position[own[0]], set_aside=bool(aside[own].any()),
+        ))  # fmt: skip
+    test.refuse_nothing_measured(bool(items), "repeats of lengths")
+    remarks = [
+        say(
+            "The range of the first {repeats} repeats of each length: {count} ranges.",
+            repeats=repeats,
+            count=len(items),
+        ),
+        say(
+            "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge "
+            "changes between them."
+        )
+        if least > 0
+        else NOT_STATED,
+        *_others_in_words(test, found, rows),
+    ]
+    quantity = say("range of repeated lengths, worst against its limit")
+    return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats,
+                       causes=_each_its_own([item.u_um for item in items]), lacking=single)  # fmt: skip
+
+
+def length_unstated(artefact: ArtefactFacts) -> str | None:
+    """The key without which a calibrated length has no uncertainty."""
+    return "u_um" if artefact.certified and not artefact.u_um else None
+
+
+def normal_expansion(test: Test) -> tuple[Condition, ...]:
+    """A length of normal expansion, where that of the gauge is stated and is another (ISO 10360-2:2009)."""
+    cte, (low, high) = test.circumstances.cte_per_k, NORMAL_EXPANSION
+    if not cte or low <= cte <= high:
+        return ()
+    what = say(
+        "a length of normal expansion, {low:g} to {high:g} × 10⁻⁶ /K (that of the gauge is {cte:.3g} × 10⁻⁶ /K)",
+        low=low * 1e6, high=high * 1e6, cte=cte * 1e6,
+    )  # fmt: skip
+    return (Condition(what, (what,)),)
+
+
+def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
+    """What a reader must know of lengths measured away from 20 °C on a gauge of unknown expansion; else nothing."""
+    away = away_from_20(artefact)
+    if cte_per_k or away < WARM:
+        return NOTHING
+    return say(
+        "The artefact was up to {away:.2g} K from 20 °C and its expansion is not stated{key}: its lengths "
+        "are taken as those at 20 °C, which for steel is {steel:.2g} µm wrong in a metre.",
+        away=away, steel=11.5 * away, key=at_key("[artefact] cte_per_k"),
+    )  # fmt: skip
+
+
+def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> Ints:
+    """Rows of the lengths that are decided: of this test, and no copies."""
+    copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
+    own = ~copied & (True if chosen is None else chosen(test.artefact, found))
+    test.refuse_nothing_measured(bool(own.any()), "lengths of its own positions, tips and sizes")
+    return np.flatnonzero(own)
+
+
+def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
+    """How many lengths of the recording are not decided for they belong to another test."""
+    copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
+    others = int((~copied).sum()) - len(rows)
+    if not others:
+        return []
+    return [
+        plural(
+            others,
+            one=say(
+                "{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
+                count=others,
+            ),
+            many=say(
+                "{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
+                count=others,
+            ),
+        )
+    ]
+
+
+def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
+    further = any(getattr(stated, LINE_KEYS[line]) or stated.declared(line) for line in LENGTH_LINES[1:])
+    if worst.u_um > 0 and further:
+        return say("u is the test uncertainty (ISO/TS 23165), {u_um:.3g} µm for the length named.", u_um=worst.u_um)
+    if worst.u_um > 0:
+        return say(
+            "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
+            "the length named; nothing else is stated.",
+            u_um=worst.u_um,
+        )  # fmt: skip
+    return NOT_STATED
+
+
+def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:
+    least = say(
+        "least favourable: measurement {measurement}, repeat {repeat}, {length} mm",
+        measurement=worst.measurement or 0, repeat=worst.repeat or 0, length=nominal(worst.length_mm or 0.0),
+    )  # fmt: skip
+    return plural(
+        len(items),
+        one=say("{count} length decided, each by its own u and limit; {least}.", count=len(items), least=least),
+        many=say("{count} lengths decided, each by its own u and limit; {least}.", count=len(items), least=least),
+    )
+
+
+def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]:
+    if again is None:
+        return []
+    told: list[Text] = []
+    for standing in ("again", "replaced"):
+        which = semicolons(
+            say("measurement {measurement}, {length} mm", measurement=measurement, length=nominal(length))
+            for measurement, length in dict.fromkeys(
+                (item.measurement or 0, item.length_mm or 0.0) for item in items if item.standing == standing
+            )
+        )
+        if which and standing == "again":
+            told.append(say(
+                "One of {repeats} values lies outside: measure {readings} times more, as further repeats of the same "
+                "measurement, all of which must lie inside: {which}.",
+                repeats=again.repeats, readings=again.readings, which=which,
+            ))  # fmt: skip
+        elif which:
+            told.append(say(
+                "One of {repeats} values lay outside and was measured {readings} times more, all inside: {which}.",
+                repeats=again.repeats, readings=again.readings, which=which,
+            ))  # fmt: skip
+    return told
+
+
+def _unshown(test: Test, found: Indications) -> list[Text]:
+    """What neither job nor recording say, and would have to."""
+    under = test.circumstances
+    told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
+    if test.artefact.bidirectional(found.rows) is None:
+        told.append(say("Whether the lengths are bidirectional is not recorded."))
+    if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
+        told.append(
+            say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
+        )
+    return [text for text in told if text]
+
+
+def _each_its_own(u_um: Sequence[float]) -> Causes:
+    return Causes(np.zeros((len(u_um), 0)), np.array(u_um, dtype=np.float64), np.arange(len(u_um)))

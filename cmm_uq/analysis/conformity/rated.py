@@ -1,0 +1,97 @@
+"""Whether a test was carried out under the conditions for which the limits of the machine hold, and with its probe."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.base.messages import Text, Verbatim, at_key, say
+from cmm_uq.base.points import Points
+from cmm_uq.jobs.circumstances import Circumstances, RatedConditions
+
+SECONDS_PER_HOUR = 3600.0
+
+_ROUNDING = 1e-9
+"""K."""
+
+
+def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Condition, ...]:
+    """Those that the job states; what was not recorded is not shown to be met, and limits hold for stated conditions only."""
+    rated = circumstances.rated
+    found = []
+    if rated.temperature_c is None and rated.declared is None:
+        what = say("rated conditions: the temperatures for which the limits hold are not stated")
+        remedy = Verbatim('temperature_c in [rated_conditions], or there declared = { by = "…", reason = "…" }')
+        found.append(Condition(what, (what,), remedy))
+    if rated.temperature_c is not None:
+        found.append(_temperature(points, *rated.temperature_c))
+    if rated.change_k_per_h is not None:
+        found.append(_change(points, rated.change_k_per_h))
+    if rated.difference_k is not None:
+        found.append(_difference(points, rated.difference_k))
+    used = circumstances.probe
+    for what, wanted, given in (
+        (say("probe"), rated.probe, used.name),
+        (say("stylus"), rated.stylus, used.stylus),
+    ):
+        if wanted is not None:
+            met = wanted == given
+            asked = say("rated {what} {wanted}", what=what, wanted=Verbatim(wanted))
+            lacks = say("{asked} ({given})", asked=asked, given=Verbatim(given) if given else say("not stated"))
+            found.append(Condition(asked, () if met else (lacks,)))
+    return tuple(found)
+
+
+def rated_in_words(rated: RatedConditions) -> list[Text]:
+    """Who answers for rated conditions that are not stated, and why."""
+    given = rated.declared
+    if given is None:
+        return []
+    by, reason = Verbatim(given.by), Verbatim(given.reason.rstrip(". "))
+    return [say("Rated conditions: declared to be met by {by}: {reason}.", by=by, reason=reason)]
+
+
+def _recorded(points: Points) -> list[str]:
+    return [name for name in points.columns if name.startswith("temp_") and name.endswith("_c")]
+
+
+def _temperature(points: Points, low: float, high: float) -> Condition:
+    what = say("rated temperature {low:g} to {high:g} °C", low=low, high=high)
+    columns = _recorded(points)
+    if not columns:
+        return Condition(what, (say("{what}: no temperature is recorded (temp_…_c)", what=what),))
+    values = np.concatenate([points.columns[name] for name in columns])
+    coldest, warmest = float(values.min()), float(values.max())
+    told = say("{what} ({coldest:.4g} to {warmest:.4g} °C)", what=what, coldest=coldest, warmest=warmest)
+    return Condition(what, () if low <= coldest and warmest <= high else (told,))
+
+
+def _change(points: Points, most: float) -> Condition:
+    what = say("rated change of temperature {most:g} K/h", most=most)
+    columns = _recorded(points)
+    if not columns or "time_s" not in points.columns:
+        return Condition(
+            what, (say("{what}: no temperature is recorded over time{key}", what=what, key=at_key("temp_…_c, time_s")),)
+        )
+    time = points.columns["time_s"]
+    largest = max(_largest_change(time, points.columns[name]) for name in columns)
+    told = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)
+    return Condition(what, () if largest <= most + _ROUNDING else (told,))
+
+
+def _largest_change(time_s: np.ndarray, values: np.ndarray) -> float:
+    """Largest difference of two readings within an hour, K."""
+    order = np.argsort(time_s, kind="stable")
+    time, value = time_s[order], values[order]
+    ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")
+    return float(max(np.ptp(value[start:end]) for start, end in enumerate(ends)))
+
+
+def _difference(points: Points, most: float) -> Condition:
+    what = say("rated difference of temperatures {most:g} K", most=most)
+    columns = _recorded(points)
+    if len(columns) < 2:
+        return Condition(what, (say("{what}: one temperature at most is recorded", what=what),))
+    largest = float(np.ptp(np.array([points.columns[name] for name in columns]), axis=0).max())
+    told = say("{what} ({largest:.3g} K)", what=what, largest=largest)
+    return Condition(what, () if largest <= most + _ROUNDING else (told,))

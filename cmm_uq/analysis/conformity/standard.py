@@ -1,0 +1,430 @@
+"""What a standard is: what it tests, on which observations, what a complete test consists of, and what is decided.
+
+A standard decides one characteristic or several (E0, R0, P_FTU). Each goes by observations that a kind of measurement offers
+(``Kind.tested``), not by the kind's name: a standard of another package can be stated of every kind that offers them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, partial
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.conformity.as_recorded import LeftOut, numbered
+from cmm_uq.analysis.conformity.clauses import Clause, in_words
+from cmm_uq.analysis.conformity.copies import copies_in_words
+from cmm_uq.analysis.conformity.decision import Decision, decide, needs_uncertainty, rule_words
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.analysis.conformity.rated import rated_conditions, rated_in_words
+from cmm_uq.analysis.conformity.risk import Known, Risks, global_risks
+from cmm_uq.analysis.conformity.shared_causes import Causes, probability_of_all
+from cmm_uq.analysis.conformity.statement import Decided, Statement, counted, least_favourable
+from cmm_uq.analysis.conformity.uncertainty_lines import (
+    FORM_LINES,
+    declared_in_words,
+    u_of_unstated,
+    uncertainty_conditions,
+    with_declared,
+)
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, at_key, say
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
+from cmm_uq.jobs.conformity import ConformityFacts, needed
+from cmm_uq.jobs.short_gauge import ShortGauge
+from cmm_uq.machine.model.artefact import Artefact, Indications
+from cmm_uq.maths.uncertainty.budget import Budget, Line
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+NOT_CONSIDERED = say(
+    "Simple acceptance takes no account of the uncertainty: at the limit itself conforming is as likely as not."
+)
+
+NOT_STATED = say("No uncertainty is stated above zero: none is considered, and no probability can be given.")
+
+RAISED = say(
+    "Where the test uncertainty evaluated is smaller, u is half of the laboratory's calibration and measurement capability "
+    "(k = 2){key}.",
+    key=at_key("[laboratory.cmc]"),
+)
+
+CMC = say("the laboratory's calibration and measurement capability")
+
+BY_MEASUREMENT_ALONE = say(
+    "Probabilities are what the measurement alone says, with nothing known of such machines beforehand: where the limit is "
+    "near they may be off by several points either way."
+)
+
+
+def _nothing_asked(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
+    return ()
+
+
+def _nothing_needed(artefact: ArtefactFacts) -> str | None:
+    return None
+
+
+def _nothing_more(test: Test) -> tuple[Condition, ...]:
+    return ()
+
+
+@dataclass(frozen=True)
+class Characteristic:
+    """One thing that a standard decides.
+
+    Parameters
+    ----------
+    name : as in ``[[conformity]] characteristic``.
+    observed : what it is decided on, one of ``Kind.tested``.
+    statement : compares and decides; see :meth:`Test.stated`.
+    conditions : what a complete test consists of, and what is missing of it, for an artefact with its points; ``recorded``
+        says whether these were measured or are a plan's.
+    unstated : the key of ``[artefact]`` that a rule with an uncertainty needs and that is not stated; ``None`` when nothing is
+        missing.
+    asks : what a complete test asks of artefact, probe and surroundings beside its points.
+    also : other names of it.
+    needs : the key of ``[test_uncertainty]`` without which a rule with an uncertainty says nothing.
+    beside : how a short gauge recorded beside the artefact enters; not at all where left out.
+    lines : of the test uncertainty that apply; see :mod:`cmm_uq.analysis.conformity.uncertainty_lines`.
+    """
+
+    name: str
+    observed: str
+    statement: Callable[[Test], Statement]
+    conditions: Callable[..., tuple[Condition, ...]] = _nothing_asked
+    unstated: Callable[[ArtefactFacts], str | None] = _nothing_needed
+    asks: Callable[[Test], tuple[Condition, ...]] = _nothing_more
+    also: tuple[str, ...] = ()
+    needs: str | None = None
+    beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
+    lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Standard:
+    """A standard as it can be stated.
+
+    Parameters
+    ----------
+    name : with its part and edition, as in ``[[conformity]] standard``.
+    characteristics : that are decided; the first is meant where the job names none.
+    remarks : what every statement by it says.
+    sensing : for which probes it is; ``None`` for any.
+    clauses : what it takes the standard to ask, for the form that a laboratory fills in.
+    """
+
+    name: str
+    characteristics: tuple[Characteristic, ...]
+    remarks: tuple[Text, ...] = ()
+    sensing: Literal["contacting", "optical"] | None = None
+    clauses: tuple[Clause, ...] = ()
+
+    @property
+    def clause_names(self) -> tuple[str, ...]:
+        """See :attr:`cmm_uq.jobs.conformity.Asked.clause_names`."""
+        return tuple(clause.name for clause in self.clauses)
+
+    def characteristic(self, name: str | None) -> Characteristic:
+        """One of them by name; without one the first.
+
+        Raises
+        ------
+        ValueError : it is not decided here.
+        """
+        found = next((each for each in self.characteristics if name in (None, each.name, *each.also)), None)
+        if found is None:
+            known = ", ".join(each.name for each in self.characteristics)
+            raise ValueError(f"characteristic = {name!r} of {self.name} is not decided here: only {known}")
+        return found
+
+    def uncertainty_missing(
+        self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
+    ) -> str | None:  # fmt: skip
+        """See :meth:`cmm_uq.jobs.conformity.Asked.uncertainty_missing`."""
+        if wish.rule == "simple":
+            return None
+        asked = self.characteristic(wish.characteristic)
+        if asked.lines and asked.lines != FORM_LINES and all(stated.declared(line) for line in asked.lines):
+            return None
+        if asked.needs is not None and not (
+            getattr(stated, asked.needs) or stated.u_temperature_k or stated.u_fixturing_um
+        ):
+            return asked.needs
+        return asked.unstated(artefact)
+
+
+@dataclass(frozen=True, eq=False)
+class Test:
+    """A test that is to be decided.
+
+    Parameters
+    ----------
+    standard, characteristic : what is tested.
+    facts : limit and rule.
+    artefact : with its recording.
+    recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
+    accuracy : figures of performance with uncertainty, by name.
+    key : of job.toml, for messages.
+    circumstances : under which it was carried out.
+    left_out : what the screening left out of the estimates; it is in ``artefact`` and in ``recorded``.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    standard: Standard
+    characteristic: Characteristic
+    facts: ConformityFacts
+    artefact: Artefact
+    recorded: Artefact
+    accuracy: Mapping[str, Quantity]
+    key: str
+    circumstances: Circumstances = field(default_factory=Circumstances)
+    left_out: LeftOut | None = None
+
+    def set_aside(self, rows: Ints) -> NDArray[np.bool_]:
+        """Which values (m,), each of several points (m, j), rest on a reading that the screening left out."""
+        return np.zeros(len(rows), dtype=bool) if self.left_out is None else self.left_out.any_of(rows)
+
+    def set_aside_in(self, measurement: int, repeat: int | None = None) -> bool:
+        """Whether the screening left out a reading of a measurement, or of one repeat of it."""
+        points = self.artefact.points
+        own = (points.measurement == measurement) & (True if repeat is None else points.repeat == repeat)
+        return bool(self.set_aside(np.flatnonzero(own)[:, None]).any())
+
+    def indications(self) -> Indications:
+        """Errors of indication of the calibrated lengths.
+
+        Raises
+        ------
+        CmmUqError : there is no calibration.
+        """
+        found = self.artefact.indications()
+        if found is None:
+            raise CmmUqError(f"{self.facts.standard} compares with calibrated lengths, and the {self.artefact.kind} has none",
+                             where=f"job.toml {self.key} standard",
+                             fix="Give length_mm and u_um in [artefact], or leave the statement out")  # fmt: skip
+        return found
+
+    def limits_um(self, lengths_mm: Floats) -> Floats:
+        """The limit of each of some lengths (m,), µm: ``limit_um``, A + L/K, B, or the lesser of these two."""
+        mpe = self.facts.mpe
+        if mpe is None:
+            return np.full(len(lengths_mm), self.facts.limit_um, dtype=np.float64)
+        most = np.full(len(lengths_mm), np.inf if mpe.b_um is None else mpe.b_um)
+        if mpe.a_um is None or mpe.k is None:
+            return most
+        return np.asarray(np.minimum(mpe.a_um + lengths_mm / mpe.k, most), dtype=np.float64)
+
+    @cached_property
+    def unstated(self) -> tuple[Condition, ...]:
+        """Lines of the test uncertainty that are neither stated nor declared."""
+        return uncertainty_conditions(self.characteristic.lines, self.recorded, self.circumstances)
+
+    @property
+    def answered(self) -> bool:
+        """Whether an uncertainty of nought is one that somebody answers for, and not an unknown one."""
+        return bool(self.characteristic.lines) and not self.unstated
+
+    def decide(
+        self, value_um: float, u_um: float, limit_um: float, *, signed: bool, length_mm: float | None = None
+    ) -> Decision:
+        """One value by the rule and the prior of the job.
+
+        Where all lines of the uncertainty are declared negligible every rule comes to simple acceptance. Where some are
+        unknown, what they may well be of the length (of the artefact's size by default) counts before anything is proved to
+        be beyond the limit.
+        """
+        if u_um <= 0 and self.answered and needs_uncertainty(self.facts.rule):
+            simple = decide(value_um, 0.0, limit_um, "simple", signed=signed)
+            return replace(simple, rule=rule_words(self.facts.rule))
+        length = self.artefact.sizes[0].nominal if length_mm is None else length_mm
+        return decide(
+            value_um, u_um, limit_um, self.facts.rule, signed=signed, prior=self.prior(limit_um),
+            unstated=self._u_of_unstated(length),
+        )  # fmt: skip
+
+    @cached_property
+    def _u_of_unstated(self) -> Callable[[float], float]:
+        """Standard uncertainty, µm, that what is not stated may well have, of a length in mm."""
+        return cache(partial(u_of_unstated, self.characteristic.lines, self.recorded, self.circumstances))
+
+    def least_u(self, lengths_mm: Floats) -> Floats:
+        """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.
+
+        The capability has k = 2 (ILAC-P14:09/2020); 0 where none is given.
+        """
+        cmc = self.circumstances.cmc
+        return np.array([0.5 * cmc.least(unit("µm"), float(each)) if cmc else 0.0 for each in lengths_mm])
+
+    def at_least(self, u_um: float, length_mm: float) -> float:
+        """A standard uncertainty not below that; one that is not stated stays 0."""
+        return max(u_um, float(self.least_u(np.array([length_mm]))[0])) if u_um > 0 else u_um
+
+    def budget_at_least(self, budget: Budget, length_mm: float) -> Budget:
+        """A budget of a test value, with a line for what the capability has more."""
+        scale = MICROMETRE if budget.unit == unit("mm") else 1.0
+        least = float(self.least_u(np.array([length_mm]))[0]) * scale
+        if not 0 < budget.u < least:
+            return budget
+        more = Line(say("raised to the laboratory's capability"), float(np.sqrt(least**2 - budget.variance)), CMC,
+                    unit=budget.unit)  # fmt: skip
+        return replace(budget, lines=[*budget.lines, more])
+
+    def prior(self, limit_um: float) -> Known | None:
+        """What the job says of an error with this limit beforehand."""
+        given = self.facts.prior
+        if given is None:
+            return None
+        return Known(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
+
+    def refuse_without_uncertainty(self, u: float, name: str) -> None:
+        """Refuse a rule that needs an uncertainty where there is none.
+
+        Parameters
+        ----------
+        u : the least of all.
+        name : the key that would state it.
+
+        Raises
+        ------
+        CmmUqError : with the key and the fix.
+        """
+        if u <= 0 and needs_uncertainty(self.facts.rule) and not self.answered:
+            problem, fix = needed(name, self.facts)
+            raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
+
+    def refuse_nothing_measured(self, measured: bool, what: str) -> None:
+        """Refuse a statement on something of which the recording has nothing.
+
+        Raises
+        ------
+        CmmUqError : with what is to be recorded.
+        """
+        if not measured:
+            name = f"{self.characteristic.name} of {self.facts.standard}"
+            raise CmmUqError(f"{name} is decided on {what}, and the recording has none",
+                             where=f"job.toml {self.key} characteristic",
+                             fix="Record them, or leave the statement out")  # fmt: skip
+
+    def stated(
+        self, quantity: Text, measured: Text, items: tuple[Decided, ...], remarks: Sequence[Text], *,
+        signed: bool = True, causes: Causes | None = None, budget: Budget | None = None, repeats: int | None = None,
+        lacking: Sequence[Text] = (),
+    ) -> Statement:  # fmt: skip
+        """What was decided, with what the test lacks, and what the rule leaves out.
+
+        Parameters
+        ----------
+        quantity : what is compared, in words.
+        measured : what was measured, in the plural, for "… conform".
+        items : all that was decided, in the recording's order.
+        remarks : what the reader must know of this use of the standard.
+        signed : whether limits hold on both sides of zero.
+        causes : of the uncertainty of each item, from which follows the probability that all conform.
+        budget : of the least favourable one.
+        repeats : up to which a repeat has every point of its measurement; all of them by default.
+        lacking : what could not be decided of what was recorded.
+        """
+        form = self.circumstances.clauses.get(self.facts.clauses or "")
+        clauses = [one for one in self.standard.clauses if not one.of or self.characteristic.name in one.of]
+        told, differing = in_words(self.standard.name, clauses, form)
+        asked = (
+            *self.characteristic.conditions(self.recorded, recorded=True),
+            *self.characteristic.asks(self),
+            *(Condition(what, (what,)) for what in (*lacking, *differing)),
+            *self.unstated,
+            *rated_conditions(self.circumstances, self.recorded.points),
+            *numbered(self.recorded.points if self.left_out is None else self.left_out.recording, repeats),
+            *self._gaps_of_short_gauge(),
+        )
+        worst = least_favourable(items)
+        more: list[Text] = []
+        if self.facts.rule == "simple" and worst.u_um > 0:
+            more.append(NOT_CONSIDERED)
+        if self.facts.prior is None and worst.u_um > 0:
+            more.append(BY_MEASUREMENT_ALONE)
+        more += self.standard.remarks
+        if self._raised(items):
+            more.append(RAISED)
+        if copies := copies_in_words(self.recorded.points):
+            more.append(copies)
+        aside = [item for item in items if item.set_aside]
+        outside = () if self.left_out is None else self.left_out.without_value
+        if self.left_out is not None and (aside or outside):
+            more = [*self.left_out.in_words([item.measurement for item in aside] if not outside else [None]), *more]
+        more = [*_set_aside(self.circumstances.set_aside), *more]
+        joint = None if causes is None or outside or counted(aside) else _joint(items, causes, signed)
+        lines, stated = self.characteristic.lines, self.circumstances.uncertainty
+        more += [*declared_in_words(lines, stated), *rated_in_words(self.circumstances.rated), *told]
+        if budget is not None:
+            budget = with_declared(budget, lines, stated)
+        missing = {text: condition.remedy for condition in asked for text in condition.missing}
+        return Statement(
+            self.facts, self.characteristic.name, quantity, measured, items, tuple(missing), (*remarks, *more), signed,
+            joint, budget, self._risks(worst, signed), outside, tuple(missing.values()),
+        )  # fmt: skip
+
+    def _gaps_of_short_gauge(self) -> tuple[Condition, ...]:
+        """What is missing from the numbering of a short gauge that lengths of this test rest on."""
+        gauge, found = self.circumstances.short_gauge, self.artefact.indications()
+        if gauge is None or found is None or found.u_beside is None or not found.u_beside.any():
+            return ()
+        gaps = [text for condition in numbered(gauge.points, measurements=False) for text in condition.missing]
+        return tuple(Condition(text, (say("short gauge, {gap}", gap=text),)) for text in gaps)
+
+    def _raised(self, items: Sequence[Decided]) -> bool:
+        """Whether any was decided with the capability's uncertainty in place of a smaller one."""
+        if self.circumstances.cmc is None:
+            return False
+        nominal = self.artefact.sizes[0].nominal
+        least = self.least_u(np.array([nominal if item.length_mm is None else item.length_mm for item in items]))
+        return any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True))
+
+    def _risks(self, worst: Decided, signed: bool) -> Risks | None:
+        """Of all machines alike, where such a length is decided by this rule."""
+        prior = self.prior(worst.limit_um)
+        if prior is None or worst.u_um <= 0:
+            return None
+        band = worst.decision.guard_band
+        accepted = -20.0 * worst.u_um if band is None else worst.limit_um - band
+        return global_risks(accepted, worst.limit_um, worst.u_um, prior, signed=signed)
+
+
+def _set_aside(reasons: Mapping[int, str]) -> list[Text]:
+    """What the laboratory leaves out of the estimates, and why."""
+    return [
+        say("Measurement {number}, left out of the estimates by the laboratory, is decided with the others: {reason}.",
+            number=number, reason=Verbatim(reason.rstrip(". ")))
+        if reason
+        else say("Measurement {number}, left out of the estimates by the laboratory, is decided with the others; no reason is "
+                 "stated.", number=number)
+        for number, reason in reasons.items()
+    ]  # fmt: skip
+
+
+def _joint(items: Sequence[Decided], causes: Causes, signed: bool) -> float | None:
+    """Probability that all that counts conforms."""
+    rows = np.array([i for i, item in enumerate(items) if item.standing != "replaced"], dtype=np.int64)
+    left = counted(items)
+    return probability_of_all(
+        [item.error_um for item in left], [item.limit_um for item in left], causes.of(rows), signed=signed
+    )
+
+
+def characteristic_of(standard: Standard, facts: ConformityFacts, key: str) -> Characteristic:
+    """The characteristic that a job wishes to be decided.
+
+    Raises
+    ------
+    CmmUqError : it is not decided here.
+    """
+    try:
+        return standard.characteristic(facts.characteristic)
+    except ValueError as error:
+        raise CmmUqError(str(error), where=f"job.toml {key} characteristic", fix="Leave it out") from None

@@ -1,0 +1,237 @@
+"""The standards that can be stated, each with its characteristics, and those of other packages.
+
+Another package offers one as an entry point of the group ``cmm_uq.standards``, of the standard's own name. What of each is
+tested, from which columns, and what is not: docs/standards.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+from functools import partial
+from types import MappingProxyType
+
+from cmm_uq.analysis.conformity.as_recorded import LeftOut
+from cmm_uq.analysis.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
+from cmm_uq.analysis.conformity.clauses import CLAUSES
+from cmm_uq.analysis.conformity.lengths_decided import (
+    at_offset,
+    errors_of_indication,
+    length_unstated,
+    normal_expansion,
+    on_lines,
+    repeatability_range,
+    short,
+)
+from cmm_uq.analysis.conformity.orientation_conditions import orientations
+from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
+from cmm_uq.analysis.conformity.plans import (
+    B89,
+    B89_BIDIRECTIONAL,
+    B89_LINEAR,
+    B89_OFFSET,
+    B89_REPEATABILITY,
+    ISO_10360_2,
+    ISO_10360_2_OFFSET,
+    ISO_10360_5,
+    ISO_10360_8,
+    VDI_2617_2_1,
+    Condition,
+)
+from cmm_uq.analysis.conformity.remeasured import Again
+from cmm_uq.analysis.conformity.short_gauge import repeats_of_gauge, supplemented
+from cmm_uq.analysis.conformity.spheres_decided import (
+    diameter_allowed,
+    form_error,
+    form_unstated,
+    range_of_centres,
+    repeats_of_sphere,
+    sensing_stated,
+    size_error,
+    size_unstated,
+)
+from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
+from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.uncertainty_lines import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.plugins import STANDARDS, Plugin, named, offered
+from cmm_uq.jobs.circumstances import Circumstances
+from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+AGAIN = Again(repeats=3, outside=1, lengths=5, readings=10)
+"""Of ISO 10360-2:2009; see docs/standards.md."""
+
+
+def _short_gauge_repeated(test: Test) -> tuple[Condition, ...]:
+    return repeats_of_gauge(
+        test.circumstances.short_gauge, test.indications(), ISO_10360_2.repeats, ISO_10360_2.shortest_mm
+    )
+
+
+def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:
+    return (*normal_expansion(test), *_short_gauge_repeated(test))
+
+
+_E0 = Characteristic(
+    "E0", LENGTHS, partial(errors_of_indication, chosen=at_offset(0.0), again=AGAIN), partial(conditions, ISO_10360_2),
+    length_unstated, _asked_of_gauges, beside=supplemented,
+    lines=LENGTH_LINES,
+)  # fmt: skip
+_R0 = Characteristic(
+    "R0", LENGTHS, partial(repeatability_range, repeats=3, chosen=at_offset(0.0)), partial(conditions, ISO_10360_2),
+    asks=_short_gauge_repeated, needs="u_repeat_um", beside=supplemented, lines=REPEAT_LINES,
+)  # fmt: skip
+_E150 = Characteristic(
+    "E150", LENGTHS, partial(errors_of_indication, chosen=at_offset(150.0), again=AGAIN),
+    partial(best_of, ISO_10360_2_OFFSET), length_unstated, _asked_of_gauges, beside=supplemented,
+    lines=LENGTH_LINES,
+)  # fmt: skip
+_SPHERE = (partial(conditions, ISO_10360_5), partial(diameter_allowed, plan=ISO_10360_5))
+
+
+def _superseded(by: str) -> tuple[Text, ...]:
+    return (say("This edition is superseded by {by}.", by=Verbatim(by)),)
+
+
+_STANDARDS = (
+    Standard("ASME B89.4.1-1997", (
+        Characteristic("volumetric performance", BARS, volumetric_performance, partial(conditions, B89),
+                       lines=REPEAT_LINES),
+        Characteristic("repeatability", FORMS, range_of_centres, partial(repeats_of_sphere, B89_REPEATABILITY),
+                       needs="u_repeat_um", lines=REPEAT_LINES),
+        Characteristic("linear displacement accuracy", LENGTHS,
+                       partial(errors_of_indication, chosen=on_lines(B89_LINEAR.positions)),
+                       partial(conditions, B89_LINEAR), length_unstated, lines=LENGTH_LINES),
+        Characteristic("offset probe performance", BARS, offset_probe, partial(offset_positions, B89_OFFSET),
+                       needs="u_repeat_um", lines=REPEAT_LINES),
+        Characteristic("bidirectional length", LENGTHS,
+                       partial(errors_of_indication, chosen=short(B89_BIDIRECTIONAL.longest_mm)),
+                       partial(orientations, B89_BIDIRECTIONAL), length_unstated, lines=LENGTH_LINES),
+    ), _superseded("ASME B89.4.10360.2-2008")),
+    Standard("ASME B89.4.10360.2-2008", (_E0, _R0, _E150), (
+        say("ASME B89.4.10360.2-2008 takes over ISO 10360-2; what it adds to it is not tested here."),
+    ), "contacting"),
+    Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
+    Standard("ISO 10360-5:2010", (
+        Characteristic("P_FTU", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1], lines=FORM_LINES),
+        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1], lines=SIZE_LINES),
+    ), _superseded("ISO 10360-5:2020"), "contacting"),
+    Standard("ISO 10360-5:2020", (
+        Characteristic("P_Form.Sph.1x25:SS:Tact", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1],
+                       ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
+        Characteristic("P_Size.Sph.1x25:SS:Tact", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1],
+                       ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
+    ), sensing="contacting"),
+    Standard("ISO 10360-8:2013", (
+        Characteristic("P_Form.Sph.1x25:Tr:ODS", FORMS, form_error, partial(conditions, ISO_10360_8), form_unstated,
+                       sensing_stated, ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
+        Characteristic("P_Size.Sph.1x25:Tr:ODS", FORMS, size_error, partial(conditions, ISO_10360_8), size_unstated,
+                       sensing_stated, ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
+    ), sensing="optical"),
+    Standard("VDI/VDE 2617", (_E0,), (
+        say("VDI/VDE 2617 is decided like ISO 10360-2:2009 here, with the same positions, lengths and repetitions."),
+        say("VDI/VDE 2617 alone names no part: that of the length measuring uncertainty is VDI/VDE 2617-2.1."),
+    ), "contacting"),
+    Standard("VDI/VDE 2617-2.1", tuple(
+        Characteristic(name, LENGTHS, partial(errors_of_indication, chosen=on_lines(VDI_2617_2_1[name].positions)),
+                       partial(conditions, VDI_2617_2_1[name]), length_unstated, lines=LENGTH_LINES)
+        for name in ("U3", "U1", "U2")
+    ), sensing="contacting"),
+)  # fmt: skip
+
+BUILT_IN: Mapping[str, Standard] = MappingProxyType(
+    {standard.name: replace(standard, clauses=CLAUSES[standard.name]) for standard in _STANDARDS}
+)
+"""The standards that are decided here, by name."""
+
+
+def statement(
+    facts: ConformityFacts,
+    artefact: Artefact,
+    accuracy: Mapping[str, Quantity],
+    key: str,
+    tested: Collection[str],
+    recorded: Artefact | None = None,
+    circumstances: Circumstances | None = None,
+    left_out: LeftOut | None = None,
+) -> Statement:
+    """Compare what the standard asks for with its limit, and decide.
+
+    Parameters
+    ----------
+    facts : standard, limit and rule.
+    artefact : with its recording.
+    accuracy : figures with uncertainty.
+    key : of job.toml, for messages.
+    recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
+    tested : what of this kind of artefact a standard may be decided on.
+    circumstances : under which the test was carried out, by the job.
+    left_out : what the screening left out of the artefact.
+
+    Raises
+    ------
+    CmmUqError : there is no such standard, the recording is not what it is decided on, or the rule needs an uncertainty
+        that is not stated.
+    """
+    under = circumstances or Circumstances()
+    standard, characteristic = decidable(facts, artefact.kind, key, tested, under)
+    whole, beside = recorded or artefact, characteristic.beside
+    if left_out is not None:
+        artefact, whole = left_out.whole(artefact), left_out.whole(whole)
+    if beside is not None:
+        artefact, whole = beside(artefact, under.short_gauge), beside(whole, under.short_gauge)
+    return characteristic.statement(
+        Test(standard, characteristic, facts, artefact, whole, accuracy, key, under, left_out)
+    )
+
+
+def decidable(
+    facts: ConformityFacts, kind: str, key: str, tested: Collection[str], under: Circumstances
+) -> tuple[Standard, Characteristic]:  # fmt: skip
+    """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement.
+
+    Parameters
+    ----------
+    facts, key, tested : see :func:`statement`.
+    kind : of measurement.
+    under : circumstances of the test.
+
+    Raises
+    ------
+    CmmUqError : there is no such standard, or it is for other artefacts or probes.
+    """
+    standard = standard_named(facts.standard)
+    if standard is None:
+        raise CmmUqError(f"no standard {facts.standard!r} is decided", where=f"job.toml {key} standard",
+                         fix=suggestion(facts.standard, names()))  # fmt: skip
+    characteristic = characteristic_of(standard, facts, key)
+    if characteristic.observed not in tested:
+        raise CmmUqError(f"{facts.standard} is not decided on a {kind}", where=f"job.toml {key} standard",
+                         fix="Leave the statement out, or record the artefact that the standard asks for")  # fmt: skip
+    if None not in (standard.sensing, under.probe.sensing) and standard.sensing != under.probe.sensing:
+        raise CmmUqError(f"{facts.standard} is for {standard.sensing} probes, and the recording was made with one that is not",
+                         where=f"job.toml {key} standard",
+                         fix="State ISO 10360-8:2013 of optical probes, or leave the statement out")  # fmt: skip
+    return standard, characteristic
+
+
+def standard_named(name: str) -> Standard | None:
+    """A standard by its name; ``None`` where there is none. A built-in one cannot be replaced.
+
+    Raises
+    ------
+    CmmUqError : another package offers it, but cannot be loaded, or two packages do.
+    """
+    if name in BUILT_IN:
+        return BUILT_IN[name]
+    outside = named(offered(STANDARDS, Plugin), name)
+    return None if outside is None else outside.loaded(Standard)
+
+
+def names() -> tuple[str, ...]:
+    """Of all standards, those of other packages last; none of these is imported."""
+    return (*BUILT_IN, *(plugin.name for plugin in offered(STANDARDS, Plugin) if plugin.name not in BUILT_IN))

@@ -1,0 +1,218 @@
+"""Whether every line of the test uncertainty that applies is stated above zero, or somebody answers for it.
+
+Of an error of indication ISO/TS 23165:2006 counts calibration, expansion coefficient, temperature, alignment and fixturing of
+the artefact. Of a range of repeats, or of a bar's lengths, the calibration cancels, and what of the artefact changes between
+them is left. A line that is neither stated nor declared is not nought but unknown: no test passes without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.plans import Condition
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
+from cmm_uq.jobs.circumstances import LINE_KEYS, Circumstances, Declared, TestUncertainty
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.maths.uncertainty.budget import Budget
+
+LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")
+"""Of a calibrated length, in the order of its budget."""
+
+WARM = 0.5
+"""K from 20 °C from which on an unknown expansion matters."""
+
+SIZE_LINES = LENGTH_LINES[:3]
+FORM_LINES = ("form",)
+REPEAT_LINES = ("repeat",)
+
+UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
+"""What a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others."""
+
+STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6
+"""1/K; of what gauges are made of, aluminium expands most."""
+
+_NAMES = {
+    "calibration": say("calibration of the artefact"),
+    "expansion": say("expansion coefficient of the artefact"),
+    "temperature": say("temperature of the artefact"),
+    "alignment": say("alignment of the artefact"),
+    "fixturing": say("fixturing of the artefact"),
+    "form": say("calibration of the form"),
+    "repeat": say("what of the artefact changes between the readings"),
+}
+
+
+def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
+    """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
+    found = [_neither(line) for line in lines if not _met(line, artefact, under)]
+    if "form" in lines and not _form_of_sphere(artefact):
+        found.append(
+            _lacks(say("uncertainty: the form deviation of the test sphere is not stated"), "form_um in [artefact]")
+        )
+    if "expansion" in lines:
+        found += _thermal(artefact, under)
+    return tuple(found)
+
+
+def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstances, length_mm: float) -> float:
+    """Standard uncertainty, µm, that the lines of a length which are neither stated nor declared may well have.
+
+    It counts before a value is called nonconforming, and for nothing else: the figures are this project's, and larger than a
+    laboratory that controls its temperature has. An expansion of which no coefficient is stated was not corrected at all.
+    """
+    recorded = artefact.points.columns.get("temp_artefact_c")
+    away = 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max())
+    per_length = {
+        "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
+        "expansion": away * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
+    }
+    missing = {line for line in lines if not _met(line, artefact, under)}
+    if "expansion" in lines and not under.cte_per_k and not under.uncertainty.declared("expansion"):
+        missing.add("expansion")
+    each = [per_length[line] * length_mm / MICROMETRE if line in per_length else UNSTATED_UM for line in missing]
+    return float(np.linalg.norm(each)) if each else 0.0
+
+
+def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    return {"calibration": _calibrated, "repeat": _repeats}.get(line, _stated)(line, artefact, under)
+
+
+def u_of_repeats(length_mm: float, under: Circumstances) -> float:
+    """Standard uncertainty, µm, of a difference of two readings of one length, by what of it changes between them.
+
+    As ``u_repeat_um`` says, or from temperature and fixturing of each reading; where both are stated whole, the lesser.
+    """
+    by_lines, direct = _two_readings(length_mm, under), under.uncertainty.u_repeat_um
+    if not direct:
+        return 0.0 if under.uncertainty.declared("repeat") else by_lines
+    return min(direct, by_lines) if by_lines and _both_lines(under) else direct
+
+
+def _two_readings(length_mm: float, under: Circumstances) -> float:
+    stated = under.uncertainty
+    warm = length_mm / MICROMETRE * abs(under.cte_per_k or 0.0) * stated.u_temperature_k
+    return float(np.sqrt(2.0) * np.hypot(warm, stated.u_fixturing_um))
+
+
+def _both_lines(under: Circumstances) -> bool:
+    """Whether temperature and fixturing say all that changes between readings."""
+    stated = under.uncertainty
+    known = bool(under.cte_per_k or stated.declared("expansion"))
+    warm = bool(stated.declared("temperature")) or (known and stated.u_temperature_k > 0)
+    return warm and bool(stated.declared("fixturing") or stated.u_fixturing_um)
+
+
+def _repeats(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    return _stated(line, artefact, under) or (_both_lines(under) and _two_readings(1.0, under) > 0)
+
+
+def _stated(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    return bool(getattr(under.uncertainty, LINE_KEYS[line]) or under.uncertainty.declared(line))
+
+
+def _calibrated(line: str, artefact: Artefact, under: Circumstances) -> bool:
+    """Whether each calibrated length, or the size where there are none, has an uncertainty above zero."""
+    found = artefact.indications()
+    u = np.array([artefact.sizes[0].sd]) if found is None else found.u
+    return under.uncertainty.declared(line) is not None or bool(np.all(u > 0))
+
+
+def _form_of_sphere(artefact: Artefact) -> bool:
+    probed = artefact.forms()
+    return probed is not None and probed.certified > 0
+
+
+def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
+    """Expansion coefficient and temperature, without which errors are neither corrected nor uncertain as they are."""
+    stated = under.uncertainty
+    if not under.cte_per_k and not stated.declared("expansion"):
+        yield _lacks(
+            say("uncertainty: the expansion coefficient of the artefact is not stated"),
+            "cte_per_k in [artefact], or expansion in [test_uncertainty.negligible]",
+        )
+    elif under.cte_per_k is None and stated.machine.expansion is None and away_from_20(artefact) >= WARM:
+        yield _lacks(
+            say(
+                "uncertainty: lengths are not brought to 20 °C, for the expansion coefficient of the artefact is not stated"
+            ),
+            "cte_per_k in [artefact], or expansion in [test_uncertainty.machine] of a machine that corrects it",
+        )
+    if "temp_artefact_c" in artefact.points.columns:
+        return
+    if stated.machine.temperature is None:
+        yield _lacks(
+            say("uncertainty: the temperature of the artefact during the test was not recorded"),
+            "column temp_artefact_c, or temperature in [test_uncertainty.machine] of a machine that measures and corrects it",
+        )
+    elif not stated.declared("expansion"):
+        yield _lacks(
+            say("uncertainty: how far the artefact was from 20 °C, on which that of its expansion coefficient depends"),
+            "column temp_artefact_c, or expansion in [test_uncertainty.machine] or [test_uncertainty.negligible]",
+        )
+
+
+def away_from_20(artefact: Artefact) -> float:
+    """How far the artefact was from 20 °C at most, K; 0 where its temperature was not recorded."""
+    recorded = artefact.points.columns.get("temp_artefact_c")
+    return 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max(initial=0.0))
+
+
+def _neither(line: str) -> Condition:
+    key = "u_um in [artefact]" if line == "calibration" else f"{LINE_KEYS[line]} in [test_uncertainty]"
+    return _lacks(
+        say("uncertainty: {line} is neither stated nor declared negligible", line=_NAMES[line]),
+        f'{key}, or {line} = {{ by = "…", reason = "…" }} in [test_uncertainty.negligible]',
+    )
+
+
+def _lacks(what: Text, remedy: str) -> Condition:
+    return Condition(what, (what,), Verbatim(remedy))
+
+
+def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[Text]:
+    """Who answers for which line, and why."""
+    told: list[Text] = []
+    for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
+        negligible, own = getattr(stated.negligible, line, None), getattr(stated.machine, line, None)
+        if negligible:
+            by, reason = _answer(negligible)
+            told.append(
+                say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line], by=by, reason=reason)
+            )
+        if own:
+            by, reason = _answer(own)
+            told.append(
+                say(
+                    "{line:capital}: declared the machine's own by {by}: {reason}.",
+                    line=_NAMES[line],
+                    by=by,
+                    reason=reason,
+                )
+            )
+    return told
+
+
+def _answer(declared: Declared) -> tuple[Text, Text]:
+    """Name and reason, without the full stop that a sentence sets."""
+    return Verbatim(declared.by), Verbatim(declared.reason.rstrip(". "))
+
+
+def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty) -> Budget:
+    """The budget of which each declared line says so: those of a length are its first, in their order.
+
+    That of a form begins with the form deviation itself, of which nothing is declared; that of repeats has lines of its own.
+    """
+    own = () if lines == REPEAT_LINES else ("", *lines) if lines == FORM_LINES else lines
+    named = [
+        replace(line, name=say("{line} (declared negligible)", line=line.name))
+        if name and getattr(stated.negligible, name, None)
+        else replace(line, name=say("{line} (declared the machine's own)", line=line.name))
+        if name and getattr(stated.machine, name, None)
+        else line
+        for line, name in zip(budget.lines, own, strict=False)
+    ]
+    return replace(budget, lines=[*named, *budget.lines[len(named) :]])

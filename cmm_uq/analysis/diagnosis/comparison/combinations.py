@@ -1,0 +1,347 @@
+"""Which explanations hold together: the posterior over combinations of them, found best first.
+
+Each combination has its marginal likelihood, the sizes of its members integrated one at a time about their joint best; each
+known effect has its posterior probability by summing over the combinations that contain it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.analysis.diagnosis.comparison.prior import ALIKE, EFFECTS, Prior, with_two
+from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.base.points import Floats, Ints
+
+MOST = 12
+"""The most known effects that are looked for."""
+
+WINDOW = 7.0
+"""A combination less probable than one of its parts by more than this, in logarithm, is not followed."""
+
+LIKE = 0.02
+"""Part of an effect's squared visible length up to which two others that leave no more of it are tried in its place."""
+
+SETTLED, FOLLOWED = 24, 8
+"""How many combinations of each size have their evidence computed, and are followed to the next size."""
+
+Key = frozenset[int]
+
+
+@dataclass(frozen=True)
+class Combination:
+    """Explanations that hold together, the size of each at its best, the log posterior up to a constant, and its log prior."""
+
+    versions: tuple[Version, ...]
+    log_posterior: float
+    log_prior: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """All combinations worth following.
+
+    Parameters
+    ----------
+    explanations : of which they are made.
+    found : by the indices of their explanations.
+    counts : probability, beforehand, of none, one, two … known effects that act by themselves.
+    imitated : nonparametric terms that leave next to nothing of an effect in this recording.
+    """
+
+    explanations: Sequence[Explanation]
+    found: Mapping[Key, Combination]
+    counts: tuple[float, ...] = EFFECTS
+    imitated: Mapping[int, Key] = field(default_factory=dict)
+
+    @cached_property
+    def probability(self) -> dict[Key, float]:
+        """Of each combination."""
+        log = np.array([c.log_posterior for c in self.found.values()])
+        return dict(zip(self.found, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
+
+    def effects_of(self, key: Key) -> Key:
+        """The known effects of a combination."""
+        return frozenset(i for i in key if self.explanations[i].kind == EFFECT)
+
+    @cached_property
+    def of_effects(self) -> dict[Key, float]:
+        """Probability of each set of known effects, whatever is unknown besides."""
+        total: dict[Key, float] = {}
+        for key, p in self.probability.items():
+            known = self.effects_of(key)
+            total[known] = total.get(known, 0.0) + p
+        return total
+
+    @property
+    def most_probable(self) -> Key:
+        """The most probable set of known effects."""
+        return max(self.of_effects, key=lambda key: self.of_effects[key])
+
+    @property
+    def most_members(self) -> int:
+        """How many explanations, unknown functions too, the most probable combination has."""
+        return len(max(self.found, key=lambda key: self.found[key].log_posterior))
+
+    def versions(self, effects: Key) -> tuple[Version, ...]:
+        """Of the most probable combination with these known effects, or more."""
+        keys = [key for key in self.found if self.effects_of(key) >= effects]
+        return self.found[max(keys, key=lambda key: self.found[key].log_posterior)].versions
+
+    def imitating(self, index: int) -> Key:
+        """Nonparametric terms that could pass for an effect: by its form, or in this recording."""
+        effect = self.explanations[index]
+        by_form = {j for j, function in enumerate(self.explanations) if function.could_be(effect)}
+        return frozenset(by_form) | self.imitated.get(index, frozenset())
+
+    def unknown_beside(self, effects: Key) -> float:
+        """Probability that something unknown acts besides, given these known effects."""
+        beside = sum(p for key, p in self.probability.items() if self.effects_of(key) == effects and key != effects)
+        return beside / self.of_effects[effects]
+
+    def of(self, index: int) -> float:
+        """Probability that an explanation is part of the truth."""
+        return self.of_any(frozenset((index,)))
+
+    def of_any(self, those: Key) -> float:
+        """Probability that at least one of some explanations is part of the truth."""
+        return min(1.0, float(sum(p for key, p in self.probability.items() if those & key)))
+
+    def instead(self, effects: Key, index: int) -> dict[int, float]:
+        """Odds of each other known effect in the place of one, or of one and more, the rest kept.
+
+        In the place of several it counts where it is more probable than that the one is merely left out: a gauge that had
+        another temperature on each of its lines looks like two or three errors of the machine at once. Of effects that were
+        never compared by themselves, but with others that are withheld, there are no odds.
+        """
+        rest, whole = effects - {index}, self.of_effects.get(effects, 0.0)
+        odds: dict[int, float] = {}
+        if whole == 0:
+            return odds
+        for other, p in self.of_effects.items():
+            more = other - effects
+            if len(more) != 1 or index in other:
+                continue
+            if len(other) == len(effects) or p > self.of_effects.get(rest, 0.0):
+                (it,) = more
+                odds[it] = odds.get(it, 0.0) + p / whole
+        return odds
+
+
+def explore(comparison: Comparison, before: Combinations | None = None, changed: Key = frozenset()) -> Combinations:
+    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best.
+
+    Parameters
+    ----------
+    comparison : of all explanations.
+    before : what was found of the same ones, but for some that have other versions now.
+    changed : these.
+    """
+    found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
+    # there may be more than were looked for; unknown functions may stand for several of them
+    while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
+        found = _explored(comparison, found, frozenset(), with_two(found.counts))
+    return found
+
+
+def _counts(comparison: Comparison) -> tuple[float, ...]:
+    """Probability of none, one, two … known effects: of one more at least than are everywhere."""
+    counts: tuple[float, ...] = EFFECTS
+    while len(counts) - 1 <= len(everywhere(comparison)):
+        counts = with_two(counts)
+    return counts
+
+
+def everywhere(comparison: Comparison) -> list[int]:
+    """Effects that every machine has to some degree and this recording shows."""
+    return [
+        i for i in sorted(comparison.visible)
+        if (effect := comparison.explanations[i].effect) is not None and effect.everywhere and not effect.of_artefact
+    ]  # fmt: skip
+
+
+def _explored(
+    comparison: Comparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
+) -> Combinations:
+    """The same with so many known effects at the most."""
+    known = (
+        {}
+        if before is None
+        else {key: one for key, one in before.found.items() if not key & changed and np.isfinite(one.log_posterior)}
+    )  # one of more effects than were looked for may be possible now
+    search = _Search(comparison, known, counts)
+    search.climb(frozenset())
+    # one of many coefficients can explain all of these at once, and then none of them is worth adding by itself
+    if together := search.with_more((), everywhere(comparison)):
+        search.settle(together)
+        search.climb(keyed(together))
+    exchanged: set[Key] = set()
+    while (best := search.best()) not in exchanged:
+        exchanged.add(best)
+        for i in best:
+            fewer = tuple(v for v in search.settled[best].versions if v.explanation != i)
+            search.settle(fewer)
+            search.expand(keyed(fewer))
+            for pair in search.pairs_like(i):
+                if not best & frozenset(pair):
+                    search.settle(search.with_more(fewer, pair))
+        search.settle_best(len(best), SETTLED)
+    return Combinations(comparison.explanations, search.settled, counts)
+
+
+def keyed(versions: Iterable[Version]) -> Key:
+    """Which explanations these are versions of."""
+    return frozenset(v.explanation for v in versions)
+
+
+class _Search:
+    """Combinations settled so far, and those that wait for it with an estimate of their posterior."""
+
+    def __init__(self, comparison: Comparison, known: Mapping[Key, Combination], counts: tuple[float, ...]) -> None:
+        self.comparison = comparison
+        self.known = known
+        self.prior = Prior(comparison.explanations, counts, comparison.visible)
+        self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
+        self.settled: dict[Key, Combination] = {}
+        self._expanded: set[Key] = set()
+        self._waiting: dict[Key, tuple[float, tuple[Version, ...]]] = {}
+        self.settle(())
+
+    def climb(self, start: Key) -> None:
+        """Follow the most probable combinations from one to those with more, level by level."""
+        level = [start]
+        while level:
+            for key in level:
+                self.expand(key)
+            size = len(level[0]) + 1
+            level = [key for key in self.settle_best(size, SETTLED, start) if self.worth(key)]
+            level = self.best_of(level, FOLLOWED)
+
+    def best(self) -> Key:
+        """The most probable combination."""
+        return max(self.settled, key=lambda key: self.settled[key].log_posterior)
+
+    def worth(self, key: Key) -> bool:
+        """Whether a combination is at least as probable as one of its parts, but for the window."""
+        posterior = self.settled[key].log_posterior
+        parts = [self.settled[key - {i}].log_posterior for i in key if key - {i} in self.settled]
+        return posterior > max(parts, default=-np.inf) - WINDOW
+
+    def best_of(self, keys: Sequence[Key], count: int) -> list[Key]:
+        """The most probable, half of the places kept for known effects alone."""
+        order = sorted(keys, key=lambda key: -self.settled[key].log_posterior)
+        known = [key for key in order if not self._unknown(key)][: count // 2]
+        return known + [key for key in order if key not in known][: count - len(known)]
+
+    def expand(self, key: Key) -> None:
+        """Put every combination with one more explanation on the list."""
+        if key in self._expanded:
+            return
+        self._expanded.add(key)
+        known = self.settled[key]
+        fixed = float(self.comparison.log_evidence_of(known.versions)[0])
+        base = known.log_posterior - known.log_prior - fixed
+        for i, (total, version) in self.comparison.beside(known.versions, self.candidates).items():
+            if i in key or i not in self.candidates:
+                continue
+            larger = key | {i}
+            estimate = base + total + self.prior.log(larger, alike=self.alike((*known.versions, version)))
+            if larger in self.settled or estimate <= self._waiting.get(larger, (-np.inf, ()))[0]:
+                continue
+            self._waiting[larger] = estimate, (*known.versions, version)
+
+    def settle_best(self, size: int, count: int, within: Key = frozenset()) -> list[Key]:
+        """Settle the most probable of this size and with ``within`` that wait, half of the places for known effects alone."""
+        order = sorted(
+            (key for key in self._waiting if len(key) == size and within <= key), key=lambda key: -self._waiting[key][0]
+        )
+        known = [key for key in order if not self._unknown(key)][: count // 2]
+        chosen = known + [key for key in order if key not in known][: count - len(known)]
+        for key in chosen:
+            self.settle(self._waiting.pop(key)[1])
+        return chosen
+
+    @cached_property
+    def _forms(self) -> tuple[Ints, Floats]:
+        """Known effects of one coefficient that are seen, and the form (m, n) of each, of length one."""
+        numbers, forms = list[int](), list[Floats]()
+        for i in sorted(self.candidates & self.comparison.visible):
+            first = self.comparison.explanations[i].members[0]
+            if self.comparison.explanations[i].kind == EFFECT and first.columns.shape[1] == 1 and not first.shape:
+                form = self.comparison.rest(first.columns / self.comparison.noise_scale[:, None])[:, 0]
+                length = float(np.linalg.norm(form))
+                if length > 0:
+                    numbers.append(i)
+                    forms.append(form / length)
+        return np.array(numbers, dtype=np.intp), np.array(forms).T
+
+    def pairs_like(self, index: int) -> list[tuple[int, int]]:
+        """Pairs of other known effects that together leave next to nothing of one, and neither of them does alone.
+
+        A bar that sags is as two scales at once: no exchange of one for one leads from that to these.
+        """
+        numbers, forms = self._forms
+        own = np.flatnonzero(numbers == index)
+        if not len(own):
+            return []
+        others = np.flatnonzero(numbers != index)
+        cosines, among = forms[:, others].T @ forms[:, own[0]], forms[:, others].T @ forms[:, others]
+        a, b = np.triu_indices(len(others), 1)
+        apart = 1 - among[a, b] ** 2
+        together = cosines[a] ** 2 + cosines[b] ** 2 - 2 * cosines[a] * cosines[b] * among[a, b]
+        alone = np.maximum(np.abs(cosines[a]), np.abs(cosines[b])) ** 2
+        like = (apart > LIKE) & (1 - alone > LIKE) & (together > (1 - LIKE) * apart)
+        return [(int(numbers[others[i]]), int(numbers[others[j]])) for i, j in zip(a[like], b[like], strict=True)]
+
+    def with_more(self, versions: tuple[Version, ...], more: Iterable[int]) -> tuple[Version, ...]:
+        """The same with others, the size of each at its best beside those before it."""
+        for i in more:
+            versions = (*versions, self.comparison.beside(versions, (i,))[i][1])
+        return versions
+
+    def settle(self, versions: tuple[Version, ...]) -> None:
+        """Find the best sizes of a combination, and its evidence."""
+        key = keyed(versions)
+        if key in self.known and key not in self.settled:
+            self.settled[key] = self.known[key]
+        if key not in self.settled:
+            evidence, settled = log_evidence_together(self.comparison, versions)
+            log_prior = self.prior.log(key, alike=self.alike(settled))
+            self.settled[key] = Combination(settled, evidence + log_prior, log_prior)
+
+    def alike(self, versions: Iterable[Version]) -> bool:
+        """Whether those of a machine out of adjustment show errors of one order of magnitude."""
+        shown = [v.amplitude * self._shown(v.explanation) for v in versions if v.explanation in self.prior.machine]
+        return len(shown) > 0 and max(shown) <= ALIKE * min(shown)
+
+    def _shown(self, index: int) -> float:
+        """How much of an effect the observations show where its coefficient is as large as physics allows."""
+        columns = self.comparison.explanations[index].members[0].columns
+        return float(np.linalg.norm(columns / self.comparison.noise_scale[:, None]))
+
+    def _unknown(self, key: Key) -> bool:
+        return any(self.comparison.explanations[i].kind == UNKNOWN for i in key)
+
+
+def log_evidence_together(comparison: Comparison, versions: Sequence[Version]) -> tuple[float, tuple[Version, ...]]:
+    """Log evidence of explanations that hold together, and the best version of each.
+
+    Exact for one; for several, the sizes and versions of each are summed with those of the others held at their best.
+    """
+    best = list(versions)
+    totals = [0.0] * len(best)
+    for _ in range(4):
+        before = tuple(best)
+        for i, version in enumerate(best):
+            others = best[:i] + best[i + 1 :]
+            totals[i], best[i] = comparison.beside(others, (version.explanation,))[version.explanation]
+        if tuple(best) == before or len(best) == 1:
+            break
+    fixed = float(comparison.log_evidence_of(best)[0])
+    return fixed + sum(total - fixed for total in totals), tuple(best)

@@ -1,0 +1,566 @@
+"""Marginal likelihoods of candidate explanations, alone and together, in closed form.
+
+Everything enters linearly with a normal prior whose standard deviation is a multiple of the noise, so that the evidence of
+explanations depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
+are summed over a grid. What the job's model could absorb is projected out.
+
+Explanations that the evidence is conditional on, the *given* ones, join the covariance of the noise, each at a fixed size. So
+the evidence of one more explanation beside them needs nothing but the inner products of all columns, which are computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Container, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, special
+
+from cmm_uq.analysis.diagnosis.comparison.drawn import drawn, standing_of, widths
+from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
+from cmm_uq.analysis.diagnosis.comparison.given import Beside, Given
+from cmm_uq.analysis.diagnosis.comparison.precision import Precision, precisions
+from cmm_uq.analysis.diagnosis.comparison.quick import (
+    corrected,
+    eigen,
+    interpolated,
+    log_sum,
+    log_sum_in,
+    log_sum_of_powers,
+    squared,
+)
+from cmm_uq.analysis.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
+from cmm_uq.analysis.diagnosis.noise import OFTEN, Kind, probable_tails
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.machine.model.display import Display
+
+_KEPT = 8_000_000
+"""Numbers that are kept of what follows from what was given last."""
+
+_LEAST_LEFT = 0.1
+"""Part of a residual's variance that the fit must leave for it to tell of tails."""
+
+_LARGEST_EXPONENT = 600.0
+"""Of a factor that says how little something counts."""
+
+_CORRECTED = 3
+"""Columns of a member, over those of what is given, from which on its own principal axes are corrected for that."""
+
+_BLOCK, _COLUMNS = 150_000, 500
+"""Numbers of a block that a processor's cache holds; columns weighed at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Explanations against "nothing is missing".
+
+    Parameters
+    ----------
+    observed : (m,) observations over their noise scale, mm.
+    baseline : (m, p) columns over their noise scale that may take any coefficient.
+    kinds : of noise.
+    sigma, log_sigma : (s,) grid of the noise, mm, and its log probability.
+    explanations : candidates; columns in mm.
+    noise_scale : (m,).
+    least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
+    certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
+    display : steps to which all coordinates are rounded, where they matter.
+    often_heavy : probability, beforehand, that recordings of which nothing is missing have heavy tails.
+    """
+
+    observed: Floats
+    baseline: Floats
+    kinds: Sequence[Kind]
+    sigma: Floats
+    log_sigma: Floats
+    explanations: Sequence[Explanation]
+    noise_scale: Floats
+    least_noise: float
+    certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    display: Display | None = None
+    often_heavy: float = OFTEN
+
+    @cached_property
+    def _reached(self) -> Floats:
+        """(m, m − m') orthonormal basis of what the baseline reaches."""
+        if not self.baseline.shape[1]:
+            return np.zeros((len(self.observed), 0))
+        length = np.linalg.norm(self.baseline, axis=0)
+        U, s, _ = linalg.svd(self.baseline / np.where(length > 0, length, 1.0), full_matrices=False)
+        return np.asarray(U[:, s > 1e-9 * s[0]], dtype=np.float64)
+
+    def rest(self, columns: Floats) -> Floats:
+        """What the baseline leaves of columns (m, b)."""
+        return columns - self._reached @ (self._reached.T @ columns)
+
+    @cached_property
+    def left(self) -> Floats:
+        """(m,) what the baseline leaves of the observations."""
+        return self.rest(self.observed[:, None])[:, 0]
+
+    @cached_property
+    def _standing(self) -> tuple[Ints, Floats]:
+        return standing_of(self.left, self._reached)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """m', how many observations that is worth."""
+        return int(len(self.observed) - self._reached.shape[1])
+
+    @cached_property
+    def _stack(self) -> tuple[Floats, tuple[Group, ...]]:
+        return stacked(self.explanations, self.rest, self.noise_scale, self.least_noise, self.degrees_of_freedom)
+
+    @cached_property
+    def _where(self) -> dict[tuple[int, int], slice]:
+        """Columns of the stack of each explanation's members."""
+        return {
+            (int(i), int(j)): slice(int(start), int(start) + group.r)
+            for group in self._stack[1]
+            for i, j, start in zip(group.explanation, group.member, group.start, strict=True)
+        }
+
+    @cached_property
+    def visible(self) -> frozenset[int]:
+        """Explanations of which the baseline leaves anything."""
+        return frozenset(i for i, _ in self._where)
+
+    def noise(
+        self, kind: Kind, random: np.random.Generator, sigma: Floats, heavy: NDArray[np.bool_] | None = None
+    ) -> Floats:
+        """What the baseline leaves (m, draws), mm, of noise of one kind.
+
+        Where the display's steps matter, coordinates are rounded as the recording's were.
+
+        Parameters
+        ----------
+        sigma : (draws,) of a reading, mm.
+        heavy : (draws,) which have heavy tails; none by default.
+        """
+        fine = kind.unrounded if self.display else None
+        # of a stream of its own: the others stay as they are
+        wider = None if heavy is None else widths(random.spawn(1)[0], heavy, len(self.left))
+        found = drawn(fine or kind, random, len(sigma), self.noise_scale, self._standing, wider)
+        if self.certified.size:
+            found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
+        if not (self.display and fine):
+            return sigma * self.rest(found)
+        found, scale = sigma * found, self.noise_scale[:, None]
+        return self.rest(found + self.display.rounded(scale * found) / scale)
+
+    @cached_property
+    def _noises(self) -> list[Precision]:
+        return precisions(self.kinds, self._reached, self.certified)
+
+    @cached_property
+    def _blocks(self) -> list[Floats]:
+        """Inner products (k, M, r, r) of each member's columns under each kind of noise, by group."""
+        stack, groups = self._stack
+        found = []
+        for group in groups:
+            columns = group.columns(stack)
+            each = columns.T.reshape(-1, group.r, len(stack))
+            blocks = np.empty((len(self._noises), len(each), group.r, group.r))
+            for block, noise in zip(blocks, self._noises, strict=True):
+                parts = np.array_split(columns, max(1, columns.shape[1] // _COLUMNS), axis=1)
+                other = np.hstack([noise(part) for part in parts]).T.reshape(each.shape)
+                block[:] = each @ other.transpose(0, 2, 1)
+            found.append(blocks)
+        return found
+
+    @cached_property
+    def _left_weighed(self) -> Floats:
+        """Precision times what the baseline leaves (k, m, 1), by kind of noise."""
+        return self._by_noise(self.left[:, None])
+
+    def _by_noise(self, columns: Floats) -> Floats:
+        """Precision times columns (m, b), by kind of noise (k, m, b)."""
+        return np.stack([noise(columns) for noise in self._noises])
+
+    @cached_property
+    def squares(self) -> Floats:
+        """Sum of squares (k,) of what the baseline leaves, mm², whitened by each kind of noise."""
+        return np.asarray(self._left_weighed[:, :, 0] @ self.left, dtype=np.float64)
+
+    def over_sigma(self, squares: Floats) -> Floats:
+        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
+        return self._over_sigma(squares.copy())
+
+    def _over_sigma(self, squares: Floats) -> Floats:
+        """The same, in the place of the squares where that is possible."""
+        np.maximum(squares, 1e-300, out=squares)
+        np.log(squares, out=squares)
+        if self._table is not None:
+            return interpolated(squares, *self._table)
+        squares *= -0.5 * self.degrees_of_freedom
+        squares += self._uniform
+        return squares
+
+    @cached_property
+    def _uniform(self) -> float:
+        """Constant of the gamma integral over a uniform ln σ."""
+        half, step = 0.5 * self.degrees_of_freedom, float(np.log(self.sigma[1] / self.sigma[0]))
+        return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
+
+    @cached_property
+    def _table(self) -> tuple[Floats, Floats] | None:
+        """Logarithms of squares and of the integrals over them; none where these have a closed form."""
+        if np.ptp(self.log_sigma) == 0:
+            return None
+        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(float(self.left @ self.left), 1e-300))
+        exponent = (
+            self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
+        )
+        return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
+
+    def of_nothing(self, data: Floats) -> Floats:
+        """Log evidence (k, b) of nothing beyond the baseline, by kind of noise, for data (m, b)."""
+        known = self._weigh(data, ())
+        return np.asarray(self.over_sigma(known.squares) + known.log[:, None], dtype=np.float64)
+
+    def precision(self, kind: int) -> Precision:
+        """Of a kind of noise, by its index."""
+        return self._noises[kind]
+
+    def only(self, kinds: Sequence[int]) -> Comparison:
+        """The same under some of the kinds of noise."""
+        found = self.under([self.kinds[k] for k in kinds], self.left)
+        index = list(kinds)
+        found.__dict__["_noises"] = [self._noises[k] for k in index]
+        found.__dict__["_blocks"] = [blocks[index] for blocks in self._blocks]
+        return found
+
+    def under(self, kinds: Sequence[Kind], left: Floats) -> Comparison:
+        """The same candidates for what the baseline leaves (m,) of other observations, under other kinds of noise."""
+        found = replace(self, observed=left, kinds=kinds)
+        shared = {name: getattr(self, name) for name in ("_reached", "_stack", "_where", "_table", "visible")}
+        found.__dict__.update(shared, left=left)  # what none of the two changes
+        return found
+
+    def noise_posterior(self, left: Floats | None = None) -> Floats:
+        """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline.
+
+        Parameters
+        ----------
+        left : (m,) of the observations, by default what the baseline leaves of them.
+        """
+        every = self.squares if left is None else self._by_noise(left[:, None])[:, :, 0] @ left
+        log = np.stack([
+            noise.log + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
+            - 0.5 * squares / self.sigma**2
+            for noise, squares in zip(self._noises, every, strict=True)
+        ])  # fmt: skip
+        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
+    def nothing(self, random: np.random.Generator, draws: int) -> Floats:
+        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior.
+
+        A few readings do not tell whether their noise is normal; so many draws have heavy tails as that is probable.
+        """
+        weight = self.noise_posterior()
+        chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
+        kind, size = np.unravel_index(chosen, weight.shape)
+        uniform = random.spawn(1)[0].random(draws)
+        found = np.empty((len(self.left), draws))
+        for g in np.unique(kind):
+            columns = np.flatnonzero(kind == g)
+            heavy = uniform[columns] < self.heavy_tails(self.kinds[g])
+            found[:, columns] = self.noise(self.kinds[g], random, self.sigma[size[columns]], heavy)
+        return found
+
+    def heavy_tails(self, kind: Kind) -> float:
+        """Probability of heavy tails beside what a kind of noise is otherwise."""
+        if kind.name == "tails":
+            return 0.0
+        reached = np.linalg.qr(kind.white(self._reached))[0]
+        own = kind.white(self.left[:, None])[:, 0]
+        own -= reached @ (reached.T @ own)
+        left = 1 - np.sum(reached**2, axis=1)
+        enough = left > _LEAST_LEFT
+        return probable_tails(own[enough] / np.sqrt(left[enough]), self.often_heavy)
+
+    def log_evidence(
+        self,
+        left: Floats | None = None,
+        given: Sequence[Version] = (),
+        among: Container[int] | None = None,
+    ) -> tuple[Floats, Floats]:
+        """Log evidence (b,) of what is given, and (c, b) of each explanation beside it.
+
+        Parameters
+        ----------
+        left : (m, b) data, by default the recording's.
+        given : explanations that it is conditional on.
+        among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
+        """
+        known = self._beside(left, given)
+        return self._of_given(known), self._total(known, among)
+
+    def _total(self, known: Beside, among: Container[int] | None = None) -> Floats:
+        """Log evidence (c, b) of each explanation, its versions and sizes summed."""
+        total = np.full((len(self.explanations), known.squares.shape[1]), -np.inf)
+        for group, each in self._each(known, among, sizes=False):
+            gains = each[:, 0] - np.log(AMPLITUDES) + group.weight[:, None]
+            chosen = group.explanation[group.first]
+            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
+        return total
+
+    def lengths(self, columns: Floats) -> Floats:
+        """Sum of squares (k, b) of columns (m, b), of which the baseline has been taken, whitened by each kind of noise."""
+        return np.asarray(np.einsum("mb,kmb->kb", columns, self._by_noise(columns)))
+
+    def of_signal(self, signal: Floats, noise: Floats) -> Floats:
+        """Log evidence (c, b) of each explanation over nothing for signals (m, b) in noise at right angles to everything.
+
+        It is nearly what a signal shows on average.
+
+        Parameters
+        ----------
+        noise : (m,) that counts by its size alone.
+        """
+        known = self._beside(signal, ())
+        known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
+        return self._total(known) - self._of_given(known)
+
+    def beside(
+        self, given: Sequence[Version] = (), among: Collection[int] | None = None
+    ) -> dict[int, tuple[float, Version]]:
+        """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
+        known = self._found.setdefault(frozenset(given), {})
+        if among is None or not known.keys() >= set(among):
+            found = self._beside_each(given, among)
+            known.update(found if among is None else {i: found[i] for i in found.keys() & set(among)})
+        return known
+
+    @cached_property
+    def _found(self) -> dict[frozenset[Version], dict[int, tuple[float, Version]]]:
+        """What was found beside what: a search asks again for what it found when it looked for one more."""
+        return {}
+
+    def _beside_each(
+        self, given: Sequence[Version], among: Collection[int] | None
+    ) -> dict[int, tuple[float, Version]]:  # fmt: skip
+        total = np.full(len(self.explanations), -np.inf)
+        most, best = total.copy(), {}
+        for group, cube in self.each(None, given, among):
+            each = cube[:, :, 0]
+            gains = log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
+            chosen = group.explanation[group.first]
+            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
+            largest = each.max(axis=1) + group.weight
+            better = np.maximum.reduceat(largest, group.first) > most[chosen]
+            order = np.lexsort((-largest, group.explanation))[group.first[better]]
+            for m, a in zip(order.tolist(), each[order].argmax(axis=1).tolist(), strict=True):
+                i = int(group.explanation[m])
+                most[i] = largest[m]
+                best[i] = Version(i, int(group.member[m]), float(group.amplitudes[m, a]))
+        return {i: (float(total[i]), version) for i, version in best.items()}
+
+    def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
+        """Version with most evidence among some visible explanations, for each column of data (m, b)."""
+        found = [Version(0, 0, 0.0)] * left.shape[1]
+        most = np.full(left.shape[1], -np.inf)
+        for group, each in self.each(left, (), explanations):
+            weight = np.where(np.isin(group.explanation, explanations), group.weight, -np.inf)
+            flat = (each + weight[:, None, None]).reshape(-1, left.shape[1])
+            at = flat.argmax(axis=0)
+            for column in np.flatnonzero(flat.max(axis=0) > most):
+                m, a = divmod(int(at[column]), AMPLITUDES)
+                found[column] = Version(int(group.explanation[m]), int(group.member[m]), float(group.amplitudes[m, a]))
+                most[column] = flat[at[column], column]
+        return found
+
+    def left_of(self, version: Version, given: Sequence[Version]) -> float:
+        """Part of the squared visible length of a version that is left beside what is given."""
+        columns = self._given.columns(version)
+        alone, beside = (self._weigh(columns, others).squares.sum(axis=1) for others in ((), given))
+        probability = self.noise_probability(given)
+        return float(probability @ beside / max(float(probability @ alone), 1e-300))
+
+    def log_evidence_of(self, given: Sequence[Version], left: Floats | None = None) -> Floats:
+        """Log evidence (b,) of what is given, at its size, for data (m, b)."""
+        return self._of_given(self._beside(left, given))
+
+    def _of_given(self, known: Beside) -> Floats:
+        """Log evidence (b,) of what data are beside."""
+        return log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
+
+    def noise_probability(self, given: Sequence[Version]) -> Floats:
+        """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
+        known = self._beside(None, given)
+        log = self.over_sigma(known.squares)[:, 0] + known.log
+        return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
+
+    def each(
+        self, data: Floats | None, given: Sequence[Version], among: Container[int] | None = None
+    ) -> Iterator[tuple[Group, Floats]]:
+        """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
+        yield from self._each(self._beside(data, given), among)
+
+    def _each(
+        self, known: Beside, among: Container[int] | None, *, sizes: bool = True
+    ) -> Iterator[tuple[Group, Floats]]:
+        """Log evidence (M, a, b) of members at every size, or (M, 1, b) of all sizes together, by groups."""
+        groups, b = self._stack[1], known.squares.shape[1]
+        parts = [group.part(among) for group in groups]
+        chosen = [group.only(part) for group, part in zip(groups, parts, strict=True)]
+        most = 2 * sum(some.r * len(some.start) for some in chosen) > self._stack[0].shape[1]
+        kept = known.made_of is not None and (most or self._given.kept(known))
+        size = max(1, _BLOCK // (len(known.squares) * AMPLITUDES * b))
+        for part, some, blocks in zip(parts, chosen, self._blocks, strict=True):
+            if not len(some.start):
+                continue
+            seen = self._seen(known, some, kept=kept)
+            if sizes and (each := self._of_wide(known, some, blocks, part, seen)) is not None:
+                yield some, each
+                continue
+            total = np.empty((len(some.start), AMPLITUDES if sizes else 1, b))
+            for begin in range(0, len(total), size):
+                these = slice(begin, begin + size)
+                total[these] = self._under(
+                    known, some.amplitudes[these], blocks[:, part][:, these], seen[:, these], sizes
+                )  # fmt: skip
+            yield some, total
+
+    def _seen(self, known: Beside, group: Group, *, kept: bool) -> Floats:
+        """Inner products (k, M, r, b + g) of members with data and what is given; ``kept``: of those that are kept."""
+        kinds = len(known.squares)
+        if kept:
+            columns = group.where
+            shape = kinds, columns.stop - columns.start, known.width
+            found = np.zeros(shape)
+            found[:, :, :1] = self._left_with_all[:, columns]
+            for basis, factor in known.made_of or ():
+                found += self._given.products(basis)[:, columns] @ factor
+        else:
+            found = (group.columns(self._stack[0]).T @ known.seen_by).reshape(group.r * len(group.start), kinds, -1)
+            found = found.transpose(1, 0, 2)
+        return found.reshape(kinds, len(group.start), group.r, -1)
+
+    def _of_wide(self, known: Beside, group: Group, blocks: Floats, part: slice, seen: Floats) -> Floats | None:
+        """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``.
+
+        The principal axes of the members by themselves, which are kept, are corrected for what is given.
+        """
+        given = seen.shape[3] - 1
+        if known.squares.shape[1] > 1 or not given or group.r < _CORRECTED * given:
+            return None
+        if group.r not in self._axes:
+            self._axes[group.r] = eigen(blocks)
+        strengths, turn = (axes[:, part] for axes in self._axes[group.r])
+        variance = (group.amplitudes**2)[:, :, None]
+        ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
+        gains = corrected(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
+        if gains is None:
+            return None
+        explained, log = gains
+        found = self._over_sigma(known.squares[:, None, None, 0] - explained)
+        found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
+        return log_sum_in(found, 0)[..., None]
+
+    def _under(self, known: Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
+        """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
+
+        Parameters
+        ----------
+        amplitudes : (M, a) to try.
+        blocks : (k, M, r, r) their inner products.
+        seen : (k, M, r, b + g) theirs with the data and with what is given.
+        """
+        b = known.squares.shape[1]
+        shown, hidden = seen[..., :b], seen[..., b:]
+        if hidden.shape[3]:
+            blocks = blocks - squared(hidden)
+        if blocks.shape[3] == 1:
+            strengths = blocks[..., 0]
+        else:
+            strengths, turn = eigen(blocks)
+            shown = turn.swapaxes(2, 3) @ shown
+        variance = (amplitudes**2)[:, :, None]
+        ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
+        gain, square = variance / (1 + ratio), shown**2
+        constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
+        if b > 1 and self._table is None and self.degrees_of_freedom:
+            log = self._of_many(known.squares, gain, square, constant, sizes)
+        else:
+            log = log_sum_in(self._integrated(known.squares, gain, square, constant), 0 if sizes else (0, 2))
+        return log.reshape(len(amplitudes), -1, b)
+
+    def _integrated(self, squares: Floats, gain: Floats, square: Floats, constant: Floats) -> Floats:
+        """Log evidence (k, M, a, b) over the noise.
+
+        Parameters
+        ----------
+        squares : (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along them.
+        constant : (k, M, a) to be added.
+        """
+        if squares.shape[1] == 1:
+            explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None]
+            found = self._over_sigma(squares[:, None, None, :] - explained)
+        else:
+            found = self._over_sigma(
+                np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ _with(squares, square)
+            )
+        found += constant[..., None]
+        return found
+
+    def _of_many(self, squares: Floats, gain: Floats, square: Floats, constant: Floats, sizes: bool) -> Floats:
+        """Logarithm of sums over the kinds, or the sizes too, of what :meth:`_integrated` has the logarithms of; closed form.
+
+        Constants are factors of the squares, which are few ahead of many data.
+        """
+        half, most = 0.5 * self.degrees_of_freedom, float(constant.max())
+        factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
+        found = np.concatenate([-factor * gain, factor], axis=3) @ _with(squares, square)
+        if not sizes:
+            return log_sum_of_powers(found, self.degrees_of_freedom, (0, 2)) + (most + self._uniform)
+        # of versions that nothing parts the last digit chooses one: it stays the one that logarithms give
+        np.log(np.maximum(found, 1e-300, out=found), out=found)
+        found *= -half
+        return log_sum_in(found, 0) + (most + self._uniform)
+
+    @cached_property
+    def _axes(self) -> dict[int, tuple[Floats, Floats]]:
+        """Principal axes of the members of wide groups, by the number of their columns."""
+        return {}
+
+    def _beside(self, data: Floats | None, given: Sequence[Version]) -> Beside:
+        """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
+        if data is not None:
+            return self._weigh(data, given)
+        kept, key = self._besides, frozenset(given)
+        if key not in kept:
+            new = self._weigh(None, given)
+            most = max(1, _KEPT // (len(new.squares) * len(self.left) * new.width))
+            while len(kept) >= most:
+                del kept[next(iter(kept))]
+            kept[key] = new
+        return kept[key]
+
+    @cached_property
+    def _besides(self) -> dict[frozenset[Version], Beside]:
+        """The recording beside what was given last: a search comes back to it within some steps."""
+        return {}
+
+    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> Beside:
+        own = data is None
+        plain, weighed = (self.left[:, None], self._left_weighed) if data is None else (data, self._by_noise(data))
+        log = np.array([noise.log for noise in self._noises])
+        return self._given.beside(given, plain, weighed, log, own=own)
+
+    @cached_property
+    def _given(self) -> Given:
+        return Given(self._stack[0], self._where, self._by_noise)
+
+    @cached_property
+    def _left_with_all(self) -> Floats:
+        """Inner products (k, K, 1) of the stack's columns with what the baseline leaves."""
+        return self._given.with_all(self._left_weighed)
+
+
+def _with(squares: Floats, square: Floats) -> Floats:
+    """Squares (k, M, r, b) along members, and (k, b) of the data below them (k, M, r + 1, b)."""
+    every = np.broadcast_to(squares[:, None, None, :], (*square.shape[:2], 1, squares.shape[1]))
+    return np.concatenate([square, every], axis=2)

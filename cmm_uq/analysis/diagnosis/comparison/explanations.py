@@ -1,0 +1,272 @@
+"""Candidate explanations of what a model leaves, and those of them that are effects of the catalogue.
+
+Each is a set of columns that the observations would show, scaled so that coefficients of one are as large as physics (or,
+for a nonparametric term, plausibility) allows; how much smaller they may be is left to the comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.plugins import BrokenPluginError
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect, Nonparametric
+
+EFFECT, SEVERAL, UNKNOWN = "effect", "several", "unknown"
+
+UNKNOWN_SD = 0.05
+"""mm, largest standard deviation of a nonparametric displacement."""
+
+_SHORTEST_PERIOD, _FINEST_PERIOD = 6.0, 2.0
+"""mm, searched, and told of besides where a longer one is found."""
+
+STEP = 0.35
+"""Between frequencies that are tried, over one in the range of the readings."""
+
+_TILTED, _BENT = (-0.9, -0.45, 0.0, 0.45, 0.9), (-0.5, 0.0, 0.5)
+_ROUGH = 0.25
+"""Probability that an idealised effect (:attr:`Effect.idealised_over`) has another form than the simplest."""
+
+_SHORTEST_OVER = 0.1
+"""Of the largest extent of a recording, over which such a form differs; a plate that lies level has next to none along Z."""
+
+_ADJUSTED = 100.0
+"""mm that an artefact must reach to show that a machine is out of adjustment: 20 ppm are 2 µm then, and 0.5 µm over a ball."""
+
+_BEYOND = 0.5
+"""How readily an effect is thought of beyond the size that it mostly keeps to (:attr:`Effect.mostly`)."""
+
+_MOST_PERIODS, _MOST_SHORTER = 240, 800
+_DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """One version of an explanation.
+
+    Parameters
+    ----------
+    columns : (m, r) mm.
+    shape : nonlinear parameter that they belong to.
+    weight : how probable, among the versions.
+    values : (p, r) mm, a nonparametric function where its covariate is given, for one unit of each coefficient.
+    rough : whether an effect has another form here than its own, though the same mechanism.
+    """
+
+    columns: Floats
+    shape: tuple[float, ...] = ()
+    weight: float = 1.0
+    values: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    rough: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A candidate.
+
+    Parameters
+    ----------
+    name : the effect's name; for a nonparametric term what it depends on.
+    kind : ``effect``, ``several`` (known effects at once) or ``unknown`` (a nonparametric term).
+    members : versions, as probable as their weights say.
+    covariate : (p,) what a nonparametric term depends on, of the points or of the observations.
+    covariate_name : its name in the recording.
+    term : of a nonparametric one that effects may be imitated by.
+    imitated_by : of an effect.
+    weight : how readily it is thought of, beside others of its kind.
+    effect : that it is, if it is one.
+    together : whether it is one of what a machine out of adjustment has, and long enough an artefact shows it.
+    """
+
+    name: Text
+    kind: str
+    members: tuple[Member, ...]
+    covariate: Floats | None = None
+    covariate_name: str | None = None
+    term: Nonparametric | None = None
+    imitated_by: tuple[Nonparametric, ...] = ()
+    weight: float = 1.0
+    effect: Effect | None = None
+    together: bool = False
+
+    @property
+    def shaped(self) -> bool:
+        """Whether its versions differ in a nonlinear parameter."""
+        return bool(self.members[0].shape)
+
+    def could_be(self, effect: Explanation) -> bool:
+        """Whether this nonparametric term could have the form of an effect."""
+        return self.term is not None and self.term in effect.imitated_by
+
+
+def effect_of(explanation: Explanation) -> Effect:
+    """The effect that an explanation is; a fault of the artefact as made for this one."""
+    return every()[explanation.name] if explanation.effect is None else explanation.effect
+
+
+def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
+    """Every effect of the catalogue that could act here and is not named in the model already.
+
+    Parameters
+    ----------
+    model : what is named, with its recording.
+    values : (k,) parameters about which it is linear.
+    named : effects to leave out.
+    """
+    points = model.artefact.points.at(model.where(values))
+    found = []
+    for effect in considered(model.artefact):
+        if effect.name in named or not effect.shown_in(points):
+            continue
+        if any(column not in points.columns for column in effect.columns):
+            continue
+        try:
+            members = tuple(
+                Member(_seen(model, effect, points, shape, values), shape) for shape in shapes(effect, points)
+            )
+        except BrokenPluginError:
+            raise
+        except CmmUqError:  # the job does not give the travel that this effect needs
+            continue
+        if any(np.any(member.columns) for member in members):
+            if effect.mostly < 1:
+                members = (*(replace(m, columns=effect.mostly * m.columns) for m in members),
+                           *(replace(m, weight=_BEYOND) for m in members))  # fmt: skip
+            members = (*members, *_roughly(model, effect, points, values))
+            found.append(
+                Explanation(
+                    Verbatim(effect.name), EFFECT, members, imitated_by=effect.imitated_by, weight=effect.prior_weight,
+                    effect=effect, together=effect.everywhere and _reach(points) >= _ADJUSTED,
+                )
+            )  # fmt: skip
+    return found
+
+
+def _reach(points: Points) -> float:
+    """mm, the longest extent of an artefact along an axis in any of its set-ups: with it placed freely it shows no more."""
+    return max(float(np.ptp(points.xyz[points.measurement == m], axis=0).max()) for m in np.unique(points.measurement))
+
+
+def considered(artefact: Artefact) -> Iterator[Effect]:
+    """Every effect of the catalogue, and those faults of artefacts that this one can have."""
+    for effect in every().values():
+        if not effect.of_artefact:
+            yield effect
+        elif effect.name in artefact.faults:
+            yield artefact.faults[effect.name]
+
+
+def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
+    """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
+    along = effect.course(points)
+    if along is None:
+        return
+    span = float(np.ptp(along))
+    if span == 0:
+        return
+    over = span
+    if effect.idealised_over in tuple(AXES):  # a guideway has no other form within a fraction of what was measured
+        over = max(span, _SHORTEST_OVER * float(np.ptp(points.machine_xyz, axis=0).max()))
+    u = (2 * (along - along.min()) / over - span / over)[:, None, None]
+    forms = [(s, t) for s in _TILTED for t in _BENT if s or t]
+    basis = effect.mostly * model.columns(effect, (), values) * np.array([c.prior_sd for c in effect.coefficients])
+    every = np.concatenate([basis * (1 + s * u + t * (1.5 * u**2 - 0.5)) for s, t in forms], axis=2)
+    for columns in np.split(model.seen(every, values), len(forms), axis=1):
+        yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
+
+
+def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
+    """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
+    effect = explanation.effect
+    if effect is None:
+        return explanation
+    points = model.artefact.points.at(model.where(values))
+    shaped = [i for i, member in enumerate(explanation.members) if member.shape]
+    even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
+    step = float(np.median(np.diff(np.sort(list(even.values())))))
+    kept = list(explanation.members)
+    for i in members:
+        kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
+        for part in _DIVIDED:
+            if part:
+                shape = (float(unevenly(effect, np.array(even[i] + part * step))),)
+                kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
+    return replace(explanation, members=tuple(kept))
+
+
+def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -> Explanation:
+    """A periodic effect with the periods below those that are searched: between positions at equal distances they fit as well.
+
+    Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
+    """
+    effect = effect_of(explanation)
+    axis = effect.shape[0].period_along
+    if axis is None:
+        return explanation
+    points = model.artefact.points.at(model.where(values))
+    step = STEP / float(np.ptp(points.readings[axis]))
+    first = max(1 / member.shape[0] for member in explanation.members if member.shape) + step
+    frequencies = np.arange(first, 1 / _FINEST_PERIOD, step)[:_MOST_SHORTER]
+    more = tuple(
+        Member(_seen(model, effect, points, (float(1 / f),), values), (float(1 / f),), float(first / f))
+        for f in frequencies
+    )
+    return replace(explanation, members=(*explanation.members, *more))
+
+
+def evenly(effect: Effect, shape: Floats) -> Floats:
+    """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
+    return 1 / shape if effect.shape[0].period_along else np.log(shape)
+
+
+def unevenly(effect: Effect, value: Floats) -> Floats:
+    """What :func:`evenly` was given."""
+    return 1 / value if effect.shape[0].period_along else np.exp(value)
+
+
+def several(singles: Sequence[Explanation]) -> list[Explanation]:
+    """All known effects of the machine at once, each as large as the others in the observations.
+
+    It names none of them, but lets the lack-of-fit test see those that are visible together only.
+    """
+    columns = [
+        e.members[0].columns for e in singles if not e.shaped and (e.effect is None or not e.effect.of_artefact)
+    ]  # fmt: skip
+    if len(columns) < 2:
+        return []
+    together = np.hstack(columns)
+    rms = np.sqrt(np.mean(together**2, axis=0))
+    return [
+        Explanation(
+            say("several effects together"), SEVERAL, (Member(UNKNOWN_SD * together / np.where(rms > 0, rms, 1.0)),)
+        )
+    ]
+
+
+def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
+    """Values of an effect's nonlinear parameter to try: of a period, those that the readings can tell apart."""
+    axis = effect.shape[0].period_along if effect.shape else None
+    if axis is None:
+        yield from effect.trials()
+        return
+    readings = points.readings[axis]
+    span = float(np.ptp(readings))
+    if span <= 2 * _SHORTEST_PERIOD:
+        return
+    step = STEP / span
+    highest = min(1 / _SHORTEST_PERIOD, _MOST_PERIODS * step)
+    for frequency in np.arange(0.7 / span, highest, step):
+        yield (float(1 / frequency),)
+
+
+def _seen(model: MeasurementModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:
+    scale = np.array([c.prior_sd for c in effect.coefficients])
+    return model.seen(model.columns(effect, shape, values) * scale, values)

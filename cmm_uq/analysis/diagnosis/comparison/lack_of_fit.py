@@ -1,0 +1,214 @@
+"""Whether anything is missing: the evidence of something over nothing, and how often nothing shows as much."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
+from cmm_uq.analysis.diagnosis.comparison.heavy_tails import tailed
+from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
+from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.base.points import Floats
+
+SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
+"""Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
+
+NOTHING = 1 - sum(SHARES.values())
+
+DRAWS = 200
+_TAIL = 0.8
+_NEAR = 10.0
+"""Factor from the false-alarm rate within which a probability is found more closely: 200 draws know one of 0.01 to a factor of
+three, and heavy tails that are reckoned with make it as much smaller."""
+_MOST = 1000
+"""Draws that there are then at most."""
+_CLEAR = 3.0
+"""Standard errors from the false-alarm rate at which a probability is on one side of it."""
+_STEEPEST = 1.0
+"""Mean excess of log odds whose tail is that of Markov's inequality."""
+_CROWDED = 0.25
+"""Mean excess below which draws lie at the floor: tails of tests with a few candidates have one half or more."""
+
+
+def log_prior(candidates: Sequence[Explanation]) -> Floats:
+    """Log probability, beforehand, of each candidate alone (c,)."""
+    total = dict.fromkeys(SHARES, 0.0)
+    for e in candidates:
+        total[e.kind] += e.weight
+    return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in candidates])
+
+
+def lack_of_fit(comparison: Comparison, seed: int, alpha: float | None = None) -> tuple[float, Floats, Floats]:
+    """Probability, under nothing, of as much evidence for something.
+
+    Also what is drawn under nothing: the statistic, and the largest log evidence of a nonparametric term.
+
+    Parameters
+    ----------
+    comparison : the candidates.
+    seed : of the draws.
+    alpha : false-alarm rate; a probability near it is found from more draws, and from odds under noise with heavy tails.
+    """
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
+    draws = comparison.nothing(random, DRAWS)
+    statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
+    unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
+    maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)
+    p_value = tail_probability(statistic[1:], float(statistic[0]))
+    if alpha is not None and alpha / _NEAR < p_value < alpha * _NEAR:
+        p_value = _nearer(comparison, draws, random, alpha)
+    return p_value, statistic[1:], maxima
+
+
+def _nearer(comparison: Comparison, draws: Floats, random: np.random.Generator, alpha: float) -> float:
+    """The same probability by odds that reckon with heavy tails, from as many draws as say on which side of the rate it is.
+
+    However many there are, as many make the tail, so that ever less of it is extrapolated.
+    """
+    normal = comparison.only([k for k, kind in enumerate(comparison.kinds) if kind.name != "tails"])
+    least = float(np.quantile(statistic_of(normal, draws)[0], _TAIL))
+    value = float(robust_statistic_of(normal, comparison.left[:, None], least)[0])
+    found = robust_statistic_of(normal, draws, least)
+    while True:
+        share = (1 - _TAIL) * DRAWS / len(found)
+        p_value = tail_probability(found, value, 1 - share)
+        # relative standard error of an exponential tail: of the part that is in it, and of its mean
+        error = np.sqrt((1 + np.log(share / p_value) ** 2) / (share * len(found)))
+        if len(found) >= _MOST or abs(np.log(p_value / alpha)) > _CLEAR * error:
+            return p_value
+        more = comparison.nothing(random, DRAWS)
+        found = np.append(found, robust_statistic_of(normal, more, least))
+
+
+def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
+    """Log odds (b,) of something for data (m', b): one explanation, or the best known effect with any other.
+
+    Also the log evidence (c, b) of each explanation over nothing.
+    """
+    found = _Evidence.of(comparison, data)
+    return found.log_odds(), found.something - found.nothing
+
+
+def robust_statistic_of(normal: Comparison, data: Floats, least: float) -> Floats:
+    """Log odds (b,) as :func:`statistic_of` has them, the noise of each data having heavy tails as that is probable.
+
+    Parameters
+    ----------
+    normal : the candidates under kinds of noise that are normal.
+    data : (m', b) mm.
+    least : log odds under these up to which they stay as they are: tails mostly lower what outliers raised.
+    """
+    found, often = _Evidence.of(normal, data), normal.often_heavy
+    high = np.flatnonzero(found.log_odds() > least)
+    if not often or not len(high):
+        return found.log_odds()
+    found.share(1 - often)
+    for at, own in tailed(normal, data[:, high]):
+        j = int(high[at])
+        found.add(j, _Evidence.of(own, data[:, [j]], None if found.lead is None else [found.lead[j]]))
+    return found.log_odds()
+
+
+@dataclass(frozen=True, eq=False)
+class _Evidence:
+    """Log evidence of data (m, b).
+
+    Parameters
+    ----------
+    explanations : candidates.
+    nothing, something : (b,) of nothing, and (c, b) of each explanation.
+    single : known effects of which two are tried together.
+    lead : the best of them for each of the data; ``None`` where there are no two.
+    alone, both : (b,) of it, and (c, b) of each of them beside it.
+    """
+
+    explanations: Sequence[Explanation]
+    nothing: Floats
+    something: Floats
+    single: Sequence[int]
+    lead: list[Version] | None
+    alone: Floats
+    both: Floats
+
+    @classmethod
+    def of(
+        cls, comparison: Comparison, data: Floats, lead: list[Version] | None = None
+    ) -> _Evidence:  # fmt: skip
+        """Of data (m', b), beside a leading effect or the best."""
+        nothing, something = comparison.log_evidence(data)
+        single = [
+            i
+            for i, e in enumerate(comparison.explanations)
+            if e.kind == EFFECT and e.weight == 1 and not e.shaped and i in comparison.visible
+        ]
+        alone, both = np.zeros_like(nothing), np.full_like(something, -np.inf)
+        if len(single) > 1:
+            lead = comparison.best(data, single) if lead is None else lead
+            for version, columns in _together(lead).items():
+                alone[columns], both[:, columns] = comparison.log_evidence(data[:, columns], [version], single)
+        return cls(comparison.explanations, nothing, something, single, lead, alone, both)
+
+    def share(self, part: float) -> None:
+        """Make it that of noise that has a part of the probability."""
+        for evidence in (self.nothing, self.something, self.alone, self.both):
+            evidence += np.log(part)
+
+    def add(self, j: int, other: _Evidence) -> None:
+        """To that of one of the data, that under other noise."""
+        for own, more in (
+            (self.nothing, other.nothing), (self.something, other.something),
+            (self.alone, other.alone), (self.both, other.both),
+        ):  # fmt: skip
+            own[..., j] = np.logaddexp(own[..., j], more[..., 0])
+
+    def log_odds(self) -> Floats:
+        """Log odds (b,) of something; see :func:`statistic_of`."""
+        odds = self.something - self.nothing
+        log_odds = special.logsumexp(log_prior(self.explanations)[:, None] + odds, axis=0)
+        if self.lead is None:
+            return np.asarray(log_odds, dtype=np.float64)
+        pair = np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(len(self.single), 2)) + np.log(NOTHING)
+        for version, columns in _together(self.lead).items():
+            first = version.explanation
+            others = [i for i in self.single if i != first]
+            beside = np.ascontiguousarray(self.both[:, columns])[others]
+            gain = special.logsumexp(beside, axis=0) - self.alone[columns]
+            log_odds[columns] = np.logaddexp(log_odds[columns], pair + (gain + odds[first, columns]))
+        return np.asarray(log_odds, dtype=np.float64)
+
+
+def _together(versions: Sequence[Version]) -> dict[Version, list[int]]:
+    """Columns of data that have a version in common."""
+    found: dict[Version, list[int]] = {}
+    for column, version in enumerate(versions):
+        found.setdefault(version, []).append(column)
+    return found
+
+
+def tail_probability(draws: Floats, value: float, tail: float = _TAIL) -> float:
+    """Probability of reaching a value of log odds, from draws; beyond a quantile of theirs with an exponential tail.
+
+    Log odds have a floor. Where draws crowd at it they show no tail, and beyond the largest draw they show none in any case:
+    there it is no steeper than Markov's inequality has it. The odds of what is not there have a mean of one, and so
+    reach e^x in no more than e^−x of all cases.
+    """
+    largest = float(draws.max())
+    if np.isneginf(largest):  # nothing that is thought of could show at all
+        return 1.0
+    start = float(np.quantile(draws, tail))
+    if value <= start:
+        return float((np.sum(draws >= value) + 1) / (len(draws) + 1))
+    beyond = draws[draws > start]
+    excess = float((beyond - start).mean()) if len(beyond) else 0.0  # all crowd where nothing but the digits is left
+    if excess < _CROWDED:
+        return float(max((1 - tail) * np.exp(-(value - start)), np.mean(draws >= value)))
+    shown = (1 - tail) * np.exp(-(min(value, largest) - start) / excess)
+    if value <= largest:
+        return float(shown)
+    return float(max(shown, 1 / (len(draws) + 1)) * np.exp(-(value - largest) / max(excess, _STEEPEST)))

@@ -1,0 +1,435 @@
+"""The search for what was left out: a lack-of-fit test with a known false-alarm rate, then a comparison of combinations.
+
+The candidates are each effect of the catalogue, nonparametric terms, and nothing. The test statistic is the evidence of
+"something" over "nothing"; its distribution under nothing is drawn on the recording's own design.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
+from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.explanations import (
+    EFFECT,
+    UNKNOWN,
+    Explanation,
+    Member,
+    finer,
+    known,
+    several,
+    shorter,
+)
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
+from cmm_uq.analysis.diagnosis.comparison.stack import AMPLITUDES, Version
+from cmm_uq.analysis.diagnosis.comparison.unknown_functions import unknown
+from cmm_uq.analysis.diagnosis.noise import sigma_grid
+from cmm_uq.analysis.diagnosis.recorded_noise import noise_kinds
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.measurement import SMALL_LEAN
+from cmm_uq.machine.model.noise import display_of
+
+_MISFIT = 20.0
+"""Largest misfit, over the noise, that is reckoned with when the noise is not stated."""
+
+ASSERTED = 0.5
+"""Probability from which an effect, or one of those that cannot be told from it, is asserted."""
+
+_MECHANISM = 0.2
+"""Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
+
+_PROBABLE = 0.02
+"""Probability of a combination from which the period in it is refined."""
+
+_SHOWN = 6.0
+"""Log evidence of a period from which shorter ones are tried besides: less shows none."""
+
+_FEW = 6
+"""Periods that are refined where none shows."""
+
+_BETWEEN = 0.12
+"""Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)."""
+
+_IMPROBABLE = 12.0
+"""Log evidence below that of the best from which a period is not followed."""
+
+_AGAIN = 3
+"""Times that everything is compared again about what was found."""
+
+_PASSES = 0.1
+"""Part of an effect's squared visible length up to which a nonparametric term that leaves no more of it could pass for it."""
+
+NOT_TOLD_APART = 0.02
+"""Odds from which another effect in the place of one counts as not told apart from it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelComparison:
+    """The candidates that a model's misfit is compared with.
+
+    Parameters
+    ----------
+    model, values : what is explained so far, and its estimate.
+    comparison : candidates.
+    log_odds : (c,) log evidence of each over nothing.
+    probability : (c,) of each explanation, nothing included in the comparison.
+    p_value : of "nothing is missing".
+    null : (draws,) test statistic under nothing.
+    null_maximum : (draws,) largest log evidence of a nonparametric term over nothing, under nothing.
+    """
+
+    model: MeasurementModel
+    values: Floats
+    comparison: Comparison
+    log_odds: Floats
+    probability: Floats
+    p_value: float
+    null: Floats
+    null_maximum: Floats
+
+    @property
+    def explanations(self) -> Sequence[Explanation]:
+        """The candidates."""
+        return self.comparison.explanations
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search ends with.
+
+    Parameters
+    ----------
+    first : comparison before anything is found.
+    last : what is left after everything is, without candidates.
+    combinations : of explanations, with their probabilities; ``None`` where the lack-of-fit test does not reject.
+    chosen : indices, among the candidates, of the known effects that are found.
+    versions : of them, and of what is unknown besides, in the most probable combination.
+    model : the job's model with what was left out.
+    unexplained : probability that something unknown acts besides.
+    rough : of the effects found, those of which another form is more probable than their own.
+    stated : standard uncertainty of a coordinate, mm, as the job states it.
+    """
+
+    first: ModelComparison
+    last: Comparison
+    combinations: Combinations | None
+    chosen: Key
+    versions: tuple[Version, ...]
+    model: MeasurementModel
+    unexplained: float
+    rough: Key = frozenset()
+    stated: float | None = None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of what was left out."""
+        return tuple(self.first.explanations[i].name for i in sorted(self.chosen))
+
+
+def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed: int) -> Found:
+    """Find what a model leaves out.
+
+    Squarenesses that are found so large that the model bends are modelled, and everything is compared again about them: else
+    what they leave out to first order would be taken for further effects.
+
+    Parameters
+    ----------
+    model : what the job names, with its recording.
+    stated : standard uncertainty of a coordinate, mm, as the job states it.
+    alpha : false-alarm rate.
+    seed : of the null distribution.
+    """
+    found = _search(model, stated, alpha, seed)
+    for _ in range(_AGAIN):
+        whole = found.model
+        about = whole.estimate().about
+        if not found.effects or not whole.leans_beyond(
+            about - _without(model, whole), np.zeros_like(about), SMALL_LEAN
+        ):
+            break
+        again = _search(replace(model, within=whole), stated, alpha, seed)
+        if not again.effects:
+            break
+        before, found = found, again
+        if found.effects == before.effects:
+            break
+    return found
+
+
+def _without(model: MeasurementModel, whole: MeasurementModel) -> Floats:
+    """What the model by itself estimates, as parameters (k,) of one with effects more."""
+    own = dict(zip((u.key for u in model.unknowns), model.estimate().about, strict=True))
+    return np.array([own.get(unknown.key, 0.0) for unknown in whole.unknowns])
+
+
+def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> Found:
+    first = model_comparison(model, stated, seed, alpha)
+    if first.p_value >= alpha:
+        return Found(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
+    combinations = explore(first.comparison)
+    if shaped := _shaped(combinations):
+        explanations = [
+            _refined(first, combinations, i) if i in shaped else e for i, e in enumerate(first.explanations)
+        ]
+        first = replace(first, comparison=replace(first.comparison, explanations=explanations))
+        combinations = explore(first.comparison, combinations, frozenset(shaped))
+    combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
+    chosen = asserted(combinations)
+    return _of(first, combinations, chosen, stated)
+
+
+def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> Found:
+    """What a search ends with where these effects are found."""
+    versions = combinations.versions(chosen)
+    found = first.model if not chosen else with_effects(first, versions, chosen)
+    last = comparison_of(found, stated, ())
+    rough = frozenset(
+        i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
+    )
+    beside = combinations.unknown_beside(chosen)
+    return Found(first, last, combinations, chosen, versions, found, beside, rough, stated)
+
+
+def without(found: Found, gone: Key) -> Found:
+    """The same search with some of the effects not asserted: what they stood for stays unexplained."""
+    chosen = found.chosen - gone
+    combinations = found.combinations
+    if combinations is None or not gone:
+        return found
+    versions = combinations.versions(chosen)
+    model = with_effects(found.first, versions, chosen) if chosen else found.first.model
+    last = comparison_of(model, found.stated, ()) if chosen else found.first.comparison
+    return replace(
+        found, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=found.rough - gone
+    )
+
+
+def in_place_of(found: Found, index: int, tried: Key) -> tuple[Found, int] | None:
+    """The same search with the next most probable in the place of an effect, and which that is; ``None`` where none may be.
+
+    It is one that these data cannot tell from it, is probable enough to be named, and has with all such one half, as any.
+
+    Parameters
+    ----------
+    found : the search.
+    index : of the effect.
+    tried : effects that are none to be found.
+    """
+    combinations = found.combinations
+    if combinations is None:
+        return None
+    for other in sorted(rivals_of(combinations, found.chosen, index) - tried, key=lambda i: -combinations.of(i)):
+        chosen = found.chosen - {index} | {other}
+        if chosen not in combinations.of_effects or found.first.explanations[other].shaped:
+            continue
+        if combinations.of(other) >= _MECHANISM and with_rivals(combinations, chosen, other) >= ASSERTED:
+            instead = _of(found.first, combinations, chosen, found.stated)
+            return replace(instead, unexplained=max(instead.unexplained, found.unexplained)), other
+    return None
+
+
+def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> float:
+    """Probability that an effect, beside the others, has another form than its own."""
+    members = comparison.explanations[index].members
+    evidence = np.full(len(members), -np.inf)
+    for group, cube in comparison.each(None, [v for v in versions if v.explanation != index], (index,)):
+        evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1) + group.weight
+    weight = np.exp(evidence - special.logsumexp(evidence))
+    return float(weight[[member.rough for member in members]].sum())
+
+
+def _shaped(combinations: Combinations) -> set[int]:
+    """Effects with a nonlinear parameter that probable combinations contain."""
+    return {
+        version.explanation
+        for key, probability in combinations.probability.items()
+        for version in (combinations.found[key].versions if probability > _PROBABLE else ())
+        if combinations.explanations[version.explanation].members[version.member].shape
+    }
+
+
+def _refined(first: ModelComparison, combinations: Combinations, index: int) -> Explanation:
+    """An effect with a nonlinear parameter, finer wherever that fits beside what is most probable with it, however short."""
+    most = max(
+        (key for key in combinations.found if index in key), key=lambda key: combinations.found[key].log_posterior
+    )
+    others = [v for v in combinations.found[most].versions if v.explanation != index]
+    explanation = first.explanations[index]
+    gains = _gains(first, explanation, others)
+    shows = bool(gains.max() > _SHOWN)
+    if shows:
+        explanation = shorter(first.model, first.values, explanation)
+        gains = _gains(first, explanation, others)
+    below = gains.max() - gains
+    shaped = np.array([bool(member.shape) for member in explanation.members])
+    between = _BETWEEN * max(float(gains.max()), 0.0) + 1.0
+    fits = [int(i) for i in np.argsort(below) if shaped[i] and below[i] < between][: None if shows else _FEW]
+    refined = finer(first.model, first.values, explanation, fits)
+    # what does not fit at all keeps its weight, and costs nothing: columns of zeros are invisible
+    lost = set(np.flatnonzero(shaped & (below > max(_IMPROBABLE, between))).tolist())
+    weight = sum(explanation.members[i].weight for i in lost)
+    kept = tuple(member for i, member in enumerate(refined.members) if i not in lost)
+    nothing = Member(np.zeros((len(first.comparison.left), 1)), weight=weight)
+    return replace(refined, members=(*kept, nothing) if lost else kept)
+
+
+def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Version]) -> Floats:
+    """Log evidence (members,) of each version of an explanation beside others, over that of the others alone."""
+    beside = [replace(e, members=(e.members[v.member],)) for v in others for e in [first.explanations[v.explanation]]]
+    comparison = replace(first.comparison, explanations=[explanation, *beside])
+    given = [Version(k, 0, v.amplitude) for k, v in enumerate(others, 1)]
+    evidence = np.full(len(explanation.members), -np.inf)
+    for group, cube in comparison.each(None, given, (0,)):
+        own = group.explanation == 0
+        evidence[group.member[own]] = special.logsumexp(cube[own, :, 0], axis=1) - np.log(AMPLITUDES)
+    return np.asarray(evidence - comparison.log_evidence_of(given)[0], dtype=np.float64)
+
+
+def asserted(combinations: Combinations) -> Key:
+    """The most probable set of known effects, without those that something else could well be instead."""
+    chosen = combinations.most_probable
+    if not chosen:
+        return _in_place_of_functions(combinations)
+    doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and with_rivals(combinations, chosen, i) < ASSERTED]
+    return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
+
+
+def _in_place_of_functions(combinations: Combinations) -> Key:
+    """Effects to which nothing is more probable than one or two nonparametric terms that could pass for all of them.
+
+    They are the most probable set of known effects. Each is asserted as one of a group, to which the terms belong, if it or an
+    effect that cannot be told from it is probable enough to be named at all, where those before it are taken as found.
+    """
+    known = {key: p for key, p in combinations.of_effects.items() if key}
+    best = max(known, key=lambda key: known[key]) if known else frozenset()
+    found: Key = frozenset()
+    for i in sorted(best, key=lambda i: -combinations.of(i)):
+        alike = rivals_of(combinations, best, i) | {i}
+        beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
+        own = sum(p for key, p in known.items() if found <= key and alike & key)
+        if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
+            found |= {i}
+    return found
+
+
+def _imitated(comparison: Comparison, combinations: Combinations) -> dict[int, Key]:
+    """Of each effect that may be asserted, the probable functions that leave next to nothing of it."""
+    probable = [i for i in range(len(combinations.explanations)) if combinations.of(i) > _PROBABLE]
+    kinds = {kind: [i for i in probable if combinations.explanations[i].kind == kind] for kind in (EFFECT, UNKNOWN)}
+    best = {i: _version(combinations, i) for i in probable}
+    return {
+        i: frozenset(j for j in kinds[UNKNOWN] if comparison.left_of(best[i], [best[j]]) < _PASSES)
+        for i in kinds[EFFECT]
+    }
+
+
+def _version(combinations: Combinations, index: int) -> Version:
+    """The version of an explanation in the most probable combination that contains it."""
+    keys = [key for key in combinations.found if index in key]
+    most = max(keys, key=lambda key: combinations.found[key].log_posterior)
+    return next(v for v in combinations.found[most].versions if v.explanation == index)
+
+
+def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
+    """Effects that are improbable only because a nonparametric term, which could be the same, describes them as well.
+
+    None that could stand in the place of one that is chosen: together they would determine nothing.
+    """
+    found = set()
+    instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
+    for i, effect in enumerate(combinations.explanations):
+        if effect.kind != EFFECT or i in instead or combinations.of(i) < _MECHANISM:
+            continue
+        if any(combinations.of_any(frozenset((i, j))) >= ASSERTED for j in combinations.imitating(i)):
+            found.add(i)
+    return frozenset(found)
+
+
+def _less_than_function(combinations: Combinations, index: int) -> bool:
+    """Whether an effect is less probable than a nonparametric term that could be it: its form is not the effect's own."""
+    return any(combinations.of(j) > combinations.of(index) for j in combinations.imitating(index))
+
+
+def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
+    """Probability of an effect or one that these data cannot tell from it."""
+    return combinations.of_any(rivals_of(combinations, chosen, index) | {index})
+
+
+def rivals_of(combinations: Combinations, chosen: Key, index: int) -> Key:
+    """Known effects that these data cannot tell from one of those chosen."""
+    return frozenset(i for i, odds in combinations.instead(chosen, index).items() if odds > NOT_TOLD_APART)
+
+
+def model_comparison(
+    model: MeasurementModel, stated: float | None, seed: int, alpha: float | None = None
+) -> ModelComparison:
+    """Compare all candidates for what a model leaves.
+
+    Parameters
+    ----------
+    seed : of the null distribution.
+    alpha : false-alarm rate near which the p-value is found more closely.
+    """
+    values = model.estimate().about
+    singles = known(model, values, tuple(effect.name for effect in model.effects))
+    known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
+    functions = [function for function in unknown(model, values) if function.term not in known_as]
+    candidates = singles + several(singles) + functions
+    comparison = comparison_of(model, stated, candidates)
+    nothing, something = comparison.log_evidence()
+    log_odds = something[:, 0] - nothing[0]
+    prior = log_prior(candidates)
+    log_total = special.logsumexp(np.append(prior + log_odds, np.log(NOTHING)))
+    p_value, null, maxima = lack_of_fit(comparison, seed, alpha)
+    probability = np.exp(prior + log_odds - log_total)
+    return ModelComparison(model, values, comparison, log_odds, probability, p_value, null, maxima)
+
+
+def comparison_of(model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]) -> Comparison:
+    """Candidates, possibly none, against what a model leaves."""
+    estimate = model.estimate()
+    linear = estimate.linear
+    sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
+    sigma, log_sigma = sigma_grid(stated, sigma_left, model.least_noise)
+    held = _held(model)
+    rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
+    return Comparison(
+        rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.freedoms.dense()]) / linear.noise_scale[:, None],
+        noise_kinds(model, candidates), sigma, log_sigma, candidates, linear.noise_scale,
+        max(stated or sigma_left / _MISFIT, model.least_noise), _certified(model, max(sigma_left, model.least_noise)),
+        display_of(model),
+    )  # fmt: skip
+
+
+def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
+    """The model with known effects more, of the shapes that are most probable together."""
+    shapes, added = dict(compared.model.shapes), []
+    for version in sorted(versions, key=lambda v: v.explanation):
+        if version.explanation in chosen:
+            explanation = compared.explanations[version.explanation]
+            if explanation.effect is None:
+                continue
+            added.append(explanation.effect)
+            if added[-1].shape:
+                shapes[explanation.name] = explanation.members[version.member].shape
+    return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes, within=None)
+
+
+def _certified(model: MeasurementModel, sigma: float) -> Floats:
+    """What the certificates of sizes leave open (m, c), for one standard deviation, in units of this noise."""
+    artefact = model.artefact
+    certified = np.array([size.certified for size in artefact.sizes], dtype=bool)
+    sds = np.array([size.sd for size in artefact.sizes])[certified]
+    change = artefact.size_change()[model.used][:, certified] * sds
+    return np.asarray(change / artefact.noise_scale[model.used, None] / sigma, dtype=np.float64)
+
+
+def _held(model: MeasurementModel) -> NDArray[np.bool_]:
+    """Which parameters of the linear model are sizes with a certificate; all others may take any value."""
+    return np.array([unknown.known for unknown in model.unknowns], dtype=bool)

@@ -1,0 +1,322 @@
+"""The diagnosis of a recording: whether something is missing, where, what, and whether modelling it predicts better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.analysis.diagnosis.asserting import Withheld, group_of, settled, unpredicted, with_periods, without_size
+from cmm_uq.analysis.diagnosis.compared import compared_on
+from cmm_uq.analysis.diagnosis.comparison.search import Found, ModelComparison, in_place_of, search, without
+from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement
+from cmm_uq.analysis.diagnosis.joint import Joint, joint_posterior
+from cmm_uq.analysis.diagnosis.location import Place, located
+from cmm_uq.analysis.diagnosis.noise import heavy, named
+from cmm_uq.analysis.diagnosis.periods import Mode, modes_of
+from cmm_uq.analysis.diagnosis.rivals import Remaining, remaining
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.display import of_last_digit
+from cmm_uq.machine.model.kind import Observed
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.least_squares import solve
+from cmm_uq.maths.inference.linear_model import LinearModel
+from cmm_uq.maths.inference.noise import Components
+from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.maths.inference.studentised import studentised
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+FALSE_ALARMS = 0.01
+"""Default rate at which a recording without any fault is found to have one."""
+
+_TOLD_APART = 0.95
+_ODDS = 0.05
+"""Odds of another in the place of an effect from which both are named together: a placing is suggested that gives 20 : 1."""
+
+_UNKNOWN = 0.5
+_NOISE_KIND = 0.9
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """An effect that the model left out.
+
+    Parameters
+    ----------
+    effect, title : its name, and in words.
+    probability : among all candidates that could stand in its place, nothing and nonparametric terms included.
+    parameters : reported parameters, from the joint posterior.
+    explained : part of the misfit's sum of squares that it takes away.
+    together : probability of it or one that these data cannot tell from it.
+    points_to : what a technician should look at.
+    group : what these data cannot tell from it; with a probability below one half it is asserted as one of these.
+    modes : other periods that fit, where it has one; all that fit, where none of them is settled.
+    settled : whether its period, where it has one, is among the parameters.
+    """
+
+    effect: str
+    title: Text
+    probability: float
+    parameters: Mapping[str, Quantity]
+    explained: float
+    together: float
+    points_to: Text
+    group: tuple[Text, ...] = ()
+    modes: tuple[Mode, ...] = ()
+    settled: bool = True
+
+
+@dataclass(frozen=True)
+class NoiseFound:
+    """What the noise is like once everything found is modelled; lengths in µm."""
+
+    coordinate: Quantity
+    placing: Quantity
+    correlated_in_time: bool
+    heavy_tails: bool
+    contradicts_stated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """See the module's docstring.
+
+    Parameters
+    ----------
+    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
+    p_value : of "nothing is missing".
+    alpha : false-alarm rate asked for.
+    where : most significant first.
+    effects : what is asserted, most probable first.
+    indistinguishable : groups of effects that this recording cannot tell apart.
+    rivals : every candidate by itself with its probability, most probable first.
+    noise, improvement : see their classes.
+    before, after : the job's model, and with what was left out.
+    components : of the noise, for the model after.
+    posterior : joint, of the model after.
+    compared : observations that the candidates were compared on; what was found is estimated from all.
+    found : the search that it rests on.
+    withheld : effects that are probable, and yet not asserted.
+    remaining : combinations of explanations that remain, and what they make of the named effects.
+    """
+
+    verdict: str
+    p_value: float
+    alpha: float
+    where: tuple[Place, ...]
+    effects: tuple[LeftOut, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
+    rivals: tuple[tuple[Text, float], ...]
+    noise: NoiseFound
+    improvement: Improvement
+    before: MeasurementModel
+    after: MeasurementModel
+    components: Components
+    posterior: NoisyPosterior
+    compared: int
+    found: Found
+    withheld: tuple[Withheld, ...] = ()
+    remaining: Remaining = field(default_factory=Remaining)
+
+
+def diagnose(
+    model: MeasurementModel,
+    *,
+    stated_um: float | None,
+    alpha: float,
+    seed: int,
+    progress: Progress | None = None,
+    known: NoisyPosterior | None = None,
+    observe: Observed | None = None,
+) -> Diagnosis:
+    """Diagnose a recording.
+
+    Parameters
+    ----------
+    model : what the job names, without gross outliers.
+    stated_um : standard uncertainty of a coordinate that the job states.
+    alpha : false-alarm rate.
+    seed : of everything random.
+    known : posterior of the model, where it was sampled already.
+    observe : makes the artefact of points; without it a large recording is searched with all its observations.
+    """
+    stated = None if stated_um is None else stated_um * MICROMETRE
+    model = _with_last_digit(model)
+    some = model if observe is None else compared_on(model, observe, seed)
+    found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
+    gain = improvement(model, found.model)
+    if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
+        withheld = (*withheld, *unpredicted(found, gain.unseen))
+        found = _of_all(without(found, found.chosen), model)
+        gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
+    noise = _noise(found, joint, stated)
+    after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
+    return Diagnosis(
+        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha, found.chosen),
+        _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
+        joint.components, joint.posterior, int(some.used.sum()), found, withheld,
+        remaining(found, joint, model, seed),
+    )  # fmt: skip
+
+
+def _asserted(
+    found: Found, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
+) -> tuple[Found, Joint, tuple[Withheld, ...]]:
+    """What of a search may be asserted, estimated from all observations, and what is withheld.
+
+    Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place. Where there
+    is none, the least probable of those whose size is open goes first: without it that of the others may be known.
+    """
+    found, gone = with_periods(found)
+    places: dict[int, Withheld] = {}  # of each effect that was tried in the place of others, the first of these
+    tried: frozenset[int] = frozenset()
+    while True:
+        found = _of_all(found, model)
+        joint = joint_posterior(found, seed, progress, known)
+        more = without_size(found, joint)
+        if not more:
+            return found, joint, gone
+        tried |= frozenset(more)
+        alone = []
+        for i, withheld in more.items():
+            if (instead := in_place_of(found, i, tried)) is not None:
+                found, other = instead
+                places[other] = places.get(i, withheld)
+            else:
+                alone.append(i)
+        if len(alone) == len(more):
+            least = min(alone, key=lambda i: more[i].probability)
+            found, gone = without(found, frozenset({least})), (*gone, places.get(least, more[least]))
+
+
+def _of_all(found: Found, model: MeasurementModel) -> Found:
+    """The same, its model that of all observations."""
+    if not found.chosen or found.model.artefact is model.artefact:
+        return found if found.chosen else replace(found, model=model)
+    return replace(found, model=replace(found.model, artefact=model.artefact, used=model.used))
+
+
+def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
+    """The model whose noise is no less than the last digit of what was recorded: exact figures, and copies, have no other."""
+    least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
+    return replace(model, least_noise=least) if least > model.least_noise else model
+
+
+def _verdict(found: Found, alpha: float) -> str:
+    if found.first.p_value >= alpha:
+        return "consistent"
+    if not found.effects:
+        return "unexplained"
+    return "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
+
+
+def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[LeftOut, ...]:
+    index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
+    posterior = joint.posterior
+    column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
+    linear, first = found.model.estimate().linear, _squares(before.estimate().linear, ())
+    total = first - _squares(linear, ())
+    listed = []
+    for effect in (e for e in found.model.effects if e.name in found.effects):
+        modes = modes_of(found, index[effect.name])
+        known = not modes or settled(found, index[effect.name], modes)
+        probability, together, group = _probability(found, index[effect.name], known=known)
+        draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
+        shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
+        if modes and known:  # what is reported of a period is reported of one
+            own = modes[0].holds(shapes[:, 0])
+            draws, shapes = (draws[own], shapes[own]) if own.any() else (draws, shapes)
+        reported = effect.to_reported(draws, shapes)
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        share = (_squares(linear, [column[effect.name, c.name] for c in effect.coefficients]) - first + total) / first
+        parameters = {
+            name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
+            for name, values in reported.items()
+            if known or name not in _of_a_period(effect)
+        }
+        explained = max(share, 0.0) if total > 0 else 0.0
+        item = LeftOut(
+            effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
+            modes[1:] if known else modes, known,
+        )  # fmt: skip
+        listed.append(item)
+    return tuple(sorted(listed, key=lambda item: -item.probability))
+
+
+def _of_a_period(effect: Effect) -> frozenset[str]:
+    """What is reported of an effect with one period only: another has another phase."""
+    return frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
+
+
+def _probability(found: Found, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
+    """Of an effect by itself, and with all that could stand in its place; and the names of those.
+
+    Without a known period these are the functions of the reading, too.
+    """
+    combinations = found.combinations
+    if combinations is None:
+        return 0.0, 0.0, ()
+    group = group_of(combinations, found.chosen, index)
+    group |= frozenset() if known else combinations.imitating(index)
+    names = tuple(
+        combinations.explanations[i].name
+        for i in sorted(group, key=lambda i: -combinations.of(i))
+        if combinations.of(i) > 0
+    )
+    return combinations.of(index), combinations.of_any(group | {index}), names
+
+
+def _unwrapped(phase: Floats) -> Floats:
+    """Phases within half a turn of their circular mean, so that they have a mean and an interval."""
+    middle = float(np.angle(np.mean(np.exp(1j * phase))))
+    return np.asarray(middle + np.angle(np.exp(1j * (phase - middle))), dtype=np.float64)
+
+
+def _squares(linear: LinearModel, without: Sequence[int]) -> float:
+    """Sum of squared residuals, in units of the noise scale, when some parameters are left out."""
+    kept = [i for i in range(len(linear.unknowns)) if i not in without]
+    return float(np.sum(solve(linear.only(kept)).residuals ** 2))
+
+
+def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
+    if found.combinations is None:
+        return ()
+    names, groups = [e.name for e in found.first.explanations], []
+    for i in sorted(found.chosen):
+        odds = found.combinations.instead(found.chosen, i)
+        rivals = sorted((r for r in odds if odds[r] > _ODDS), key=lambda r: -odds[r])
+        if rivals and found.combinations.of(i) < _TOLD_APART:
+            groups.append((names[i], *(names[r] for r in rivals)))
+    return tuple(groups)
+
+
+def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
+    order = np.argsort(-compared.probability)
+    return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
+
+
+def _noise(found: Found, joint: Joint, stated: float | None) -> NoiseFound:
+    """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
+    sizes, weight = joint.posterior.sizes, found.last.noise_posterior().sum(axis=1)
+    estimate = found.model.estimate()
+    residuals = studentised(estimate.linear, joint.components, sizes.typical, estimate.least_squares.residuals)
+    likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
+    squares = found.last.squares[likeliest] * found.last.kinds[likeliest].scatter ** 2
+    return NoiseFound(
+        Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
+        Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
+        float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
+        named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or heavy(residuals),
+        stated is not None and _contradicts(stated, squares, found.last.degrees_of_freedom),
+    )  # fmt: skip
+
+
+def _contradicts(stated: float, squares: float, count: int) -> bool:
+    """Two-sided χ² test of the stated noise at 1 %."""
+    p = float(special.chdtrc(count, squares / stated**2))
+    return min(p, 1 - p) < 0.005

@@ -1,0 +1,238 @@
+"""Where a mismatch lives: covariate, region and direction that carry the evidence, and the function that shows it.
+
+Many covariates show one mismatch: what grows along X also grows with the order in which X was gone through. So the place with
+most evidence is named, those that fit as well are named with it, and another place only where it carries evidence beside the
+first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
+from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison
+from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import MICROMETRE
+
+_UNSEEN = 0.05
+"""Part of a constant or a line that must show in the observations; with less, nothing is known of it."""
+
+_AS_WELL = float(np.log(20.0))
+"""Log odds within which another covariate fits as well."""
+
+_MOST = 4
+"""Places that are told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a mismatch lives.
+
+    Parameters
+    ----------
+    covariate : column that it depends on.
+    region : of that covariate, where the function is larger than half its maximum and its band does not hold zero, or between
+        which values it jumps.
+    p_value : corrected for having looked at every covariate; of a further place, beside those before it.
+    amplitude_um : largest value of the function in the region.
+    what : the function, in words.
+    curve : covariate, function and its standard uncertainty in µm, each (p,).
+    k : coverage factor of its band for 95 %.
+    along : axis along which it displaces points; ``None`` where it is told by the observations themselves.
+    scale : whether it is a scale of that axis.
+    also : other functions that fit as well and show the same.
+    data : lowest and highest of the covariate among the points of each observation, and what the job's model leaves of it in
+        µm, each (m,).
+    """
+
+    covariate: str
+    region: tuple[float, float]
+    p_value: float
+    amplitude_um: float
+    what: Text
+    curve: tuple[Floats, Floats, Floats]
+    k: float = 2.0
+    along: str | None = None
+    scale: bool = False
+    also: tuple[Text, ...] = ()
+    data: tuple[Floats, Floats, Floats] = field(default_factory=lambda: (np.zeros(0), np.zeros(0), np.zeros(0)))
+
+
+def located(compared: ModelComparison, alpha: float, effects: Collection[int] = ()) -> tuple[Place, ...]:
+    """Where the evidence is that something is missing, significant at ``alpha``, the place with most of it first.
+
+    Parameters
+    ----------
+    compared : the candidates.
+    alpha : false-alarm rate over all covariates.
+    effects : those that were found; of functions that fit equally well the one that has the form of one of them is named.
+    """
+    if compared.p_value >= alpha:
+        return ()
+    functions = {
+        i for i, e in enumerate(compared.explanations) if e.kind == UNKNOWN and e.covariate_name and e.covariate is not None
+    }  # fmt: skip
+    chosen: list[tuple[Version, float, tuple[Text, ...]]] = []
+    while functions and len(chosen) < _MOST:
+        gains = _beside(compared, [version for version, *_ in chosen], functions)
+        gains = {i: gain for i, gain in gains.items() if _p_value(compared, gain[0]) < alpha}
+        if not gains:
+            break
+        most = max(gain for gain, _ in gains.values())
+        likely = [i for i, (gain, _) in gains.items() if gain > most - _AS_WELL]
+        first = max(likely, key=lambda i: (_has_form(compared, i, effects), gains[i][0]))
+        gain, version = gains[first]
+        still = {
+            i for i, (left, _) in _beside(compared, [*(v for v, *_ in chosen), version], set(gains) - {first}).items()
+            if _p_value(compared, left) < alpha
+        }  # fmt: skip
+        also = sorted((i for i in likely if i != first and i not in still), key=lambda i: -gains[i][0])
+        names = tuple(dict.fromkeys(compared.explanations[i].name for i in also))
+        chosen.append((version, _p_value(compared, gain), names))
+        functions = still
+    return tuple(_places(compared, chosen))
+
+
+def _beside(
+    compared: ModelComparison, given: Sequence[Version], functions: Collection[int]
+) -> dict[int, tuple[float, Version]]:
+    """Log odds of each function beside those given, and its best version."""
+    comparison = compared.comparison
+    alone = float(comparison.log_evidence_of(given)[0]) if given else 0.0
+    found = comparison.beside(given, functions)
+    return {
+        i: (evidence - alone if given else float(compared.log_odds[i]), version)
+        for i, (evidence, version) in found.items()
+        if i in functions
+    }
+
+
+def _p_value(compared: ModelComparison, log_odds: float) -> float:
+    return tail_probability(compared.null_maximum, log_odds)
+
+
+def _has_form(compared: ModelComparison, function: int, effects: Collection[int]) -> bool:
+    """Whether one of the effects found could be this function."""
+    own = compared.explanations[function]
+    return any(own.could_be(effect) for i, effect in enumerate(compared.explanations) if i in effects)
+
+
+def _places(
+    compared: ModelComparison, chosen: Sequence[tuple[Version, float, tuple[Text, ...]]]
+) -> Iterable[Place]:  # fmt: skip
+    """Those whose band does not hold zero everywhere, their functions estimated together."""
+    fit = _Fit.of(compared, [version for version, *_ in chosen])
+    for number, (version, p_value, also) in enumerate(chosen):
+        explanation = compared.explanations[version.explanation]
+        covariate, name, term = explanation.covariate, explanation.covariate_name, explanation.term
+        if covariate is None or name is None:
+            continue
+        x, order = np.unique(covariate, return_index=True)
+        values = explanation.members[version.member].values
+        y, u = fit.function(number, x, values[order])
+        sure = np.abs(y) > fit.k * u
+        if not sure.any():
+            continue
+        region = region_of(x, y, sure) if values.shape[1] > 1 else _jump(compared, version.explanation, x, order)
+        largest = float(np.abs(y[sure]).max()) / MICROMETRE
+        yield Place(
+            name, region, p_value, largest, explanation.name, (x, y / MICROMETRE, u / MICROMETRE), fit.k,
+            None if term is None else term.along, term is not None and term.scale, also, _data(compared, covariate),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Unknown functions fitted together to what the baseline leaves.
+
+    Parameters
+    ----------
+    mean, covariance : of their coefficients, (r,) and (r, r), for functions in mm.
+    parts : coefficients of each function.
+    left : (m, r) what the baseline leaves of their columns.
+    k : coverage factor for 95 %.
+    """
+
+    mean: Floats
+    covariance: Floats
+    parts: Sequence[slice]
+    left: Floats
+    k: float
+
+    @classmethod
+    def of(cls, compared: ModelComparison, versions: Sequence[Version]) -> _Fit:
+        """Best linear estimate, with a normal prior of each version's amplitude."""
+        comparison = compared.comparison
+        members = [compared.explanations[v.explanation].members[v.member] for v in versions]
+        each = [comparison.rest(member.columns / comparison.noise_scale[:, None]) for member in members]
+        if not each:
+            return cls(np.zeros(0), np.zeros((0, 0)), (), np.zeros((len(comparison.left), 0)), 2.0)
+        left = np.hstack(each)
+        ends = np.cumsum([0, *(columns.shape[1] for columns in each)])
+        least = comparison.left - left @ np.linalg.lstsq(left, comparison.left, rcond=None)[0]
+        degrees = max(comparison.degrees_of_freedom - left.shape[1], 1)
+        variance = max(float(least @ least) / degrees, comparison.least_noise**2)
+        amplitude = np.repeat([v.amplitude for v in versions], np.diff(ends))
+        precision = left.T @ left / variance + np.diag(1 / (amplitude**2 * variance))
+        covariance = np.linalg.inv(precision)
+        mean = covariance @ (left.T @ comparison.left) / variance
+        parts = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        return cls(mean, covariance, parts, left, float(special.stdtrit(degrees, 0.975)))
+
+    def function(self, number: int, x: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """One function and its standard uncertainty, mm, each (p,), from its values (p, r) for unit coefficients.
+
+        A constant or a line that no observation shows, or that the baseline absorbs, is no part of the function.
+        """
+        own = self.parts[number]
+        left = self.left[:, own]
+        lines = np.column_stack([np.ones_like(x), (x - x.mean()) / np.ptp(x)])
+        among = np.linalg.lstsq(values, lines, rcond=None)[0]
+        shown = np.sqrt(np.mean((left @ among) ** 2, axis=0))
+        unseen = shown < _UNSEEN * np.sqrt(np.mean((values @ among) ** 2, axis=0))
+        lines = lines[:, unseen]
+        values = values - lines @ np.linalg.lstsq(lines, values, rcond=None)[0]
+        return values @ self.mean[own], np.sqrt(np.einsum("pi,ij,pj->p", values, self.covariance[own, own], values))
+
+
+def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tuple[float, float]:
+    """Range of the sorted covariate that holds a step with 95 % probability."""
+    members = compared.explanations[index].members
+    evidence = np.full(len(members), -np.inf)
+    for group, cube in compared.comparison.each(None, (), (index,)):
+        if group.r == 1:
+            evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1)
+    probability = np.exp(evidence - special.logsumexp(evidence))
+    likely = np.argsort(-probability)
+    likely = likely[: int(np.searchsorted(np.cumsum(probability[likely]), 0.95)) + 1]
+    jumps = [int(np.flatnonzero(np.diff(members[m].values[order, 0]))[0]) for m in likely]
+    return float(x[min(jumps)]), float(x[max(jumps) + 1])
+
+
+def _data(compared: ModelComparison, covariate: Floats) -> tuple[Floats, Floats, Floats]:
+    """Ends of a covariate of points (n,), or itself of observations (m,), and what the baseline leaves of each in µm."""
+    model, comparison = compared.model, compared.comparison
+    rows = model.artefact.rows[model.used]
+    each = covariate[rows] if len(covariate) == len(model.artefact.points) else covariate[:, None]
+    return each.min(axis=1), each.max(axis=1), comparison.left * comparison.noise_scale / MICROMETRE
+
+
+def region_of(covariate: Floats, curve: Floats, sure: NDArray[np.bool_] | None = None) -> tuple[float, float]:
+    """Range of the sorted covariate about the curve's largest value where it exceeds half of it and is ``sure``."""
+    size = np.abs(curve) if sure is None else np.where(sure, np.abs(curve), 0.0)
+    high = (np.abs(curve) >= 0.5 * size.max()) & (size > 0)
+    first = last = int(np.argmax(size))
+    while first > 0 and high[first - 1]:
+        first -= 1
+    while last < len(high) - 1 and high[last + 1]:
+        last += 1
+    return float(covariate[first]), float(covariate[last])

@@ -1,0 +1,298 @@
+"""How large an effect must be for the diagnosis to find it, and to call it by its name.
+
+Nothing is approximated but slow noise and tails, of which there are none: recordings are drawn on the plan's own design, and
+the search's own statistic, with its own candidates, priors and false-alarm rate, decides on each. What it sees of a draw is a
+quadratic form, so that a recording costs some milliseconds. *Detected*: the lack-of-fit test rejects. *Named*: besides, the
+true effect alone is more probable than any other known effect alone and than none, and so much that no other is said to be as
+possible (``NOT_TOLD_APART``): with twins that nothing tells apart, a lucky guess is no
+name.
+
+(Baarda 1968 and Teunissen 2018 call these sizes minimal detectable and minimal identifiable bias.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
+from cmm_uq.analysis.diagnosis.comparison.prior import Prior
+from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import Unit
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.kind import Observed
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.noise import Components, Sizes
+
+POWER = 0.8
+
+SIZES = np.array([3.0, 3.7, 4.4, 5.1, 6.0, 7.5, 12.0, 30.0])
+"""Sizes of an effect that are tried: its rms in all observations together, what is fitted projected out, over the noise."""
+
+_LARGER = np.array([1.0, 1.3])
+"""Noise as it looks, over what it is, at which the threshold of the test is found."""
+
+_TAIL = 0.2
+CERTAIN = float(np.log(0.95 / 0.05))
+"""Log odds of an effect against everything else from which on no other is said to be as possible."""
+
+ALLOWED = 3.0
+"""Prior standard deviations up to which an effect is reckoned with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Power:
+    """How an effect would be found.
+
+    Parameters
+    ----------
+    effect : its name.
+    parameter, unit : its (first) parameter.
+    allowed : largest amplitude that physics allows, in its unit.
+    per_unit : size, as in :data:`SIZES`, of an effect of one unit; 0 where nothing of it shows.
+    detected_at, named_at : (d,) size from which on each drawn recording is alarmed, and named rightly; may be infinite.
+    """
+
+    effect: str
+    parameter: str
+    unit: Unit
+    allowed: float
+    per_unit: float
+    detected_at: Floats
+    named_at: Floats
+
+    def detected(self, amplitude: float) -> float:
+        """Probability that an effect of this amplitude, in its unit, is detected."""
+        return float(np.mean(self.detected_at <= abs(amplitude) * self.per_unit))
+
+    def named(self, amplitude: float) -> float:
+        """Probability that it is called by its name."""
+        return float(np.mean(self.named_at <= abs(amplitude) * self.per_unit))
+
+    @property
+    def detectable(self) -> float | None:
+        """Amplitude detected with a probability of 80 %; ``None`` where none that physics allows is."""
+        return self._amplitude(self.detected_at)
+
+    @property
+    def identifiable(self) -> float | None:
+        """Amplitude named rightly with a probability of 80 %."""
+        return self._amplitude(self.named_at)
+
+    def _amplitude(self, at: Floats) -> float | None:
+        size = float(np.quantile(at, POWER, method="higher"))
+        return size / self.per_unit if size <= self.allowed * self.per_unit else None
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnNoise:
+    """Noise of the observations of a recording, m of them, in one set of sizes.
+
+    Parameters
+    ----------
+    components, sizes : of the noise.
+    noise_scale : (m,).
+    """
+
+    components: Components
+    sizes: Sizes
+    noise_scale: Floats
+
+    def draws(self, random: np.random.Generator, count: int) -> Floats:
+        """(m, count) over the noise scale and the noise of a reading."""
+        drawn = self.components.repeated(self.sizes, count, random)[0]
+        return np.asarray(drawn.T / self.noise_scale[:, None] / self.sizes.coordinate[0])
+
+    def covariance(self, column: Floats) -> Floats:
+        """The covariance of :meth:`draws` times a column (m, 1)."""
+        scale = 1 / self.noise_scale[:, None] / self.sizes.coordinate[0]
+        variances = self.components.variances(self.sizes)[0][0] @ self.components.shares.T
+        turn = self.components.turn
+        return np.asarray(scale * (turn.T @ (variances[:, None] * (turn @ (scale * column)))))
+
+
+def without_fault(observe: Observed, model: MeasurementModel, noise: Noise, seed: int) -> MeasurementModel:
+    """The same model of a recording drawn with nothing left out, in the placings of its own.
+
+    Parameters
+    ----------
+    observe : makes the artefact of points.
+    model : gives effects and placings.
+    noise : that it has.
+    """
+    artefact = model.artefact
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(8,)))
+    sizes = np.array([size.nominal for size in artefact.sizes])
+    xyz = model.simulate(np.zeros(len(model.unknowns) - len(sizes)), sizes, noise, random)
+    return replace(model, artefact=observe(artefact.points.at(xyz)))
+
+
+def powers(
+    model: MeasurementModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
+    draws: int = 20, noise: DrawnNoise | None = None,
+) -> Iterator[Power]:  # fmt: skip
+    """Power of the diagnosis of a model's recording, for effects that the model does not name.
+
+    Parameters
+    ----------
+    model : what the job names, of a recording without fault.
+    effects : linear ones.
+    stated : standard uncertainty of a coordinate that the job would state, mm.
+    sigma : that it truly has, mm.
+    alpha : false-alarm rate.
+    seed : of the draws; those of the test itself are of seed 0 (:func:`~cmm_uq.analysis.diagnosis.comparison.search.search`).
+    draws : recordings drawn of each effect and size.
+    noise : of these; white where it is left out. It has ``sigma`` as the noise of a reading.
+    """
+    compared = model_comparison(model, stated, 0)
+    rule = _Rule(compared.comparison, sigma, alpha, noise)
+    for effect in effects:
+        yield _power(rule, model, compared.values, effect, seed, draws)
+
+
+def _power(rule: _Rule, model: MeasurementModel, values: Floats, effect: Effect, seed: int, draws: int) -> Power:
+    points = model.artefact.points.at(model.placed(values))
+    column = model.seen(effect.basis(points)[:, :, :1], values) / rule.comparison.noise_scale[:, None]
+    shown = rule.comparison.rest(column)
+    length = float(np.linalg.norm(shown))
+    name, unit = effect.reported[0].name, effect.coefficients[0].unit
+    allowed = ALLOWED * effect.coefficients[0].prior_sd
+    index = rule.index(effect.name)
+    if length * allowed < SIZES[0] * rule.sigma or index is None:
+        never = np.full(draws, np.inf)
+        return Power(effect.name, name, unit, allowed, 0.0, never, never)
+    noise = rule.noise(shown / length, seed, draws)
+    alarm, margin = np.empty((len(SIZES), draws)), np.empty((len(SIZES), draws))
+    for i, size in enumerate(SIZES):
+        alarm[i], margin[i] = rule(rule.sigma * (noise + size * shown / length), index)
+    return Power(
+        effect.name, name, unit, allowed, length / rule.sigma, _reached(alarm), _reached(np.minimum(alarm, margin))
+    )
+
+
+def _reached(margin: Floats) -> Floats:
+    """Size (d,) from which on the margin (sizes, d) stays positive; linear in the size's square between those tried."""
+    squares = SIZES**2
+    count = len(SIZES)
+    found = np.full(margin.shape[1], np.inf)
+    for column in range(margin.shape[1]):
+        values = margin[:, column]
+        below = np.flatnonzero(values <= 0)
+        last = int(below[-1]) if len(below) else -1
+        if last < 0:
+            found[column] = SIZES[0]
+        if last in (-1, count - 1):
+            continue
+        part = -values[last] / (values[last + 1] - values[last])
+        found[column] = float(np.sqrt(squares[last] + part * (squares[last + 1] - squares[last])))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Naming:
+    """When one effect alone is called by its name."""
+
+    explanations: Sequence[Explanation]
+
+    @cached_property
+    def priors(self) -> Floats:
+        """(c,) log probability, beforehand, of each explanation alone among combinations; minus infinity for several."""
+        prior = Prior(self.explanations)
+        return np.array([prior.log([i]) for i in range(len(self.explanations))])
+
+    def __call__(self, odds: Floats, true: int) -> Floats:
+        """By how much (b,) the true effect passes what would let others stand beside it.
+
+        Parameters
+        ----------
+        odds : (c, b) log evidence of each explanation over nothing.
+        true : which of them acts.
+        """
+        weight = odds + self.priors[:, None]
+        kinds = np.array([explanation.kind for explanation in self.explanations])
+        nothing = np.full((1, odds.shape[1]), Prior(self.explanations).log([]))
+        none = special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
+        others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
+        other = others.max(axis=0, initial=-np.inf)
+        asserted = weight[true] - np.maximum(none, other)
+        without_rival = np.minimum(asserted, weight[true] - other + np.log(NOT_TOLD_APART))
+        all_but_certain = weight[true] - special.logsumexp(np.vstack([none, others]), axis=0) - CERTAIN
+        return np.asarray(np.maximum(without_rival, all_but_certain))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rule:
+    """The search's rule on data (m, b), mm, of which the baseline has been taken."""
+
+    comparison: Comparison
+    sigma: float
+    alpha: float
+    coloured: DrawnNoise | None = None
+
+    @cached_property
+    def _thresholds(self) -> Floats:
+        """(t,) statistic at which the test rejects when the noise looks :data:`_LARGER` times what it is.
+
+        The test draws "nothing is missing" at the noise that fits the recording best, and a fault makes that larger. Its tail
+        is that of :func:`~cmm_uq.analysis.diagnosis.comparison.search.tail_probability`.
+        """
+        comparison = self.comparison
+        random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))
+        draws = comparison.nothing(random, DRAWS)
+        found = []
+        for larger in _LARGER:
+            statistic = statistic_of(comparison, larger * draws)[0]
+            start = float(np.quantile(statistic, 1 - _TAIL))
+            beyond = float((statistic[statistic > start] - start).mean())
+            found.append(start + beyond * float(np.log(_TAIL / self.alpha)))
+        return np.array(found)
+
+    def threshold(self, data: Floats) -> Floats:
+        """(b,) statistic at which the test rejects for data (m, b)."""
+        comparison = self.comparison
+        squares = np.append(np.sum(data**2, axis=0), float(comparison.left @ comparison.left))
+        log = comparison.log_sigma - comparison.degrees_of_freedom * np.log(comparison.sigma)
+        fitting = comparison.sigma[(log - 0.5 * squares[:, None] / comparison.sigma**2).argmax(axis=1)]
+        ratio = fitting[:-1] / fitting[-1]
+        return np.asarray(np.interp(ratio, _LARGER, self._thresholds), dtype=np.float64)
+
+    def noise(self, direction: Floats, seed: int, draws: int) -> Floats:
+        """Noise (m, draws) and what certificates leave open, in units of a reading's, less what the baseline takes.
+
+        Its part along ``direction`` (m, 1) is spread evenly over its distribution, which leaves less to chance.
+        """
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
+        drawn, along = random.standard_normal((len(direction), draws)), direction
+        if self.coloured is not None:
+            drawn, along = self.coloured.draws(random, draws), self.comparison.rest(self.coloured.covariance(direction))
+        white = self.comparison.rest(drawn)
+        even = special.ndtri((random.permutation(draws) + 0.5) / draws)
+        variance = float((direction.T @ along).item())
+        white = white + along / variance * (np.sqrt(variance) * even - direction.T @ white)
+        certified = self.comparison.certified
+        if certified.size:
+            white = white + self.comparison.rest(certified @ random.standard_normal((certified.shape[1], draws)))
+        return np.asarray(white, dtype=np.float64)
+
+    def index(self, name: str) -> int | None:
+        """Of an effect among the rivals; ``None`` where it is not one, or invisible."""
+        for i, explanation in enumerate(self.comparison.explanations):
+            if explanation.name == name and explanation.kind == EFFECT and i in self.comparison.visible:
+                return i
+        return None
+
+    @cached_property
+    def _naming(self) -> Naming:
+        return Naming(self.comparison.explanations)
+
+    def __call__(self, data: Floats, true: int) -> tuple[Floats, Floats]:
+        """By how much the statistic (b,) passes the threshold, and the true effect what would let others stand beside it."""
+        statistic, odds = statistic_of(self.comparison, data)
+        return statistic - self.threshold(data), self._naming(odds, true)

@@ -1,0 +1,251 @@
+"""Features of virtual measurements: of drawn points exactly, or to first order where only values are asked for.
+
+To first order means: by the exact derivative of the association about the measurement without errors of its own. How far that
+is from the association itself is looked at in every run (:mod:`cmm_uq.analysis.parts.virtual`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.analysis.parts.plan import DIRECTED, Feature, FeatureKind
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry.association import Association
+from cmm_uq.maths.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one
+
+_STEP = 1e-3
+"""mm: of central differences, whose error is the square of step over radius."""
+
+_NEAR = 1e-2
+"""Of a feature's extent: how far points may be from those that it was prepared for."""
+
+_SLIDING: tuple[FeatureKind, ...] = ("line", "circle", "cylinder", "cone")
+"""Features that lie anywhere along their axis by their fit."""
+
+VALUES = 8
+"""Numbers that a feature is told by: position (3), direction (3), diameter, half angle."""
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """A feature of N measurements, in the frame of the points.
+
+    Parameters
+    ----------
+    values : (N, 8) position, direction, diameter, half angle; zero where there is none.
+    form : (N,) form deviation, mm; (0,) where it was not asked for.
+    points : (N, n, 3) measured; (0, 0, 3) where they were not asked for.
+    members : of a common datum, each as what it fixes.
+    """
+
+    values: Floats
+    form: Floats = field(default_factory=lambda: np.zeros(0))
+    points: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
+    members: tuple[Features, ...] = ()
+
+    @property
+    def position(self) -> Floats:
+        """(N, 3) mm."""
+        return self.values[:, :3]
+
+    @property
+    def direction(self) -> Floats:
+        """(N, 3) unit vectors, in the sense of the nominal one."""
+        return self.values[:, 3:6]
+
+    @property
+    def diameter(self) -> Floats:
+        """(N,) mm."""
+        return self.values[:, 6]
+
+
+class ProbedFeature:
+    """A feature to be associated many times.
+
+    Parameters
+    ----------
+    feature : of the plan.
+    points : (n, 3) its points as they are measured without any draw, mm.
+    association : how.
+    looked_at : the same feature at points that are near, whose preparation then serves for these too.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine it.
+    """
+
+    def __init__(
+        self, feature: Feature, points: Floats, association: Association, looked_at: ProbedFeature | None = None
+    ) -> None:
+        self.feature, self.points, self.association = feature, points, association
+        self.n = len(points)
+        self._offset = np.zeros_like(points)
+        self._repeated: Repeated
+        if feature.kind == "point":
+            return
+        if looked_at is not None and looked_at.is_near(points):
+            self._repeated = looked_at._repeated
+            self._offset = points - (looked_at.points - looked_at._offset)
+            return
+        try:
+            self._repeated = Repeated(feature.kind, self._in_own_plane(points))
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"feature {feature.name!r}", fix=error.fix) from error
+
+    def is_near(self, points: Floats) -> bool:
+        """Whether points (n, 3) are so near to its own that these serve for them too; only of what takes long to prepare.
+
+        The point on the axis is then the one over the middle of its own points.
+        """
+        if self.feature.kind not in ("cylinder", "cone"):
+            return False
+        return bool(np.abs(points - self.points).max(initial=0.0) < _NEAR * self._repeated.placed.extent)
+
+    @cached_property
+    def _plane(self) -> Floats:
+        """(2, 3) of a line on a surface: along it, and out of the material."""
+        along = np.asarray(self.feature.nominal.direction)
+        out = self.feature.normals.mean(axis=0)
+        out = out - (out @ along) * along
+        return np.array([along, out / np.linalg.norm(out)])
+
+    def _in_own_plane(self, points: Floats) -> Floats:
+        """Of a line on a surface the coordinates (…, 2) in its plane, else the points."""
+        return np.asarray(points @ self._plane.T) if self.feature.kind == "line" else points
+
+    def of(self, displacements: Floats, *, with_points: bool = False) -> Features:
+        """Features of displacements (N, n, 3) from ``points``, mm, by the association itself; (N, n) along the normals.
+
+        Raises
+        ------
+        CmmUqError : displacements that are large against the feature.
+        """
+        if displacements.ndim < self.points.ndim + 1:
+            return self._of_raised(displacements, with_points=with_points)
+        points = self.points + displacements if with_points else np.zeros((0, 0, 3))
+        if self.feature.kind == "point":
+            values = np.zeros((len(displacements), VALUES))
+            values[:, :3] = (self.points + displacements).mean(axis=1)
+            return Features(values, np.zeros(len(displacements)), points)
+        moved = displacements + self._offset
+        drawn = self._associated(self._in_own_plane(moved))
+        return Features(self._slid(self._values(drawn), moved.mean(axis=1)), drawn.form, points)
+
+    def _of_raised(self, heights: Floats, *, with_points: bool) -> Features:
+        normals = self.feature.normals
+        raised = Raised(heights, self._in_own_plane(normals), self._in_own_plane(self._offset))
+        points = self.points + heights[:, :, None] * normals if with_points else np.zeros((0, 0, 3))
+        drawn = self._associated(raised)
+        mean = self._offset.mean(axis=0) + heights @ normals / self.n
+        return Features(self._slid(self._values(drawn), mean), drawn.form, points)
+
+    def _associated(self, displacements: Floats | Raised) -> Drawn:
+        if self.association == "least_squares":
+            return self._repeated.least_squares(displacements)
+        if self.association in ("minimum_zone", "tangent"):
+            drawn = self._repeated.minimum_zone(displacements)
+            return self._outside(drawn) if self.association == "tangent" else drawn
+        try:
+            return self._repeated.one_sided(displacements, inscribed=self.association == "maximum_inscribed")
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"feature {self.feature.name!r}", fix=error.fix) from error
+
+    def _outside(self, drawn: Drawn) -> Drawn:
+        """The side of a minimum zone that looks out of the material."""
+        if self.feature.kind == "line":
+            across = self._plane @ self.feature.normals.mean(axis=0)
+        elif self.feature.kind == "plane":
+            across = self.feature.normals.mean(axis=0)
+        else:
+            raise CmmUqError(f"a {self.feature.kind} has no tangent feature", where=f"feature {self.feature.name!r}",
+                             fix="Use maximum_inscribed or minimum_circumscribed")  # fmt: skip
+        return replace(drawn, position=drawn.position + 0.5 * drawn.form[:, None] * across / np.linalg.norm(across))
+
+    def _values(self, drawn: Drawn) -> Floats:
+        values = np.zeros((len(drawn.position), VALUES))
+        position, direction = drawn.position, drawn.direction
+        if self.feature.kind == "line":
+            middle = self.points.mean(axis=0)
+            middle = middle - (self._plane @ middle) @ self._plane
+            position = position @ self._plane + middle
+            direction = None if direction is None else direction @ self._plane
+        values[:, :3] = position
+        nominal = self.feature.nominal.direction
+        if self.feature.kind in DIRECTED and nominal is not None:
+            sensed = np.broadcast_to(nominal, position.shape) if direction is None else direction
+            values[:, 3:6] = sensed * np.sign(sensed @ nominal)[:, None]
+        if drawn.size is not None:
+            values[:, 6] = drawn.size
+        if drawn.half_angle is not None:
+            values[:, 7] = drawn.half_angle
+        return values
+
+    @cached_property
+    def _unsaid(self) -> Floats:
+        """(k, 3) directions in which no fit says where a feature lies: along its axis, of a line across its surface too."""
+        if self.feature.kind not in _SLIDING:
+            return np.zeros((0, 3))
+        axis = np.asarray(self.feature.nominal.direction)
+        return np.array([axis, np.cross(*self._plane)]) if self.feature.kind == "line" else axis[None]
+
+    def _slid(self, values: Floats, mean: Floats) -> Floats:
+        """Values (N, 8) whose position goes with the points, which moved by a mean (N, 3), where no fit says where it lies.
+
+        A circle lies as high as it is probed; what moves points and datums together leaves it where it is in the part.
+        """
+        by = mean @ self._unsaid.T
+        return np.asarray(values + sum(by[..., i, None] * each for i, each in enumerate(self._sliding(values))))
+
+    def _sliding(self, values: Floats) -> list[Floats]:
+        """Changes (N, 8) of values for 1 mm in each of these directions; on the axis as it is measured."""
+        found = [np.zeros_like(values) for _ in self._unsaid]
+        for i, each in enumerate(found):
+            own = values[:, 3:6] / (values[:, 3:6] @ self._unsaid[0])[:, None]
+            each[:, :3] = self._unsaid[i] if i else own
+            if (half := self.feature.nominal.half_angle_rad) is not None:
+                each[:, 6] = 2 * np.tan(np.copysign(values[:, 7], half)) * np.linalg.norm(own, axis=1)
+        return found
+
+    @cached_property
+    def base(self) -> Floats:
+        """(8,) values without any draw."""
+        return np.asarray(self.of(np.zeros((1, self.n, 3))).values[0])
+
+    @cached_property
+    def derivative(self) -> Floats:
+        """(8, n, 3) of the values by the coordinates of each point."""
+        if self.feature.kind == "point" or self.n <= MANY:
+            return self.by_differences(lambda displacements: self.of(displacements).values)
+        states, followed = self._repeated.followed(self._in_own_plane(self._offset), _STEP)
+        up, down = np.split(self._slid(self._values(self._repeated.drawn(states)), self._offset.mean(axis=0)), 2)
+        by_coordinate = (0.5 * followed @ (up - down)).reshape(self.n, -1, VALUES)
+        if self.feature.kind == "line":
+            by_coordinate = np.einsum("nbv,bi->niv", by_coordinate, self._plane)
+        sliding = [each[0] for each in self._sliding(self.base[None])]
+        slid = np.einsum("kv,ki->vi", np.array(sliding).reshape(-1, VALUES), self._unsaid) / self.n
+        return np.asarray(np.moveaxis(by_coordinate, 2, 0) + slid[:, None])
+
+    def by_differences(self, values: Callable[[Floats], Floats]) -> Floats:
+        """(8, n, 3) derivative of values (N, 8) of displacements (N, n, 3) by the coordinates of each point."""
+        found = []
+        for unit in one_by_one(self.n, 3):
+            steps = _STEP * unit
+            found.append((values(steps) - values(-steps)) / (2 * _STEP))
+        return np.concatenate(found).T.reshape(VALUES, self.n, 3)
+
+    @property
+    def undisturbed(self) -> Features:
+        """The feature without any draw."""
+        return Features(self.base[None])
+
+    def to_first_order(self, change: Floats) -> Features:
+        """Features of first-order changes (N, 8) of the values."""
+        values = self.base + change
+        if self.feature.kind in DIRECTED:
+            values[:, 3:6] /= np.linalg.norm(values[:, 3:6], axis=1, keepdims=True)
+        return Features(values)

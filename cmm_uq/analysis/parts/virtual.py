@@ -1,0 +1,387 @@
+"""Virtual measurements of a part: errors of its characteristics, drawn with every cause at once.
+
+The error is what is measured less what is true: of the nominal part, or, where a form is known on the whole surface, of the
+part with the form that was drawn. A characteristic that was measured as y is then y less the errors.
+
+What is never negative, such as a zone, is widened by errors whatever their sign. Where points were measured, its true value is
+inferred from what was measured by turning the measurement round (:mod:`cmm_uq.analysis.parts.inverting`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy
+from dataclasses import dataclass, field
+from functools import cache, cached_property, partial
+
+import numpy as np
+
+from cmm_uq.analysis.parts.causes import Cause, Common, Drawn, normal
+from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.condensing import LARGE, condensed
+from cmm_uq.analysis.parts.evaluating import Evaluator, Known, Movement, characteristics_of
+from cmm_uq.analysis.parts.inverting import Inverse, alike, inverse, nodes_of
+from cmm_uq.analysis.parts.machine import MachineState
+from cmm_uq.analysis.parts.of_form import Form, forms, whole_surfaces
+from cmm_uq.analysis.parts.of_machine import mean_errors, modelled, noise, not_modelled
+from cmm_uq.analysis.parts.of_operator import Beside
+from cmm_uq.analysis.parts.of_stylus import styli
+from cmm_uq.analysis.parts.of_temperature import Surroundings, mean_expansion, temperatures
+from cmm_uq.analysis.parts.placing import Pose, placed
+from cmm_uq.analysis.parts.plan import FORMS, Plan
+from cmm_uq.analysis.parts.qualifying import Qualified
+from cmm_uq.analysis.parts.trial_parts import trial_parts
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
+
+CHECKED = 200
+"""Draws that are looked at exactly, beside first order."""
+
+FEWEST = 100_000
+"""Virtual measurements, after which u is known to a quarter of a percent."""
+
+ROUNDING = 1e-9
+"""mm and rad: a spread below which is none."""
+
+THREADED = 2_000
+"""Draws of a block that are worth a thread."""
+
+AGREES = 0.01
+"""Of u, by which first order may be off before all is taken exactly: what u is good for."""
+
+PILOT = 10_000
+"""Draws by which the measurement is turned round; u and ends of intervals of zones are then known to a hundredth of u."""
+
+_BLOCK = 400_000
+"""Points of the pilot drawn at once."""
+
+_AT_ONCE = 2_000_000
+"""Points of virtual measurements that are drawn at once: 50 MB for each cause that moves each coordinate on its own."""
+
+_AT_ONCE_OF_MANY = 500_000
+"""The same of a plan of thousands of points, of which a block of few draws is large enough to be quick."""
+
+_KEPT = 1_600_000
+"""Points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed."""
+
+_PILOT_SEED = 20_101
+"""Of these, in every place alike, so that places are compared by the same."""
+
+
+_PilotBlock = Callable[[], tuple[Movement, Floats]]
+"""Movements of a block of the pilot, and what adds to its characteristics, the same each time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Circumstances:
+    """How and where a part is measured.
+
+    Parameters
+    ----------
+    machine : as its certificate states it.
+    poses : where the part lies; several where nobody knows, each as likely.
+    surroundings : temperatures.
+    forms : what is known of the form of its features.
+    repeats : of each point, of whose readings the mean is taken.
+    further : causes of another kind, of the plan's points.
+    measured : (n, 3) points of the part as they were measured, in its frame, mm, about which errors are then drawn: a position
+        that is off errs as a distance does. The nominal points without them, and of a part whose
+        whole surfaces are drawn.
+    """
+
+    machine: MachineState
+    poses: tuple[Pose, ...] = (Pose(),)
+    surroundings: Surroundings = field(default_factory=Surroundings)
+    forms: tuple[Form, ...] = ()
+    repeats: int = 1
+    further: tuple[Cause, ...] = ()
+    measured: Floats | None = None
+
+
+class AtPose:
+    """Virtual measurements of a part in one place.
+
+    Parameters
+    ----------
+    plan : of the measurement.
+    given : its circumstances.
+    pose : the place.
+    known : features that were looked at in another place (:class:`Evaluator`).
+    pilot : draws by which the measurement of what is never negative is turned round; fewer, a quarter at least, of a plan of
+        thousands of points.
+
+    Attributes
+    ----------
+    base : (n, 3) by how much points are displaced without any draw, mm.
+    still : (c,) characteristics of the part: as measured, less ``base``, or of the nominal one.
+
+    Raises
+    ------
+    CmmUqError : see :class:`Evaluator`, and an axis beyond its travel.
+    """
+
+    def __init__(
+        self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None, pilot: int = PILOT
+    ) -> None:
+        surroundings = given.surroundings.since(given.machine.temperature_c)
+        self.points = points = placed(plan, pose, given.machine.machine, surroundings.columns)
+        qualified = Qualified.on(plan, points, given.machine.machine)
+        unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
+        own, on_surface = forms(given.forms, plan)
+        beside = None if given.measured is None else given.measured - plan.points
+        self.causes: list[Cause] = [
+            modelled(given.machine, qualified, pose, beside),
+            *unmodelled,
+            *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
+            *styli(plan, pose),
+            *temperatures(surroundings, plan, points, pose),
+            *given.further,
+            *own,
+        ]
+        self.base = mean_errors(given.machine, qualified, pose, beside) + mean_expansion(
+            surroundings, plan, points, pose
+        )
+        self.pilot, self._inverses = _affordable(pilot, plan), dict[bool, dict[int, Inverse]]()
+        drawn = any(len(feature.surface) for feature in plan.features)
+        self.true: Evaluator | None = None
+        if drawn or given.measured is None:
+            self.still = characteristics_of(plan, plan.points, known)
+            self.measured = Evaluator(plan, self.base, self.causes, known)
+            self.inferred, self.shift = list[int](), np.zeros_like(self.still)
+        else:
+            # what was measured has the mean errors in it: the part itself is without them
+            deviations = given.measured - self.base - plan.points
+            self.still = characteristics_of(plan, plan.points + deviations, known)
+            self.measured = Evaluator(plan, deviations, self.causes, known)
+            self.inferred = np.flatnonzero(never_negative(plan)).tolist()
+            self.measured.causes = [*self.causes, _multiples(deviations)]
+            self.shift = characteristics_of(plan, given.measured, known) - self.still
+        self._known = known
+        if drawn:
+            true = whole_surfaces(plan)
+            still: list[Cause | None] = [None] * (len(self.causes) - len(own))
+            self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
+
+    def condensed(self) -> AtPose:
+        """The same, of fewer coefficients: where nothing is taken exactly that is to first order, and features are large."""
+        plan, evaluator = self.measured.plan, self.measured
+        large = {one.name for one in plan.features if len(one.points) >= LARGE and one.kind != "point"}
+        if not large:
+            return self
+        on_points, derivative = evaluator.on_points(), evaluator.derivative()
+        found = copy(self)
+        found.causes = [condensed(cause, plan, on_points, derivative) for cause in self.causes]
+        beside = evaluator.causes[len(self.causes) :]
+        found.measured = Evaluator(plan, evaluator.base, [*found.causes, *beside], self._known, large & set(on_points))
+        found._inverses = {}
+        return found
+
+    def drawn(self, random: np.random.Generator, n: int) -> list[Drawn]:
+        """Coefficients (n, K) of each cause."""
+        return [cause.draw(random, n) for cause in self.causes]
+
+    def moved(self, coefficients: Sequence[Drawn]) -> Floats:
+        """(n, p, 3) displacements of the plan's p points beyond ``base``, mm."""
+        return self.measured.moved(self._given(coefficients), slice(None))
+
+    def errors(self, coefficients: Sequence[Drawn], *, exact: bool = False, inferred: bool = True) -> Floats:
+        """(n, c) errors of the characteristics.
+
+        Where points were measured as x, mean errors b are taken off: q = x − b. What has a sign or a size errs by
+        f(q + d) − f(q) with errors d, beside the mean f(x) − f(q). What is never negative errs by f(x) less its true value,
+        which follows from f(q + d) by turning the measurement round (``inverse``). Without measured
+        points, and with a form that is drawn on whole surfaces, all errs by what is measured less what is true.
+
+        Parameters
+        ----------
+        inferred : whether measurements are turned round; else what is never negative errs as all else does, which takes less
+            time and compares places as well.
+        """
+        found = self.read(coefficients, exact=exact)
+        true = self.still if self.true is None else self.true(coefficients, exact=exact)
+        errors = found + self.shift - true
+        for i, inverted in (self._inverse(exact=exact) if inferred else {}).items():
+            errors[:, i] = self.shift[i] + self.still[i] - inverted(found[:, i])
+        return errors
+
+    def prepare(self, *, exact: bool) -> None:
+        """Turn the measurement round, once for all draws."""
+        self._inverse(exact=exact)
+
+    def read(self, coefficients: Sequence[Drawn], *, exact: bool = False) -> Floats:
+        """(n, c) characteristics as they would be measured, mm and rad.
+
+        Of the nominal part, with mean errors; of the part as it was measured, once more and without mean errors.
+        """
+        return self.measured(self._given(coefficients), exact=exact) + self._beside(coefficients)
+
+    def _beside(self, coefficients: Sequence[Drawn]) -> Floats:
+        """(n, c) of causes that move no point."""
+        found = np.zeros((len(coefficients[0]), len(self.still)))
+        for cause, drawn in zip(self.causes, coefficients, strict=True):
+            if isinstance(cause, Beside):
+                found += np.asarray(drawn) @ cause.adds
+        return found
+
+    def _given(self, coefficients: Sequence[Drawn]) -> list[Drawn | None]:
+        """Coefficients of the evaluator's causes: of errors, and none of further deviations of the part."""
+        return [*coefficients, *[None] * (len(self.measured.causes) - len(self.causes))]
+
+    def _inverse(self, *, exact: bool) -> dict[int, Inverse]:
+        """By place of what is never negative, the map from what is read to what is true."""
+        if exact not in self._inverses:
+            self._inverses[exact] = self._inverted(exact=exact) if self.inferred else {}
+        return self._inverses[exact]
+
+    def _inverted(self, *, exact: bool) -> dict[int, Inverse]:
+        """Of trial parts with zones of several widths, which may be what was measured with other errors (:func:`.alike`)."""
+        perfect = self.measured.movement([*[None] * len(self.causes), -np.ones((1, 1))], exact=exact)
+        blocks = self._pilot_blocks(exact=exact)
+        again = np.concatenate([self.measured.of(moved, exact=exact) + beside for moved, beside in map(_made, blocks)])
+        alone = np.concatenate(
+            [self.measured.of(moved.plus(perfect), exact=exact) + beside for moved, beside in map(_made, blocks)]
+        )
+        nodes = {
+            i: nodes_of(float(self.still[i]), alone[:, i]) for i in self.inferred if np.ptp(alone[:, i]) > ROUNDING
+        }
+        read: dict[int, list[Floats]] = {i: [] for i in nodes}
+        for moved, beside in map(_made, blocks):
+            for i, sizes in nodes.items():
+                read[i].append(self._trials(i, sizes, moved, perfect, exact=exact) + beside[:, i])
+        return {
+            i: inverse(float(self.still[i]), again[:, i], alone[:, i], sizes, np.concatenate(read[i], axis=1))
+            for i, sizes in nodes.items()
+        }
+
+    def _trials(self, i: int, sizes: Floats, moved: Movement, perfect: Movement, *, exact: bool) -> Floats:
+        """(m, n) as parts of ``sizes`` (m,) of a zone would be measured with the errors of ``moved``.
+
+        A trial part is what the part may be with another draw, its deviations so many times as its zone then has the size:
+        a part that is t away from the measured one, whose deviations are δ, becomes one that is (1 − λ)(−δ) + λt away.
+        """
+        only, perfect = (self.measured.needed(each, i) for each in (moved, perfect))
+        form = self.measured.evaluations[i].characteristic.what in FORMS
+        trial = trial_parts(only, perfect, self.measured.plan, form=form)
+        truly = self.measured.of(trial, exact=exact, only=i)[:, 0]
+        found = np.empty((len(sizes), len(truly)))
+        for k, size in enumerate(sizes):
+            like = alike(truly, size)
+            often = size / np.maximum(truly[like], ROUNDING)
+            part = trial.rows(like).times(often).plus(perfect.rows(np.zeros_like(like)).times(1 - often))
+            found[k] = self.measured.of(only.plus(part), exact=exact, only=i)[:, 0]
+        return found
+
+    def _pilot_blocks(self, *, exact: bool) -> list[_PilotBlock]:
+        """The pilot's blocks, made once and kept where all of them together are small."""
+        at_once = min(self.pilot, max(_BLOCK // len(self.points), 2))
+        counts = [min(at_once, self.pilot - first) for first in range(0, self.pilot, at_once)]
+        blocks = [partial(self._pilot_block, which, count, exact=exact) for which, count in enumerate(counts)]
+        return [cache(block) for block in blocks] if self.pilot * len(self.points) <= _KEPT else list(blocks)
+
+    def _pilot_block(self, which: int, count: int, *, exact: bool) -> tuple[Movement, Floats]:
+        drawn = self.drawn(np.random.default_rng([_PILOT_SEED, which]), count)
+        return self.measured.movement(self._given(drawn), exact=exact), self._beside(drawn)
+
+    def off(self, seed: int = 0, count: int = CHECKED) -> Floats:
+        """(c,) root mean square difference of what is read to first order from what is exactly, of its standard deviation."""
+        drawn = self.drawn(np.random.default_rng(seed), count)
+        exact = self.read(drawn, exact=True)
+        apart = self.read(drawn, exact=False) - exact
+        spread = np.maximum(exact.std(axis=0), ROUNDING)
+        return np.asarray(np.sqrt(np.mean(apart**2, axis=0)) / spread)
+
+
+def in_parts(plan: Plan, draws: int) -> list[int]:
+    """So many draws in parts, of no more points at once than memory should hold."""
+    at_once = max(2, (_AT_ONCE if len(plan.points) <= LARGE else _AT_ONCE_OF_MANY) // len(plan.points))
+    return [min(at_once, draws - first) for first in range(0, draws, at_once)]
+
+
+def _affordable(pilot: int, plan: Plan) -> int:
+    """So many draws, or fewer of a plan of thousands of points, a quarter at least."""
+    return max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
+
+
+def _multiples(deviations: Floats) -> Common:
+    """Deviations (n, 3) of a part, as often again as the coefficient says."""
+    return Common(name="part", factors=("deviations",), draw=normal(np.zeros(1)), basis=deviations[None])
+
+
+def _made(block: _PilotBlock) -> tuple[Movement, Floats]:
+    return block()
+
+
+class Virtual:
+    """Virtual measurements of a part in all of its places, to be drawn in blocks.
+
+    Parameters
+    ----------
+    plan, given : of the measurement, and its circumstances.
+    known : features that were looked at before (:class:`Evaluator`).
+    pilot : draws by which the measurement of what is never negative is turned round.
+
+    Attributes
+    ----------
+    known : those, and its own.
+    places : one a pose, of large features with as few coefficients as serve.
+    whole : the same with those of every point.
+    exact : whether nothing is taken to first order, because that is off by more than a hundredth of an uncertainty.
+    off : (c,) by how much first order is off in the first place, of the standard deviation.
+    """
+
+    def __init__(
+        self, plan: Plan, given: Circumstances, known: Known | None = None, pilot: int = PILOT
+    ) -> None:  # fmt: skip
+        self.plan = plan
+        self.known: Known = {} if known is None else known
+        self.places = [AtPose(plan, given, pose, self.known, pilot) for pose in given.poses]
+        self.off = self.places[0].off()
+        self.exact = bool(np.any(self.off > AGREES))
+        self.whole = self.places
+        if not self.exact:
+            self.places = [place.condensed() for place in self.places]
+
+    @property
+    def names(self) -> list[str]:
+        """Of the characteristics."""
+        return [one.name for one in self.plan.characteristics]
+
+    def errors(self, random: np.random.Generator, n: int) -> Floats:
+        """(n, c) errors, each place as often as the others."""
+        for place in self.places:
+            place.prepare(exact=self.exact)
+        if n < 2 * THREADED:
+            return self._drawn(random, n)
+        halves = n // 2, n - n // 2  # of streams of their own: the same numbers on any number of cores
+        with ThreadPoolExecutor(len(halves)) as threads:
+            return np.concatenate(list(threads.map(self._drawn, random.spawn(len(halves)), halves)))
+
+    def _drawn(self, random: np.random.Generator, n: int) -> Floats:
+        counts = np.full(len(self.places), n // len(self.places))
+        counts[random.permutation(len(counts))[: n - counts.sum()]] += 1
+        found = [
+            place.errors(place.drawn(random, part), exact=self.exact)
+            for place, count in zip(self.places, counts, strict=True)
+            for part in in_parts(self.plan, int(count))
+        ]
+        return np.concatenate(found)
+
+    @cached_property
+    def named(self) -> Mapping[str, Text]:
+        """By factor, why it should be told beside the result."""
+        return {name: why for cause in self.places[0].causes for name, why in cause.named.items()}
+
+    @property
+    def source(self) -> Source:
+        """The errors as outputs of a Monte Carlo."""
+        return Source(self.names, lambda random, n: np.ascontiguousarray(self.errors(random, n).T))
+
+    def simulated(self, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
+        """So many virtual measurements: means, covariance, intervals of the errors."""
+        return from_source(self.source, trials, coverage, seed)
+
+    def settled(self, coverage: float = 0.95, digits: int = 2, seed: int = 0) -> Simulated:
+        """As many as the digits of u that are asked for need (JCGM 101, 7.9), a hundred thousand at least."""
+        return settled_source(self.source, coverage, digits, seed, fewest_trials=FEWEST)

@@ -1,0 +1,163 @@
+"""What is advised to be measured next, as other rooms read it: set-ups, what they would part and show, and that in words.
+
+How such a plan is found is in :mod:`cmm_uq.analysis.planning.suggestion`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from cmm_uq.analysis.planning.placing import Placing, joined
+from cmm_uq.analysis.planning.repeats import repeated
+from cmm_uq.base.messages import Text, Verbatim, number, plural, say, semicolons
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.machine.physics.catalogue import every
+
+ODDS = 20.0
+"""Odds that a plan is expected to reach for every pair, whichever of the two is true."""
+
+_OF_FITS = ("radius_mm", "fit_rms_um", "n_points")
+"""Columns of a recording that tell of the fit that gave a point."""
+
+
+@dataclass(frozen=True)
+class Parting:
+    """Two effects that the recording cannot tell apart.
+
+    Parameters
+    ----------
+    effects : their names.
+    before : odds of the first over the second, by the recording.
+    after : odds of the true one over the other that are to be expected, the worse of the two cases.
+    """
+
+    effects: tuple[str, str]
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An effect that is to be shown.
+
+    Parameters
+    ----------
+    effect : its name.
+    amplitude : that is to be detected, over its prior standard deviation.
+    length : visible length from which on it is detected.
+    """
+
+    effect: str
+    amplitude: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How well an effect that was not seen will show.
+
+    Parameters
+    ----------
+    effect : its name.
+    before, after : smallest amplitude that is detected, over its prior standard deviation; infinite where none is.
+    """
+
+    effect: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class NextPlan:
+    """What to measure next.
+
+    Parameters
+    ----------
+    placings : set-ups, in this order.
+    repeats : how often each is measured.
+    first : number of the first as a measurement.
+    partings : pairs, with the odds before and after.
+    shown : effects that were asked for.
+    reached : whether every pair reaches :data:`ODDS` and every effect shows as asked for.
+    box : (3, 2) the room for the artefact, scale readings, mm.
+    """
+
+    placings: tuple[Placing, ...]
+    repeats: int
+    first: int
+    partings: tuple[Parting, ...]
+    shown: tuple[Shown, ...]
+    reached: bool
+    box: Floats
+
+    @property
+    def points(self) -> Points:
+        """All of it as a recording at nominal coordinates, numbered on from what is recorded; without what fits told."""
+        points = joined(
+            [replace(each, points=repeated(each.points, self.repeats)) for each in self.placings], first=self.first
+        )
+        return replace(points, columns={k: v for k, v in points.columns.items() if k not in _OF_FITS})
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """What parts two effects.
+
+    Parameters
+    ----------
+    separates : names of the two effects.
+    what : in words.
+    repetitions : how often to measure each set-up.
+    odds : of the true one of the two over the other that are then to be expected.
+    """
+
+    separates: tuple[str, str]
+    what: Text
+    repetitions: int
+    odds: float
+
+
+def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
+    """A plan for each pair that it parts.
+
+    Parameters
+    ----------
+    plan : of all pairs together.
+    title : of the artefact.
+    """
+    if plan is None:
+        return ()
+    times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    return tuple(
+        Suggestion(
+            parting.effects,
+            say(
+                "Place the {title:small} at {ends} in scale readings and measure it {times}: odds of {odds} : 1 for the true "
+                "one are to be expected; by this recording they are {before} for {first} over {second}.",
+                title=title, ends=ends, times=times, odds=rounded(parting.after), before=odds_words(parting.before),
+                first=_title(parting.effects[0]), second=_title(parting.effects[1]),
+            ),
+            plan.repeats, parting.after,
+        )
+        for parting in plan.partings
+    )  # fmt: skip
+
+
+def _title(name: str) -> Text:
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
+
+
+def odds_words(odds: float) -> Text:
+    """Odds as ``3 : 1`` or ``1 : 3``."""
+    if odds >= 1:
+        return say("{odds} : 1", odds=rounded(odds))
+    return say("1 : {odds}", odds=rounded(1 / odds))
+
+
+def rounded(odds: float) -> Text:
+    """Odds of one or more, as many digits as they are worth."""
+    if odds >= 1000:
+        return say("more than 1000")
+    return number(odds, ".0f" if odds >= 10 else ".2g")

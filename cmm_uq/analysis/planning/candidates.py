@@ -1,0 +1,152 @@
+"""Candidate placings: the artefact in many places and attitudes inside the machine's volume."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from cmm_uq.analysis.planning.directions import PLANES, attitudes_of_lines
+from cmm_uq.analysis.planning.placing import Pattern, Placing
+from cmm_uq.analysis.planning.setting import Setting, Start
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model.artefact import Artefact
+
+THIRDS = (0.0, 0.5, 1.0)
+_FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+Shape = Callable[[Floats], Pattern | None]
+"""The pattern for an attitude; ``None`` where it does not fit."""
+
+Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
+"""Ways of setting up an artefact that the fixtures of a volume allow, by their words."""
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """A recorded artefact, that stands by itself in each placing, set up in other places.
+
+    Parameters
+    ----------
+    attitudes : in which it is set up, beside that of the recording.
+    """
+
+    attitudes: Attitudes
+
+    def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[Placing, ...]:
+        """The first recorded placing, once, in many places and attitudes.
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
+        pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
+        return self.like(pattern, attitude, volume, count)
+
+    def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[Placing, ...]:
+        """A pattern in other places; first of all in the recorded attitude (3, 3).
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        ways = [(say("as recorded"), recorded), *self.attitudes(volume)]
+        return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
+
+
+@dataclass(frozen=True)
+class Everywhere:
+    """Candidates of an artefact that stands by itself in each placing.
+
+    Parameters
+    ----------
+    attitudes : in which it is set up.
+    shape : what is measured of it in one placing.
+    elsewhere : of a recorded one.
+    """
+
+    attitudes: Attitudes
+    shape: Callable[[Setting], Shape]
+    elsewhere: Elsewhere
+
+    def candidates(self, setting: Setting, start: Start | None) -> tuple[Placing, ...]:
+        """In many places: as the plan says, or as it was recorded.
+
+        Raises
+        ------
+        CmmUqError : there is none.
+        """
+        plan, volume = setting.plan, setting.volume
+        if start is not None and start.again is not None:
+            pattern, attitude, _ = Pattern.of_recording(start.again.points)
+            return self.elsewhere.like(pattern.once().repeated(plan.repeats), attitude, volume, plan.candidates)
+        return thinned(everywhere(volume, self.attitudes(volume), self.shape(setting)), plan.candidates, volume)
+
+
+def candidates(setting: Setting, start: Start | None = None) -> tuple[Placing, ...]:
+    """Placings that the volume and the fixtures allow, at most as many as the plan says.
+
+    Raises
+    ------
+    CmmUqError : there is none.
+    """
+    return setting.planning.candidates(setting, start)
+
+
+def along_lines(volume: Volume) -> list[tuple[Text, Floats]]:
+    """Attitudes of a bar or gauge, held along its length."""
+    return [(title, way) for title, way in attitudes_of_lines(volume.size) if volume.allows(way[:, 0])]
+
+
+def across_planes(volume: Volume) -> list[tuple[Text, Floats]]:
+    """Attitudes of a plate, held by its normal."""
+    return [(title, way) for title, way in PLANES if volume.allows(way[:, 2])]
+
+
+def upright(volume: Volume) -> list[tuple[Text, Floats]]:
+    """The one attitude of what looks alike from all sides."""
+    return [(say("upright"), np.eye(3))]
+
+
+def thinned(placings: Iterator[Placing], count: int, volume: Volume) -> tuple[Placing, ...]:
+    """At most so many of them, spread evenly over the list.
+
+    Raises
+    ------
+    CmmUqError : there are none at all.
+    """
+    found = tuple(placings)
+    if not found:
+        raise CmmUqError(
+            "no placing is possible: the artefact does not fit the volume in any direction that the fixtures allow",
+            where="job.toml [plan]",
+            fix=f"The volume is {' × '.join(f'{v:.0f}' for v in volume.size)} mm; allow other directions or heights, or use "
+            "a smaller artefact",
+        )
+    if len(found) <= count:
+        return found
+    return tuple(found[i] for i in np.unique(np.linspace(0, len(found) - 1, count).round().astype(int)))
+
+
+def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Shape) -> Iterator[Placing]:
+    """Every attitude in the corners, on the edges and in the middle of the room that it has."""
+    steps = _FIFTHS if len(ways) < 4 else THIRDS
+    for title, attitude in ways:
+        pattern = shape(attitude)
+        room = None if pattern is None else volume.room(pattern.turned(attitude))
+        if pattern is None or room is None:
+            continue
+        spare = room[:, 1] - room[:, 0]
+        seen: set[tuple[float, ...]] = set()
+        for place in product(steps, repeat=3):
+            middle = room[:, 0] + spare * place
+            key = tuple(middle.round(3).tolist())
+            if key not in seen:
+                seen.add(key)
+                yield pattern.placed(volume.machine, attitude, middle, title)

@@ -1,0 +1,152 @@
+"""Better plans: placings chosen one after the other, then exchanged as long as that helps.
+
+Greedy choice with exchange (Fedorov 1972, *Theory of Optimal Experiments*) over candidate placings, whose information adds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.analysis.planning.information import Told
+from cmm_uq.analysis.planning.separation import cosines, left_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+
+CRITERIA = ("separation", "D", "A", "worst")
+
+_FLOOR = 1e-3
+"""Square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others."""
+
+_GAIN = 1e-6
+"""Least gain in the score by which a placing is chosen; else the one that tells most of everything."""
+
+_BETTER = 1e-9
+_MOST_TRIES = 2000
+
+Score = Callable[[Floats], Floats]
+"""What is to become small, (c,), of information (c, k, k)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """What a search ends with.
+
+    Parameters
+    ----------
+    indices : of the candidates taken, in ascending order.
+    after, before : score with and without them; smaller is better.
+    """
+
+    indices: tuple[int, ...]
+    after: float
+    before: float
+
+
+def score_of(criterion: str, told: Told, targets: Sequence[int]) -> Score:
+    """A criterion as a function of information.
+
+    Parameters
+    ----------
+    criterion : ``D`` (volume of the uncertainty ellipsoid), ``A`` (mean of variances) and ``worst`` (largest variance) of the
+        targets, in units of their prior standard deviations, as logarithms of a variance; ``separation``: mean of −ln sin²
+        over pairs of targets, each pair with everything that is not a target fitted.
+    told : for what must be fitted besides.
+    targets : rows of the effects that count.
+
+    Raises
+    ------
+    CmmUqError : an unknown criterion, or fewer targets than it compares.
+    """
+    targets = list(targets)
+    least = 2 if criterion == "separation" else 1
+    if criterion not in CRITERIA:
+        raise CmmUqError(f"no criterion {criterion!r}", fix=f"Known: {', '.join(CRITERIA)}")
+    if len(targets) < least:
+        raise CmmUqError(
+            f"the criterion {criterion!r} needs at least {least} effects", where="job.toml [plan]",
+            fix="Name more effects, or rivals to tell apart",
+        )  # fmt: skip
+    if criterion == "separation":
+        base = [i for i in range(len(told.prior)) if i not in targets]
+        upper = np.triu_indices(len(targets), 1)
+
+        def apart(information: Floats) -> Floats:
+            alone = np.einsum("...ii->...i", information)[..., targets]
+            sine = 1 - cosines(left_of(information, targets, base), alone)[..., upper[0], upper[1]] ** 2
+            return np.asarray(-np.log(sine + _FLOOR).mean(axis=-1))
+
+        return apart
+    nuisance = told.nuisance
+    effects = [i for i in range(len(told.prior)) if i not in nuisance]
+    at = [effects.index(i) for i in targets]
+
+    def uncertain(information: Floats) -> Floats:
+        left = left_of(information, effects, nuisance) + np.eye(len(effects))
+        covariance = np.linalg.inv(left)[..., at, :][..., :, at]
+        if criterion == "D":
+            return np.asarray(np.linalg.slogdet(covariance)[1] / len(targets))
+        variances = np.einsum("...ii->...i", covariance)
+        return np.asarray(np.log(variances.mean(axis=-1) if criterion == "A" else variances.max(axis=-1)))
+
+    return uncertain
+
+
+def step(score: Score, start: Floats, each: Floats) -> Floats:
+    """Score (c,) with each candidate (c, k, k) added to what there is (k, k): one step of the search."""
+    return score(start + each)
+
+
+def choose(told: Told, start: Floats, score: Score, count: int, *, again: bool = False) -> Chosen:
+    """Take ``count`` candidates, greedily, then exchange them one for one until nothing gains.
+
+    Where no single candidate improves the score (nothing is told apart by one placing alone), the one is taken that shrinks
+    the uncertainty ellipsoid of all effects together most.
+
+    Parameters
+    ----------
+    told : candidates.
+    start : (k, k) information of what is there already, certificates included.
+    score : see :func:`score_of`.
+    again : whether a candidate may be taken more than once; it may in any case once all are taken.
+    """
+    again = again or count > len(told.each)
+    everything = score_of("D", told, [i for i in range(len(told.prior)) if i not in told.nuisance])
+    taken: list[int] = []
+    information, before = start.copy(), float(score(start[None])[0])
+    now = before
+    for _ in range(count):
+        scores = _free(step(score, information, told.each), taken, again)
+        best = int(np.argmin(scores))
+        if scores[best] > now - _GAIN * (1 + abs(now)):
+            best = int(np.argmin(_free(step(everything, information, told.each), taken, again)))
+        taken.append(best)
+        information, now = information + told.each[best], float(scores[best])
+    return Chosen(*_exchanged(told, information, score, taken, again), before)
+
+
+def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
+    """Scores, infinite for candidates that must not be taken a second time."""
+    if not again:
+        scores = scores.copy()
+        scores[list(taken)] = np.inf
+    return scores
+
+
+def _exchanged(
+    told: Told, information: Floats, score: Score, taken: list[int], again: bool
+) -> tuple[tuple[int, ...], float]:
+    """Exchange one for one, in turn, until a whole round gains nothing."""
+    now = float(score(information[None])[0])
+    at, unchanged, tries = 0, 0, 0
+    while unchanged < len(taken) and tries < _MOST_TRIES:
+        without = information - told.each[taken[at]]
+        scores = _free(step(score, without, told.each), taken, again)
+        best = int(np.argmin(scores))
+        unchanged, tries = unchanged + 1, tries + 1
+        if scores[best] < now - _BETTER * (1 + abs(now)):
+            taken[at], information, now, unchanged = best, without + told.each[best], float(scores[best]), 0
+        at = (at + 1) % len(taken)
+    return tuple(sorted(taken)), now

@@ -1,0 +1,196 @@
+"""What placings determine of the effects that a job names, from singular values of the whitened design.
+
+Least squares on a design needs no readings: which unknowns it determines, with what uncertainty, and which combinations it
+leaves free follow from the placings alone. Beside it stands what is left of the prior standard deviation that physics allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy import linalg
+
+from cmm_uq.analysis.planning.expected import Expected, expected
+from cmm_uq.analysis.planning.information import certified, gram, scales
+from cmm_uq.analysis.planning.noise import PlannedNoise, uncorrelated, white_noise
+from cmm_uq.analysis.planning.separation import FAINT, cosines, imitators, left_of, visible
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.least_squares import LeastSquares, solve
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+
+Pair = tuple[str, str, float]
+"""Two effects and the absolute cosine between them."""
+
+NOT_TOLD_APART = 0.98
+"""Cosine from which on two effects could hardly be told apart: a fifth of one is all that the other cannot imitate."""
+
+_ROUNDING = 1e-9
+
+WEAK = 0.1
+"""Part of the prior variance from which on a parameter counts as weakly determined."""
+
+
+@dataclass(frozen=True)
+class Determined:
+    """What to expect of one parameter.
+
+    Parameters
+    ----------
+    unknown : the parameter.
+    u : standard uncertainty of its least-squares estimate, in its unit; ``None`` where the placings leave it free.
+    u_with_prior : the same when what physics allows is used too.
+    u_white : like ``u``, if the noise were white.
+    status : ``determined``, ``weak`` (the prior says almost as much) or ``free``.
+    """
+
+    unknown: Unknown
+    u: float | None
+    u_with_prior: float
+    u_white: float | None
+    status: str
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """What placings determine.
+
+    Parameters
+    ----------
+    parameters : of the effects named, and the sizes of the artefact that no certificate gives.
+    free : combinations, each by the keys of its parameters and their parts, that leave every observation as it is.
+    singular_values : of the design whitened by the noise and scaled by the prior standard deviations, largest first.
+    alike : pairs of effects, and their cosine, that could not be told apart.
+    absorbed : effects, not named by the job, that would be taken for some that it names; with the names of these.
+    unseen : effects, not named by the job, of which nothing would show at all.
+    """
+
+    parameters: tuple[Determined, ...]
+    free: tuple[Mapping[tuple[str, str], float], ...]
+    singular_values: Floats
+    alike: tuple[Pair, ...]
+    absorbed: tuple[tuple[str, tuple[str, ...]], ...]
+    unseen: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every parameter is determined."""
+        return all(parameter.status != "free" for parameter in self.parameters)
+
+
+def identifiability(
+    model: MeasurementModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
+) -> Identifiability:  # fmt: skip
+    """What the placings of a model's artefact determine of its effects, and how rivals would show besides.
+
+    Parameters
+    ----------
+    model : effects that are to be determined, with the noise.
+    rivals : effects that might act and are not named.
+    noise : of the recording to be; ``None`` for the white noise that the model states.
+    """
+    values = np.array([unknown.prior_mean for unknown in model.unknowns])
+    linear = model.linearised(values)
+    estimate = solve(_enough(linear))
+    white = white_noise(model) if noise is None else noise.white
+    under_white = expected(model, white)
+    under_noise = under_white if noise is None else expected(model, noise)
+    information = gram(model, values, noise) + certified(model.unknowns)
+    named = _named_pairs(information, [unknown.key[0] for unknown in model.unknowns])
+    alike, absorbed, unseen = _among_rivals(model, rivals, noise) if rivals else ([], (), ())
+    return Identifiability(
+        _parameters(linear, estimate, under_noise, under_white), _free(estimate),
+        _singular_values(uncorrelated(model, values, noise), white.coordinate),
+        tuple(sorted([*named, *alike], key=lambda pair: -pair[2])), absorbed, unseen,
+    )  # fmt: skip
+
+
+def _enough(linear: LinearModel) -> LinearModel:
+    """The same with observations that say nothing, so that few placings are a finding and no error.
+
+    Columns of which the placing leaves nothing but rounding become zero, lest they determine each other.
+    """
+    k, free = len(linear.unknowns), linear.freedoms.dense()
+    whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
+    there = np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole
+    return replace(
+        linear, observed=np.concatenate([linear.observed, np.zeros(k + 1)]),
+        design=np.vstack([linear.design * there, np.zeros((k + 1, k))]),
+        placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
+        noise_scale=np.concatenate([linear.noise_scale, np.ones(k + 1)]),
+    )  # fmt: skip
+
+
+def _singular_values(linear: LinearModel, sigma: float) -> Floats:
+    free = [i for i, unknown in enumerate(linear.unknowns) if not unknown.known]
+    white = linear.reduced.design[:, free] * scales(linear.unknowns)[free] / sigma
+    return np.asarray(linalg.svdvals(white)) if white.size else np.zeros(0)
+
+
+def _parameters(
+    linear: LinearModel, estimate: LeastSquares, noisy: Expected, white: Expected
+) -> tuple[Determined, ...]:  # fmt: skip
+    scale, found = scales(linear.unknowns), []
+    for i, unknown in enumerate(linear.unknowns):
+        if unknown.known:
+            continue
+        u, u_white = (float(each.u[i]) if estimate.determined[i] else None for each in (noisy, white))
+        weak = unknown.key[0] != ARTEFACT and noisy.with_prior[i] ** 2 > WEAK * scale[i] ** 2
+        status = "free" if u is None else "weak" if weak else "determined"
+        found.append(Determined(unknown, u, float(noisy.with_prior[i]), u_white, status))
+    return tuple(found)
+
+
+def _free(estimate: LeastSquares) -> tuple[Mapping[tuple[str, str], float], ...]:
+    return tuple(
+        {u.key: float(part) for u, part in zip(estimate.unknowns, column, strict=True) if part}
+        for column in estimate.null_space.T
+    )
+
+
+def _among_rivals(
+    model: MeasurementModel, rivals: Sequence[Effect], noise: PlannedNoise | None
+) -> tuple[list[Pair], tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]:
+    """Pairs of rivals not told apart, everything named fitted; rivals taken for named effects; rivals that do not show."""
+    wider = replace(model, effects=(*model.effects, *rivals))
+    values = np.array([unknown.prior_mean for unknown in wider.unknowns])
+    information = gram(wider, values, noise) + certified(wider.unknowns)
+    names = [unknown.key[0] for unknown in wider.unknowns]
+    own = {effect.name for effect in model.effects} | {ARTEFACT}
+    fitted = [i for i, name in enumerate(names) if name in own]
+    others = [i for i, name in enumerate(names) if name not in own]
+    left, alone = left_of(information, others, fitted), np.diag(information)[others]
+    seen, cosine = visible(left, alone), cosines(left, alone)
+    alike = (cosine > NOT_TOLD_APART) & seen[:, None] & seen[None, :]
+    found = [
+        (names[others[a]], names[others[b]], float(cosine[a, b]))
+        for a, b in zip(*np.nonzero(np.triu(alike, 1)), strict=True)
+        if names[others[a]] != names[others[b]]
+    ]
+    hidden = [i for i, there in zip(others, seen, strict=True) if not there]
+    shown = {names[i] for i, there in zip(others, seen, strict=True) if there}
+    absorbed = {
+        names[i]: tuple(dict.fromkeys(names[j] for j in imitators(information, i, fitted)))
+        for i in hidden
+        if information[i, i] > FAINT and names[i] not in shown
+    }
+    unseen = [names[i] for i in hidden if names[i] not in shown and names[i] not in absorbed]
+    return found, tuple(absorbed.items()), tuple(dict.fromkeys(unseen))
+
+
+def _named_pairs(information: Floats, names: Sequence[str]) -> list[Pair]:
+    """Pairs of named effects, each with everything else fitted."""
+    found = []
+    effects = [i for i, name in enumerate(names) if name != ARTEFACT]
+    for i, j in combinations(effects, 2):
+        rest = [k for k in range(len(information)) if k not in (i, j)]
+        left, alone = left_of(information, [i, j], rest), np.diag(information)[[i, j]]
+        cosine = float(cosines(left, alone)[0, 1])
+        if names[i] != names[j] and np.all(visible(left, alone)) and cosine > NOT_TOLD_APART:
+            found.append((names[i], names[j], cosine))
+    return found

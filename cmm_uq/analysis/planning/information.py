@@ -1,0 +1,137 @@
+"""How much each placing tells of every unknown.
+
+The placing's own freedoms are projected out, the noise of placings is independent, and so their information adds (JCGM 101
+has no word for it; Atkinson, Donev & Tobias 2007, *Optimum Experimental Designs*, 5.1). Unknowns are in units of their prior
+standard deviation, a size of the artefact in units of a tenth of a millimetre.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.analysis.planning.noise import PlannedNoise, uncorrelated
+from cmm_uq.analysis.planning.placing import Placing, joined
+from cmm_uq.analysis.planning.setting import Setting
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.linear_model import Unknown
+
+_HELD = 1e12
+"""Information of a size that its certificate gives without uncertainty, 0.1 nm; more would hide all other by rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Information of placings, one matrix each.
+
+    Parameters
+    ----------
+    unknowns : k of them, effects first.
+    each : (c, k, k) of every placing; there may be more rows than unknowns, of freedoms that all placings share.
+    prior : (k, k) of the certificates, without that of the effects.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    each: Floats
+    prior: Floats
+
+    def where(self, effects: Sequence[Effect]) -> list[int]:
+        """Rows of some effects."""
+        names = {effect.name for effect in effects}
+        return [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] in names]
+
+    @property
+    def nuisance(self) -> list[int]:
+        """Rows of the artefact's sizes and of what all placings share."""
+        effects = [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] != ARTEFACT]
+        return [i for i in range(len(self.prior)) if i not in effects]
+
+
+def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...] = ()) -> Told:
+    """What each placing tells of the effects that the job names, and of some others.
+
+    Raises
+    ------
+    CmmUqError : an effect needs what these placings do not give.
+    """
+    plan = setting.plan
+    points = joined(
+        placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
+        columns=plan.columns,
+    )  # fmt: skip
+    if setting.planning.shared:
+        return shared(setting.model(points, also), setting.noise)
+    numbers = np.unique(points.measurement)
+    models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
+    matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise) for model in models]
+    return Told(models[0].unknowns, np.stack(matrices), certified(models[0].unknowns))
+
+
+def whole(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:
+    """Information (k, k) of a whole recording, in the rows of :func:`told`, without that of certificates."""
+    model = setting.model(points, also)
+    if setting.planning.shared:
+        return np.asarray(shared(model, setting.noise).each.sum(axis=0), dtype=np.float64)
+    return gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise)
+
+
+def gram(model: MeasurementModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
+    """Information (k, k) of all that a model's recording says about the parameters (k,), without any prior.
+
+    Parameters
+    ----------
+    noise : in its typical sizes; ``None`` for the white noise that the model states.
+    """
+    white = _white(model, values, noise)
+    return np.asarray(white.T @ white, dtype=np.float64)
+
+
+def by_measurement(model: MeasurementModel, values: Floats) -> Floats:
+    """The same for each measurement (c, k, k), in ascending order, under the white noise that the model states."""
+    white = _white(model, values, None)
+    index = np.unique(model.artefact.measurement[model.used], return_inverse=True)[1].ravel()
+    return np.stack([rows.T @ rows for rows in (white[index == i] for i in range(int(index.max()) + 1))])
+
+
+def _white(model: MeasurementModel, values: Floats, noise: PlannedNoise | None) -> Floats:
+    """Design (m, k) over the noise, the placing projected out, in the units of :func:`scales`."""
+    linear = uncorrelated(model, values, noise)
+    return np.asarray(linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise))
+
+
+def scales(unknowns: Sequence[Unknown]) -> Floats:
+    """(k,) unit of each unknown: the prior standard deviation of an effect, a tenth of a millimetre of a size."""
+    return np.array([unknown.scale for unknown in unknowns])
+
+
+def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
+    """Information (k + more, k + more) of the certificates."""
+    values = np.zeros(len(unknowns) + more)
+    for i, unknown in enumerate(unknowns):
+        if unknown.known:
+            values[i] = min((unknown.scale / unknown.prior_sd) ** 2, _HELD) if unknown.prior_sd > 0 else _HELD
+    return np.diag(values)
+
+
+def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Told:
+    """Information of each measurement of a recording whose placing's freedoms are common to all of them: a swept bar."""
+    values = np.array([u.prior_mean for u in model.unknowns])
+    linear = uncorrelated(model, values, noise)
+    rows = np.hstack([linear.design * scales(linear.unknowns), linear.freedoms.dense()])
+    rows = rows / (linear.noise_scale[:, None] * _sigma(model, noise))
+    numbers, index = np.unique(model.artefact.measurement, return_inverse=True)
+    each = np.zeros((len(numbers), rows.shape[1], rows.shape[1]))
+    np.add.at(each, index.ravel(), rows[:, :, None] * rows[:, None, :])
+    return Told(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
+
+
+def _sigma(model: MeasurementModel, noise: PlannedNoise | None) -> float:
+    sigma = model.sigma if noise is None else noise.coordinate
+    if sigma is None:
+        raise ValueError("the information of a measurement needs the noise")
+    return sigma

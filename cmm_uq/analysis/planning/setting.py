@@ -1,0 +1,185 @@
+"""What planning needs to know of a job, together: the artefact, the wishes, the room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from cmm_uq.analysis.planning.noise import PlannedNoise
+from cmm_uq.analysis.planning.placing import Placing
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Machine, Points
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.earlier_noise import noise_file, noise_found
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.kind import Kind, Observe
+from cmm_uq.machine.physics.catalogue import effects, every
+from cmm_uq.machine.physics.effect import CONTRACT, Effect
+
+ASSUMED_NOISE_UM = 1.0
+"""Standard uncertainty of a coordinate where the job states none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """What there is before better placings are searched for.
+
+    Parameters
+    ----------
+    artefact : at the placings of a recording or of a ready plan.
+    again : the first placing of the recording, to be set up elsewhere; ``None`` without a recording.
+    """
+
+    artefact: Artefact
+    again: Placing | None
+
+
+@dataclass(frozen=True)
+class Planning:
+    """What a kind of measurement offers to planning.
+
+    Parameters
+    ----------
+    ready : plans by name, the usual one first.
+    candidates : placings that volume and fixtures allow, at most as many as the plan says.
+    elsewhere : a recorded artefact in other places and attitudes, once in each, at most so many.
+    shared : whether the freedoms of its placing are common to all measurements, so that their information does not add.
+    sought : whether it is sizes of the artefact that are sought, so that no effect need be named.
+    free : what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
+    """
+
+    ready: Mapping[str, Callable[[Setting], tuple[Placing, ...]]]
+    candidates: Callable[[Setting, Start | None], tuple[Placing, ...]]
+    elsewhere: Callable[[Artefact, Volume, int], tuple[Placing, ...]] | None = None
+    shared: bool = False
+    sought: bool = False
+    free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """An artefact, a plan's wishes, and the room for it.
+
+    Parameters
+    ----------
+    artefact : as the job describes it.
+    observe, planning : makes an artefact of that and of points; what its kind offers here.
+    plan : ``[plan]``.
+    volume : room.
+    named : effects that the job's model names.
+    sigma : standard uncertainty of one coordinate, mm.
+    stated : the same as the job states it; ``None`` where it does not.
+    noise : with its set-up offsets; ``None`` where it is taken as white.
+    """
+
+    artefact: ArtefactFacts
+    observe: Observe | None
+    planning: Planning
+    plan: PlanFacts
+    volume: Volume
+    named: tuple[Effect, ...]
+    sigma: float
+    stated: float | None = None
+    noise: PlannedNoise | None = None
+
+    @classmethod
+    def of(cls, job: Job, kind: Kind) -> Setting:
+        """What a job says, which is of this kind.
+
+        Raises
+        ------
+        CmmUqError : the kind cannot be planned; no effect is named, or one is unknown; the volume is not known.
+        """
+        facts, plan = job.facts, job.facts.plan
+        planning = kind.needs("plan", Planning, "planned")
+        observe = kind.observing("planned") if planning.free is None else None
+        if not (facts.model.effects or planning.sought) and planning.free is None:
+            raise CmmUqError("no effect is named, so there is nothing to determine", where="job.toml [model] effects",
+                             fix="Name the error factors that the measurement shall determine")  # fmt: skip
+        recorded = job.points.carriages if len(job.points) else None
+        stated, noise = facts.recording.u_coordinate_um, _noise(job)
+        return cls(
+            facts.artefact, observe, planning, plan, Volume.of(job.points.machine, plan, recorded),
+            effects(facts.model.effects, where="job.toml [model] effects"), noise.coordinate,
+            None if stated is None else stated * MICROMETRE, noise,
+        )  # fmt: skip
+
+    @property
+    def machine(self) -> Machine:
+        """That is measured."""
+        return self.volume.machine
+
+    def sized(self, points: Points) -> Setting:
+        """The same with the artefact's length as these points show it, where its certified figures stand in the recording.
+
+        Without it each placing would take the longest distance of its own for the one that the certificate speaks of.
+        """
+        if not self.artefact.with_references or self.artefact.length_mm is not None:
+            return self
+        longest = self.observed(points).sizes[0].nominal
+        return replace(self, artefact=self.artefact.model_copy(update={"length_mm": longest}))
+
+    def model(self, points: Points, also: tuple[Effect, ...] = ()) -> MeasurementModel:
+        """The model that the job names, with further effects, of the artefact at these points."""
+        return MeasurementModel(self.observed(points), (*self.named, *also), self.sigma)
+
+    def observed(self, points: Points) -> Artefact:
+        """The artefact at these points."""
+        if self.observe is None:
+            raise ValueError("a kind that names no effects has no artefact")
+        return self.observe(self.artefact, points)
+
+    def rivals(self, points: Points) -> tuple[Effect, ...]:
+        """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here.
+
+        Effects with a nonlinear parameter are left out: how well one is seen depends on its value.
+
+        Raises
+        ------
+        CmmUqError : the plan lists an unknown effect, or one whose columns will not be recorded.
+        """
+        named = {effect.name for effect in self.named}
+        if self.plan.rivals is not None:
+            where = "job.toml [plan] rivals"
+            artefact = self.observed(points)
+            chosen = tuple(artefact.acting(effect) for effect in effects(self.plan.rivals, where=where))
+            for effect in chosen:
+                if missing := [column for column in effect.columns if column not in points.columns]:
+                    raise CmmUqError(f"{effect.name} needs the column {missing[0]}, which this plan does not record",
+                                     where=where, fix="Leave it out, or give its value in [plan] columns")  # fmt: skip
+            return tuple(effect for effect in chosen if effect.name not in named and not effect.shape)
+        return tuple(
+            effect
+            for effect in every().values()
+            if effect.tier == CONTRACT
+            and effect.name not in named
+            and not effect.shape
+            and all(column in points.columns for column in effect.columns)
+        )
+
+
+def _noise(job: Job) -> PlannedNoise:
+    """What an earlier recording showed, and else what the job states.
+
+    Raises
+    ------
+    CmmUqError : what the job names is no results.json with the noise of a recording.
+    """
+    plan, stated = job.facts.plan, job.facts.recording.u_coordinate_um
+    name = noise_file(plan)
+    if name is None:
+        each = (stated or ASSUMED_NOISE_UM) * MICROMETRE
+        return PlannedNoise((each, each, each), _micrometres(plan.placing_um), _micrometres(plan.growth_um))
+    found = noise_found(job.inputs[name], str(job.folder / name))
+    x, y, z = (size * MICROMETRE for size in found.reading_um)
+    return PlannedNoise((x, y, z), _micrometres(found.placing_um), _micrometres(found.growth_um))
+
+
+def _micrometres(size: float | None) -> float | None:
+    return None if size is None else size * MICROMETRE

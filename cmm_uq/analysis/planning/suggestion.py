@@ -1,0 +1,389 @@
+"""What to measure next: the fewest set-ups that part all effects which a recording cannot tell apart.
+
+The artefact is set up as it was recorded, elsewhere, in other attitudes, and turned about its own axes. What each such set-up
+would add to the recording is known before it is measured. The odds of two effects are those that the diagnosis found; by how
+much more of them is to be expected follows from the size at which each explains the recording, with everything else fitted
+anew. Which of the two is true is not known: what counts is the worse case.
+
+Where it is asked for, the set-ups also show effects that the recording would not have shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from itertools import combinations
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis.comparison.explanations import shapes
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+from cmm_uq.analysis.planning.advice import ODDS, NextPlan, Parting, Shown, Wanted
+from cmm_uq.analysis.planning.exchange import Chosen, choose
+from cmm_uq.analysis.planning.information import Told, by_measurement, certified, gram, scales, shared
+from cmm_uq.analysis.planning.placing import Placing, appended
+from cmm_uq.analysis.planning.separation import left_of
+from cmm_uq.analysis.planning.setting import Planning
+from cmm_uq.analysis.planning.turned import turned_placings
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.kind import Observe, Observed
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.catalogue import every
+
+SET_UPS, REPEATS = 8, 10
+"""Most set-ups of a plan, and most repeats of each."""
+
+_NEVER = 1e6
+"""Amplitude, over the prior standard deviation, of what does not show at all."""
+
+_UNSEEN = 1e-13
+"""Part of what an effect by itself would tell, that rounding may leave of one that is not seen."""
+
+_ROUNDING = 1e-9
+"""Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
+
+_HOPELESS = 3
+"""Repeats of a plan that cannot reach everything."""
+
+_WORTH = 0.1
+"""Least gain in the logarithm of odds for which a plan that does not reach everything is told."""
+
+_SAME_ODDS = 1e-9
+"""Of their logarithm, by rounding."""
+
+_CANDIDATES = 120
+_TURNED = 12
+"""Of the candidates, how many are tried turned besides."""
+
+_OF_A_GROUP = 5
+"""Effects of a group of which all pairs are parted."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Effects in each other's place, and the logarithm of the odds of each, up to a constant."""
+
+    names: tuple[str, ...]
+    log_odds: Floats
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Those that the recording does not part already by the odds that a plan aims at."""
+        log_odds = self.log_odds.tolist()
+        all_pairs = combinations(range(len(self.names)), 2)
+        return [(a, b) for a, b in all_pairs if abs(log_odds[a] - log_odds[b]) < np.log(ODDS) + _SAME_ODDS]
+
+
+@dataclass(frozen=True, eq=False)
+class _Information:
+    """Information of the recording (k, k), of each candidate (c, k, k) and of certificates (k, k).
+
+    ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits.
+    """
+
+    told: Told
+    names: tuple[str, ...]
+    fitted: frozenset[str]
+    recorded: Floats
+
+    def rows(self, name: str) -> list[int]:
+        """Of an effect."""
+        return [i for i, owner in enumerate(self.names) if owner == name]
+
+    def left(self, information: Floats, rows: Sequence[int], apart: Sequence[str]) -> Floats:
+        """What (..., r, r) is left on rows once what is fitted is, but for some effects."""
+        rest = [i for i, owner in enumerate(self.names) if owner in self.fitted and owner not in apart]
+        return left_of(information + self.told.prior, rows, rest)
+
+
+def next_plan(
+    diagnosis: Diagnosis,
+    facts: ArtefactFacts,
+    observe: Observe,
+    planning: Planning | None,
+    plan: PlanFacts | None = None,
+    wanted: Sequence[Wanted] = (),
+) -> NextPlan | None:
+    """The fewest set-ups, within the machine's travel or the recorded volume, that part all that cannot be told apart.
+
+    Parameters
+    ----------
+    diagnosis : with groups of effects that look alike.
+    facts : of the artefact.
+    observe : makes the artefact of facts and points.
+    planning : what its kind offers; without it nothing is planned.
+    plan : what the volume and the fixtures allow.
+    wanted : effects that are to be shown besides.
+
+    Returns
+    -------
+    plan, ``None`` where nothing is to be parted or shown, or no set-up helps. What it reaches of what is wanted it says.
+    """
+    groups = _groups(diagnosis)
+    if not (groups or wanted) or planning is None or planning.elsewhere is None:
+        return None
+    after = diagnosis.after
+    names = sorted({name for group in groups for name in group.names} | {one.effect for one in wanted})
+    model = _with_all(after, names)
+    if facts.with_references:  # one placing alone does not show how long the artefact is
+        facts = facts.model_copy(update={"length_mm": after.artefact.sizes[0].nominal})
+    try:
+        points = after.artefact.points
+        volume = Volume.of(points.machine, plan or PlanFacts(margin_mm=0.0), points.carriages)
+        places = planning.elsewhere(after.artefact, volume, _CANDIDATES)
+        if not planning.shared:
+            some = places[:: max(1, len(places) // _TURNED)]
+            places = (*places, *turned_placings(some, volume))
+        known = _information(after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
+    except CmmUqError:  # nowhere else to put it
+        return None
+    aims = _Aims(known, groups, (), _sizes(after, groups), _variances(diagnosis))
+    everything = known.recorded + known.told.each.sum(axis=0)
+    most = aims.amplitudes(everything[None], wanted)[0]
+    showing = [one for one, amplitude in zip(wanted, most, strict=True) if amplitude < _NEVER]
+    aims = replace(aims, wanted=tuple(showing))
+    found = _within_reach(aims)
+    if found is None:
+        return None
+    chosen, repeats = found
+    after_all = aims.after(chosen, repeats)
+    return NextPlan(
+        tuple(places[i] for i in chosen.indices), repeats, int(points.measurement.max()) + 1, aims.partings(after_all),
+        aims.shown(after_all), float(aims.short(after_all[None])[0]) <= 0, volume.box,
+    )  # fmt: skip
+
+
+def _groups(diagnosis: Diagnosis) -> list[_Group]:
+    """What cannot be told apart, with the odds by which the diagnosis says so."""
+    found = []
+    combinations_found = diagnosis.found.combinations
+    index = {str.__str__(e.name): i for i, e in enumerate(diagnosis.found.first.explanations)}
+    for names in diagnosis.indistinguishable:
+        taken = names[:_OF_A_GROUP]
+        instead: Mapping[int, float] = {}
+        if combinations_found is not None and names[0] in index:
+            instead = combinations_found.instead(diagnosis.found.chosen, index[names[0]])
+        odds = [1.0, *(instead.get(index.get(name, -1), 1.0) for name in taken[1:])]
+        found.append(_Group(taken, np.log(odds)))
+    return [group for group in found if group.pairs]
+
+
+def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
+    """Of a reading, which repeats average, and of a set-up, which they do not, over that of a coordinate as it was found.
+
+    Without repeats a recording does not tell one from the other: each then has half.
+    """
+    noise, points = diagnosis.noise, diagnosis.after.artefact.points
+    if int(points.group.max()) + 1 == len(np.unique(points.measurement)):
+        return 0.5, 0.5
+    offset = noise.placing.value / noise.coordinate.value if noise.coordinate.value > 0 else 0.0
+    return 1.0, offset**2
+
+
+def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel:
+    """The model with further effects, periods as found or the longest."""
+    shape = dict(after.shapes)
+    for name in names:
+        effect = after.artefact.acting(every()[name])
+        if effect.shape and name not in shape:
+            shape[name] = next(iter(shapes(effect, after.artefact.points)))
+    others = tuple(effect for effect in after.effects if effect.name not in names)
+    return replace(after, effects=(*others, *(every()[name] for name in names)), shapes=shape)
+
+
+def _information(
+    after: MeasurementModel,
+    model: MeasurementModel,
+    observe: Observed,
+    places: Sequence[Placing],
+    *,
+    shared_freedoms: bool,
+) -> _Information:
+    fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
+    joint = observe(appended(model.artefact.points, places))
+    together = MeasurementModel(joint, model.effects, model.sigma, shapes=model.shapes)
+    names = tuple(unknown.key[0] for unknown in together.unknowns)
+    if shared_freedoms:
+        whole = shared(together)
+        more = len(whole.prior) - len(names)
+    else:
+        values = np.array([unknown.prior_mean for unknown in together.unknowns])
+        whole, more = Told(together.unknowns, by_measurement(together, values), certified(together.unknowns)), 0
+    count = len(whole.each) - len(places)
+    recorded = whole.each[:count].sum(axis=0)
+    if not shared_freedoms and len(names) == len(model.unknowns):  # without observations that were set aside
+        recorded = gram(model, values)
+    told = replace(whole, each=whole.each[count:])
+    return _Information(told, (*names, *[ARTEFACT] * more), fitted, recorded)
+
+
+def _sizes(after: MeasurementModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
+    """Size of each effect of each group, by its first and its own name, without the others of the group."""
+    return {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
+
+
+def _size(after: MeasurementModel, name: str, group: Sequence[str]) -> Floats:
+    """Size at which one effect of a group, without the others, explains the recording, over its prior standard deviation."""
+    others = tuple(effect for effect in after.effects if effect.name not in group)
+    model = _with_all(replace(after, effects=others), [name])
+    try:
+        value = model.estimate().least_squares.value / scales(model.unknowns)
+    except (
+        CmmUqError,
+        np.linalg.LinAlgError,
+    ):  # alone it would have to be larger than any machine's: the largest, then
+        value = np.ones(len(model.unknowns))
+    return np.asarray([v for v, u in zip(value, model.unknowns, strict=True) if u.key[0] == name], dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Aims:
+    """What a plan shall reach.
+
+    Parameters
+    ----------
+    known : information of the recording and of candidates.
+    groups : of effects to part.
+    wanted : effects to show.
+    sizes : of the effects of groups.
+    variances : of a reading and of a set-up, over that of a coordinate.
+    """
+
+    known: _Information
+    groups: Sequence[_Group]
+    wanted: tuple[Wanted, ...]
+    sizes: Mapping[tuple[str, str], Floats]
+    variances: tuple[float, float]
+    _start: dict[tuple[int, int, int], float] = field(default_factory=dict)
+
+    def added(self, repeats: int) -> Floats:
+        """Information of each candidate (c, k, k) that is measured so often."""
+        reading, set_up = self.variances
+        return np.asarray(self.known.told.each / (reading / repeats + set_up))
+
+    def after(self, chosen: Chosen, repeats: int) -> Floats:
+        """Information (k, k) of the recording and what is added to it."""
+        return np.asarray(self.start + self.added(repeats)[list(chosen.indices)].sum(axis=0))
+
+    def short(self, information: Floats) -> Floats:
+        """By how much (c,) a plan falls short of all aims together, in logarithms; 0 where it reaches them."""
+        total = np.zeros(len(information))
+        for g, group in enumerate(self.groups):
+            left = self._of_group(information, g)
+            for a, b in group.pairs:
+                total += np.maximum(np.log(ODDS) - self._log_odds(left, g, a, b), 0.0)
+        if self.wanted:
+            goal = np.array([one.amplitude for one in self.wanted])
+            total += np.maximum(2 * np.log(self.amplitudes(information, self.wanted) / goal), 0.0).sum(axis=1)
+        return total
+
+    def partings(self, information: Floats) -> tuple[Parting, ...]:
+        """Every pair with its odds before, and with this information (k, k)."""
+        return tuple(
+            Parting(
+                (group.names[a], group.names[b]), float(np.exp(group.log_odds[a] - group.log_odds[b])),
+                float(np.exp(min(self._log_odds(left, g, a, b)[0], 50.0))),
+            )
+            for g, group in enumerate(self.groups)
+            for left in [self._of_group(information[None], g)]
+            for a, b in group.pairs
+        )  # fmt: skip
+
+    def shown(self, information: Floats) -> tuple[Shown, ...]:
+        """Every effect that is wanted, as it shows without and with this information (k, k)."""
+        both = np.stack([self.known.recorded, information])
+        found = self.amplitudes(both, self.wanted).T.tolist()
+        return tuple(Shown(one.effect, *amplitudes) for one, amplitudes in zip(self.wanted, found, strict=True))
+
+    def amplitudes(self, information: Floats, wanted: Sequence[Wanted]) -> Floats:
+        """Smallest amplitude (c, w) of each effect by itself that is detected, over its prior standard deviation."""
+        names = [one.effect for one in wanted]
+        rows = [self.known.rows(name)[0] for name in names]
+        left = np.einsum("...ii->...i", self.known.left(information, rows, names))
+        alone = np.einsum("...ii->...i", information)[..., rows]
+        there = left > _ROUNDING * np.maximum(alone, 1e-300)
+        length = np.array([one.length for one in wanted])
+        return np.asarray(np.where(there, length / np.sqrt(np.where(there, left, 1.0)), _NEVER))
+
+    def _of_group(self, information: Floats, g: int) -> Floats:
+        """What (c, r, r) is left on all rows of a group, effect by effect, once what else is fitted is."""
+        names = self.groups[g].names
+        rows = [row for name in names for row in self.known.rows(name)]
+        left = self.known.left(information, rows, names)
+        at = np.arange(len(rows))
+        left[:, at, at] += _UNSEEN * np.einsum("...ii->...i", information)[..., rows]  # what rounding leaves of nothing
+        return left
+
+    def _log_odds(self, left: Floats, g: int, a: int, b: int) -> Floats:
+        """Expected log odds (c,) of the true one of two over the other, the less of the two cases; see :meth:`_of_group`."""
+        log_odds = self.groups[g].log_odds
+        before = float(log_odds[a] - log_odds[b])
+        return np.minimum(before + self._gain(left, g, a, b), -before + self._gain(left, g, b, a))
+
+    def _gain(self, left: Floats, g: int, true: int, other: int) -> Floats:
+        """Expected log odds (c,) for the true one that a recording's own do not contain yet."""
+        key = g, true, other
+        if key not in self._start:
+            self._start[key] = float(self._expected(self._of_group(self.known.recorded[None], g), *key)[0])
+        return self._expected(left, *key) - self._start[key]
+
+    def _expected(self, left: Floats, g: int, true: int, other: int) -> Floats:
+        names = self.groups[g].names
+        ends = np.cumsum([0, *(len(self.known.rows(name)) for name in names)]).tolist()
+        rows, others = (range(ends[i], ends[i + 1]) for i in (true, other))
+        size = np.zeros(len(rows))  # further set-ups may have coefficients of their own, after those of the recording
+        size[: len(self.sizes[names[0], names[true]])] = self.sizes[names[0], names[true]]
+        return np.asarray(0.5 * np.einsum("i,cij,j->c", size, left_of(left, rows, others), size))
+
+    @cached_property
+    def start(self) -> Floats:
+        """Information (k, k) of the recording."""
+        return self.known.recorded
+
+
+def _within_reach(aims: _Aims) -> tuple[Chosen, int] | None:
+    """The plan for all aims but effects to show that would need too many set-ups, the one that needs most first."""
+    found = _fewest(aims)
+    while found is not None and found[0].after > 0 and aims.wanted:
+        shown = aims.amplitudes(aims.after(*found)[None], aims.wanted)[0]
+        missing = shown / np.array([one.amplitude for one in aims.wanted])
+        worst = int(np.argmax(missing))
+        if missing[worst] <= 1:
+            break
+        aims = replace(aims, wanted=aims.wanted[:worst] + aims.wanted[worst + 1 :])
+        nearer = _fewest(aims)
+        found = found if nearer is None else nearer
+    return found
+
+
+def _fewest(aims: _Aims) -> tuple[Chosen, int] | None:
+    """As few set-ups as reach all aims, each repeated no more often than that needs; what comes closest where none does."""
+
+    def chosen(count: int, repeats: int) -> Chosen:
+        told = replace(aims.known.told, each=aims.added(repeats))
+        return choose(told, aims.start, aims.short, count)
+
+    most = min(SET_UPS, len(aims.known.told.each))
+    best = chosen(most, REPEATS)
+    if best.before <= 0:
+        return None
+    if best.after > 0:
+        best = chosen(most, _HOPELESS)
+        return (best, _HOPELESS) if best.after < best.before - _WORTH else None
+    few, count = 0, most
+    while count - few > 1:
+        middle = (few + count) // 2
+        reached = chosen(middle, REPEATS).after <= 0
+        few, count = (few, middle) if reached else (middle, count)
+    few, repeats = 0, REPEATS
+    while repeats - few > 1:
+        middle = (few + repeats) // 2
+        reached = chosen(count, middle).after <= 0
+        few, repeats = (few, middle) if reached else (middle, repeats)
+    return chosen(count, repeats), repeats

@@ -1,0 +1,285 @@
+"""What was recorded beside the coordinates: values that cannot be, units, columns that stick or slipped by a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.screening.finding import Finding, at_lines, finding, span
+from cmm_uq.base.messages import Text, Verbatim, alternatives, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+
+Rows = NDArray[np.bool_]
+
+SCALES = tuple(f"temp_{a}_c" for a in AXES)
+TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bottom_c", "temp_air_c")
+
+LONGEST_PAUSE, SHORTEST_BALL = 6 * 3600.0, 0.6
+"""s between points of one placing that no operator waits, and that no machine probes a ball in."""
+
+_STUCK_ROWS, _STUCK_PART, _MOVING = 8, 0.15, 0.9
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Values that a column may have, and the units that others are mistaken in."""
+
+    low: float
+    high: float
+    why: Text
+    units: tuple[tuple[Text, float, float], ...] = ()
+
+    def wrong(self, values: Floats) -> Rows:
+        """(n,) outside the bounds."""
+        return np.asarray((values < self.low) | (values > self.high))
+
+    def unit(self, values: Floats) -> Text | None:
+        """The unit in which all these values are plausible: value · factor + offset."""
+        for name, factor, offset in self.units:
+            if not np.any(self.wrong(factor * values + offset)):
+                return name
+        return None
+
+
+_TEMPERATURE = Bounds(
+    -30.0, 55.0, say("no measuring room is so cold or hot; is it in °C?"),
+    ((say("kelvin"), 1.0, -273.15), (Verbatim("°F"), 5 / 9, -160 / 9), (say("thousandths of °C"), 1e-3, 0.0)),
+)  # fmt: skip
+
+BOUNDS: Mapping[str, Bounds] = MappingProxyType(
+    {
+        "radius_mm": Bounds(1e-9, np.inf, say("a radius is positive")),
+        "fit_rms_um": Bounds(0.0, np.inf, say("an rms is not negative")),
+        "n_points": Bounds(1.0, np.inf, say("a fit needs points")),
+        "humidity_pct": Bounds(0.0, 100.0, say("relative humidity lies between 0 and 100 %")),
+        "pressure_hpa": Bounds(
+            500.0, 1100.0, say("air pressure lies between 500 and 1100 hPa; is it in hPa?"),
+            (
+                (Verbatim("Pa"), 1e-2, 0.0), (Verbatim("kPa"), 10.0, 0.0), (Verbatim("bar"), 1e3, 0.0),
+                (Verbatim("inHg"), 33.86, 0.0),
+            ),
+        ),
+        "speed_mm_s": Bounds(0.0, np.inf, say("a speed is not negative")),
+        **dict.fromkeys(TEMPERATURES, _TEMPERATURE),
+    }
+)  # fmt: skip
+"""What each column may hold."""
+
+SENSORS = (*BOUNDS, "time_s")
+"""Columns that are left out where they cannot be trusted."""
+
+
+def column_findings(points: Points, *, balls: bool) -> list[Finding]:
+    """All that is odd beside the coordinates, a finding a column.
+
+    Parameters
+    ----------
+    points : the recording.
+    balls : whether its points are centres of balls or cylinders, each of several touches.
+    """
+    found = [*_impossible(points), *_fraction(points), *_time(points, balls), *_stuck(points), *_slipped(points)]
+    return [*found, *_approach(points)]
+
+
+def _impossible(points: Points) -> Iterator[Finding]:
+    for column, bounds in BOUNDS.items():
+        if column not in points.columns or not np.any(rows := bounds.wrong(points.columns[column])):
+            continue
+        values = points.columns[column][rows]
+        unit = bounds.unit(values)
+        told = say("{column} = {span}: {why}", column=Verbatim(column), span=span(values), why=bounds.why)
+        if unit is None:
+            yield finding("impossible", points, rows, told, column)
+        else:
+            yield finding(
+                "unit", points, rows, say("{told} It looks like {unit}: convert it", told=told, unit=unit), column
+            )
+
+
+def _fraction(points: Points) -> Iterator[Finding]:
+    humidity = points.columns.get("humidity_pct", np.zeros(0))
+    if np.any(humidity > 0) and np.all(humidity <= 1):
+        every = np.ones(len(points), dtype=bool)
+        why = say(
+            "humidity_pct = {span}: no air is so dry; it looks like a fraction of 1, not %: multiply by 100",
+            span=span(humidity),
+        )
+        yield finding("unit", points, every, why, "humidity_pct")
+
+
+def _time(points: Points, balls: bool) -> Iterator[Finding]:
+    """A clock in other units, seen by the time from point to point of one placing; single moments out of their order."""
+    if "time_s" not in points.columns:
+        return
+    time = points.columns["time_s"]
+    within = np.diff(points.group) == 0
+    steps = np.abs(np.diff(time))[within]
+    usual, every = float(np.median(steps)) if len(steps) else 0.0, np.ones(len(points), dtype=bool)
+    if usual > LONGEST_PAUSE:
+        yield finding(
+            "unit",
+            points,
+            every,
+            say(
+                "time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
+                "looks like milliseconds: divide by 1000",
+                usual=usual,
+            ),
+            "time_s",
+        )
+    elif balls and 0 < usual < SHORTEST_BALL:
+        yield finding(
+            "unit",
+            points,
+            every,
+            say(
+                "time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
+                "like minutes or hours: give seconds",
+                usual=usual,
+            ),
+            "time_s",
+        )
+    else:
+        yield from _moments(points, time)
+
+
+def _moments(points: Points, time: Floats) -> Iterator[Finding]:
+    """Moments that alone break the order of a clock, and keep it in milliseconds, minutes or hours."""
+    if len(time) < 8:
+        return
+    before, after = np.maximum.accumulate(time), np.minimum.accumulate(time[::-1])[::-1]
+    broken = np.flatnonzero((time[1:-1] > after[2:]) | (time[1:-1] < before[:-2])) + 1
+    for row in broken.tolist():
+        low, high = time[row - 1], time[row + 1]
+        if not low <= high or low <= time[row] <= high:
+            continue
+        rest = np.delete(time, row)
+        unit = next((u for f, u in ((1e-3, say("milliseconds")), (60.0, say("minutes")), (3600.0, say("hours")))
+                     if low <= f * time[row] * (1 + 1e-9) and f * time[row] <= high * (1 + 1e-9)), None)  # fmt: skip
+        if unit is not None and np.all(np.diff(rest) >= 0):
+            rows = np.array([row])
+            why = say(
+                "{at_lines}: time_s = {time:g} between {low:g} and {high:g} looks like {unit}: give seconds",
+                at_lines=at_lines(points, rows),
+                time=time[row],
+                low=low,
+                high=high,
+                unit=unit,
+            )
+            yield finding("unit", points, rows, why, "time_s")
+
+
+def _stuck(points: Points) -> Iterator[Finding]:
+    """A column that changed from placing to placing, and then stood still to the last digit for many of them."""
+    for column, values in _measured(points):
+        firsts = _firsts(points.group) if _constant_in_groups(points.group, values) else np.arange(len(values))
+        sequence = values[firsts]
+        start, length = _longest_run(sequence)
+        outside = np.concatenate([np.diff(sequence[: start + 1]), np.diff(sequence[start + length - 1 :])])
+        if length < max(_STUCK_ROWS, _STUCK_PART * len(sequence)) or len(outside) < _STUCK_ROWS:
+            continue
+        if np.mean(outside != 0) >= _MOVING:
+            last = firsts[start + length] if start + length < len(firsts) else len(values)
+            rows = np.arange(firsts[start], last)
+            why = say(
+                "{column} is stuck at {values:g} in {at_lines}, where it changed from placing to placing "
+                "before or after: look at the sensor",
+                column=Verbatim(column),
+                values=values[rows[0]],
+                at_lines=at_lines(points, rows),
+            )
+            yield finding("stuck", points, rows, why, column)
+
+
+def _slipped(points: Points) -> Iterator[Finding]:
+    """A column that belongs to whole placings and changes in the middle of each: moved by a row against the others."""
+    firsts = _firsts(points.group)
+    sizes = np.diff([*firsts, len(points)])
+    if len(firsts) < _STUCK_ROWS or sizes.min() < 2 or not _in_blocks(points.group):
+        return
+    for column, values in _measured(points):
+        if _constant_in_groups(points.group, values):
+            continue
+        ways = [
+            way for by, way in ((-1, say("down")), (1, say("up"))) if _of_placings(np.roll(values, by), firsts, sizes)
+        ]
+        if ways:
+            why = say(
+                "{column} changes inside every placing and would be the same for all points of each if it "
+                "were moved back: it is shifted {ways} by one row against the other columns: move it back",
+                column=Verbatim(column),
+                ways=alternatives(ways),
+            )
+            yield finding("shifted column", points, np.ones(len(points), dtype=bool), why, column)
+
+
+def _of_placings(values: Floats, firsts: Ints, sizes: Ints) -> bool:
+    """Whether a column is the same for all points of each placing, but for one at the edge, and changes between them."""
+    constant = [np.ptp(values[a : a + k]) == 0 for a, k in zip(firsts, sizes, strict=True)]
+    return bool(np.sum(constant) >= len(firsts) - 1 and np.mean(np.diff(values[firsts]) != 0) >= _MOVING)
+
+
+def _approach(points: Points) -> Iterator[Finding]:
+    """A probe travels against the outward normal."""
+    names = [f"approach_{a}" for a in AXES]
+    if not all(name in points.columns for name in (*names, "nx", "ny", "nz")):
+        return
+    travel = np.column_stack([points.columns[name] for name in names])
+    normals = np.column_stack([points.columns[f"n{a}"] for a in AXES])
+    outward = np.einsum("ni,ni->n", travel, normals) > 0.3
+    if not outward.any():
+        return
+    every = np.ones(len(points), dtype=bool)
+    for by, way in ((-1, say("down")), (1, say("up"))):
+        back = np.einsum("ni,ni->n", np.roll(travel, by, axis=0), normals) > 0.3
+        if outward.mean() > 0.1 and back.sum() <= 1:
+            why = say(
+                "approach_x, approach_y, approach_z are shifted {way} by one row against the normals: move them back",
+                way=way,
+            )
+            yield finding("shifted column", points, every, why, "approach_x")
+            return
+    if outward.mean() > 0.95:
+        why = say(
+            "approach_x, approach_y, approach_z point along the outward normal: no probe reaches a "
+            "surface from inside: turn their signs round"
+        )
+        yield finding("sign", points, outward, why, "approach_x")
+
+
+def _measured(points: Points) -> Iterator[tuple[str, Floats]]:
+    """Columns of sensors, which change as they like."""
+    for column in (*TEMPERATURES, "pressure_hpa", "humidity_pct"):
+        if column in points.columns:
+            yield column, points.columns[column]
+
+
+def _firsts(group: Ints) -> Ints:
+    """First row of every run of rows of one (measurement, repeat)."""
+    return np.concatenate([[0], np.flatnonzero(np.diff(group)) + 1])
+
+
+def _in_blocks(group: Ints) -> bool:
+    return len(_firsts(group)) == len(np.unique(group))
+
+
+def _constant_in_groups(group: Ints, values: Floats) -> bool:
+    return bool(np.all(np.diff(values)[np.diff(group) == 0] == 0))
+
+
+def _longest_run(values: Floats) -> tuple[int, int]:
+    """Start and length of the longest run of equal values."""
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1])
+    lengths = np.diff([*starts, len(values)])
+    longest = int(np.argmax(lengths))
+    return int(starts[longest]), int(lengths[longest])
+
+
+def about_whole_column(found: Finding, points: Points) -> bool:
+    """Whether half a column or more is concerned."""
+    concerned = np.isin(points.lines, found.lines) if found.lines else np.isin(points.measurement, found.measurements)
+    return found.column in points.columns and 2 * int(concerned.sum()) >= len(points)

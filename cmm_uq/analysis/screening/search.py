@@ -1,0 +1,257 @@
+"""What makes damaged points fit their artefact: copies, exchanges and every known mistake, undone in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.screening.changes import Change, changes, changes_of_blocks
+from cmm_uq.analysis.screening.finding import Finding, at_lines, finding
+from cmm_uq.analysis.screening.shape import Shape
+from cmm_uq.base.messages import Text, Verbatim, plural, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+
+MOST = 0.2
+"""Part of the rows that may be left out; with more damage the recording is refused."""
+
+_PART, _STRAYS = 0.2, 0.05
+_FEW, _MANY = 16, 60
+_MOST_BALLS = 400
+_SAME_PLACE = 10.0
+_TRAVEL_TOLERANCE = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """What happened to some rows, and all coordinates and references without it, where that is known."""
+
+    kind: str
+    rows: Ints
+    why: Text
+    column: str | None = None
+    mended: tuple[Floats, Floats] | None = None
+
+
+class Search:
+    """The points that miss an artefact, and what makes them fit.
+
+    Parameters
+    ----------
+    points : the recording.
+    shape : what its artefact asks of them.
+
+    Attributes
+    ----------
+    misfit : (n,) by how much each point misses the artefact, mm.
+    bad : (n,) points that miss it by too much, and a few that lie as far outside the travel as that is long.
+    """
+
+    def __init__(self, points: Points, shape: Shape) -> None:
+        self.points, self.shape = points, shape
+        self.misfit = shape.misfit(points.xyz, shape.reference)
+        self.bad = self._wrong(self.misfit)
+        sound = self.misfit[~self.bad]
+        usual = 0.05 + 10 * float(np.median(sound)) if len(sound) else np.inf
+        self._fine = min(shape.tolerance, usual)
+        self._placing = np.full(len(points), -1)
+        for i, rows in enumerate(shape.rows):
+            self._placing[rows] = i
+        self._inside = bool(np.any(outside_travel(points)[~self.bad], axis=1).mean() < _STRAYS) if len(sound) else False
+        self._xyz, self._reference = points.xyz, shape.reference
+        self._open, self._settled = self.bad.copy(), np.zeros(len(points), dtype=bool)
+
+    def findings(self) -> list[Finding]:
+        """What is damaged, by its cause where that is known, each with the rows to leave out."""
+        found = []
+        for causes in (self._copies(), self._swapped(_FEW), self._blocks(), self._swapped(_MANY), self._singles()):
+            for cause in causes:
+                self._settle(cause)
+                found.append(self._finding(cause))
+        groups = self.points.group if self.shape.together else np.arange(len(self.points))
+        unknown = [np.flatnonzero(self._open & (groups == group)) for group in np.unique(groups[self._open])]
+        why = say("no known mistake explains it: measure again")
+        return found + [self._finding(Cause("outlier", rows, why)) for rows in unknown]
+
+    def changed(self, change: Change, rows: Ints) -> tuple[Floats, Floats]:
+        """Coordinates and references with a mistake undone in some rows, beside those that are undone already."""
+        xyz, reference = self._xyz.copy(), self._reference.copy()
+        xyz[rows], reference[rows] = change.apply(xyz[rows], reference[rows])
+        return xyz, reference
+
+    def _wrong(self, misfit: Floats) -> NDArray[np.bool_]:
+        low, high = self.points.machine.travel_mm.T
+        beyond = np.maximum(low - self.points.carriages, self.points.carriages - high)
+        astray = np.any(beyond > high - low, axis=1)
+        missed = misfit > self.shape.tolerance
+        return np.asarray(missed | astray if astray.mean() <= MOST else missed)
+
+    def _settle(self, cause: Cause) -> None:
+        """Take rows whose damage is known out of the search, and look again at those that stand in their placings."""
+        self._settled[self._lost_with(cause.rows)] = True
+        if cause.mended is not None:
+            self._xyz, self._reference = cause.mended
+        again = np.isin(self._placing, self._placing[cause.rows])
+        misfit = self.shape.misfit(self._xyz, self._reference, self._placings(cause.rows))
+        self._open[again] = (self._wrong(misfit) & ~self._settled)[again]
+
+    def _finding(self, cause: Cause) -> Finding:
+        rows = cause.rows
+        amount = float(self.misfit[rows].max())
+        missed = (
+            say("the artefact is missed by {amount:.3g} mm, far more than any machine's error", amount=amount)
+            if np.isfinite(amount)
+            else say("the artefact is missed far more than any machine's error")
+        )
+        what = missed if amount > self.shape.tolerance else say("the readings lie far outside the travel")
+        told = say("{at_lines}: {what}; {why}", at_lines=at_lines(self.points, rows), what=what, why=cause.why)
+        lost = tuple(int(row) for row in self._lost_with(rows))
+        return replace(finding(cause.kind, self.points, rows, told, cause.column), set_aside=True, rows=lost)
+
+    def _lost_with(self, rows: Ints) -> Ints:
+        """Rows that cannot be used without these: the other end of a bar, the other corners of a triangle."""
+        return np.flatnonzero(np.isin(self.points.group, self.points.group[rows])) if self.shape.together else rows
+
+    def _placings(self, rows: Ints) -> list[int]:
+        return [int(i) for i in np.unique(self._placing[rows]) if i >= 0]
+
+    def _copies(self) -> Iterator[Cause]:
+        """Rows with all three coordinates of another row, where they do not fit; those of one block together."""
+        _, same = np.unique(self.points.xyz, axis=0, return_inverse=True)
+        rows, originals = [], []
+        for row in np.flatnonzero(self._open):
+            others = np.flatnonzero(same.ravel() == same.ravel()[row])
+            others = others[self._other_place(others, np.full(len(others), row))]
+            if len(others):
+                rows.append(row)
+                originals.append(others[0])
+        block, source = np.array(rows, dtype=np.int64), np.array(originals, dtype=np.int64)
+        offset = np.diff(block - source, prepend=0, append=0) if len(block) else block
+        for start, end in pairwise(sorted({0, *np.flatnonzero(offset).tolist(), len(block)})):
+            lines = at_lines(self.points, source[start:end])
+            why = plural(
+                end - start,
+                one=say("it has the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
+                many=say("they have the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
+            )
+            yield Cause("duplicate" if end - start == 1 else "repeated block", block[start:end], why)
+
+    def _other_place(self, rows: Ints, others: Ints) -> NDArray[np.bool_]:
+        keys = np.column_stack([self.points.measurement, self.points.point])
+        return np.asarray(np.any(keys[rows] != keys[others], axis=1))
+
+    def _swapped(self, most: int) -> Iterator[Cause]:
+        """Two points that fit once they are exchanged."""
+        rows = np.flatnonzero(self._open)
+        if len(rows) > most:
+            return
+        for pair in combinations(rows.tolist(), 2):
+            chosen = np.array(pair)
+            if not self._open[chosen].all() or (self.shape.together and np.ptp(self._placing[chosen]) == 0):
+                continue
+            xyz = self._xyz.copy()
+            xyz[chosen] = xyz[chosen[::-1]]
+            if self._fit(chosen, xyz, self._reference):
+                why = self._exchanged(chosen)
+                yield Cause("swapped", chosen, why, None, (xyz, self._reference))
+
+    def _exchanged(self, pair: Ints) -> Text:
+        one, other = (
+            say("point {point} of measurement {measurement}", point=point, measurement=measurement)
+            for point, measurement in zip(self.points.point[pair], self.points.measurement[pair], strict=True)
+        )
+        if self.shape.is_bar:
+            return say("{one} and {other}, or the other ends of these bars, are exchanged: exchange their coordinates",
+                       one=one, other=other)  # fmt: skip
+        return say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
+
+    def _blocks(self) -> Iterator[Cause]:
+        """Measurements, runs of rows and repeats that fit as a whole once one mistake is undone in all their rows."""
+        both = (*changes(self.shape), *changes_of_blocks(self.shape))
+        for rows in self._candidates():
+            if self._open[rows].mean() >= _PART and (cause := self._first(both, rows)) is not None:
+                yield cause
+        for rows in self._candidates():
+            if self._open[rows].mean() >= _PART and self._numbered_otherwise(rows):
+                why = say("its points seem numbered in another order than the references: number them alike")
+                yield Cause("swapped", rows, why)
+
+    def _candidates(self) -> Iterator[Ints]:
+        several = 1 if self.shape.together else 3
+        if self.shape.names or not self.shape.together:
+            for number in np.unique(self.points.measurement[self._open]):
+                yield np.flatnonzero(self.points.measurement == number)
+        rows = np.flatnonzero(self._open)
+        if len(rows) > several:
+            yield np.arange(rows[0], rows[-1] + 1)
+        for group in np.unique(self.points.group[self._open]):
+            rows = np.flatnonzero(self.points.group == group)
+            if len(rows) > several:
+                yield rows
+
+    def _singles(self) -> Iterator[Cause]:
+        every = changes(self.shape)
+        outside: NDArray[np.bool_] = np.any(outside_travel(self.points), axis=1)
+        rows = np.flatnonzero(self._open)
+        for row in rows[np.argsort(~outside[rows], kind="stable")].tolist():
+            if self._open[row] and (cause := self._stuck(row) or self._first(every, np.array([row]))) is not None:
+                yield cause
+
+    def _stuck(self, row: int) -> Cause | None:
+        """One coordinate repeated from the row before, digit for digit, while the others moved on."""
+        same = self.points.xyz[row] == self.points.xyz[row - 1] if row else np.zeros(3, dtype=bool)
+        if same.sum() != 1:
+            return None
+        column = f"{AXES[int(np.argmax(same))]}_mm"
+        why = say("{column} seems stuck at the value of the row before. Measure again", column=Verbatim(column))
+        return Cause("stuck", np.array([row]), why, column)
+
+    def _first(self, every: Iterable[Change], rows: Ints) -> Cause | None:
+        for change in every:
+            if change.edges and len(rows) < 4:
+                continue
+            xyz, reference = self.changed(change, rows)
+            if self._fit(rows, xyz, reference, change.edges):
+                why = say("{what}. {fix}", what=change.what, fix=change.fix)
+                return Cause(change.kind, rows, why, change.columns[0], (xyz, reference))
+        return None
+
+    def _fit(self, rows: Ints, xyz: Floats, reference: Floats, edges: int = 0) -> bool:
+        """Whether these rows fit as well as the sound ones, inside the travel as these are, where their repeats are."""
+        after = self.shape.misfit(xyz, reference, self._placings(rows))[rows]
+        return (
+            int(np.sum(after > self._fine)) <= edges
+            and not (self._inside and np.any(outside_travel(self.points.at(xyz))[rows]))
+            and self._near_repeats(rows, xyz) >= len(rows) - edges
+        )
+
+    def _near_repeats(self, rows: Ints, xyz: Floats) -> int:
+        """How many of some rows lie where sound repeats of the same points lie, or have none."""
+        near, points = 0, self.points
+        for row in rows:
+            same = (points.measurement == points.measurement[row]) & (points.point == points.point[row]) & ~self.bad
+            same[rows] = False
+            near += not same.any() or bool(np.linalg.norm(xyz[same] - xyz[row], axis=1).min() < _SAME_PLACE)
+        return near
+
+    def _numbered_otherwise(self, rows: Ints) -> bool:
+        """Whether a placing that does not fit by itself has the artefact's distances, in another order."""
+        if not self.shape.names[2:] or self.shape.names[0] == "nx" or len(rows) > _MOST_BALLS:
+            return False
+        xyz, reference = self.points.xyz[rows], self.shape.reference[rows]
+        if np.median(self.shape.misfit_of(xyz, reference, self.shape.size)) <= self.shape.tolerance:
+            return False
+        found, own = (
+            np.sort(np.linalg.norm(v[:, None] - v[None], axis=2)[np.triu_indices(len(v), 1)]) for v in (xyz, reference)
+        )
+        return bool(np.abs(found - own).max(initial=0.0) < self.shape.tolerance)
+
+
+def outside_travel(points: Points) -> NDArray[np.bool_]:
+    """(n, 3) whether a scale reading lies outside its travel."""
+    low, high = points.machine.travel_mm.T
+    readings = points.carriages
+    return np.asarray((readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE))

@@ -1,0 +1,1 @@
+"""The command line, the commands, the same from Python, and pages in a browser."""

@@ -1,0 +1,250 @@
+"""``cmm-uq instruments list | test | watch | new | simulate``: instruments and their profiles."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cmm_uq.app.cli.completion import profiles
+from cmm_uq.app.cli.deferred import defer_scipy
+from cmm_uq.app.cli.options import Json, examples
+from cmm_uq.app.cli.printing import put_data, say
+from cmm_uq.base.errors import CmmUqError, printable
+
+app = typer.Typer(
+    help="Instruments as live sources: which profiles are ready, one tried at its port, a new one from an example line.",
+    epilog=examples("instruments list", "instruments test fluke-1502a /dev/ttyUSB0"),
+    rich_markup_mode=None,
+    invoke_without_command=True,
+)
+
+SHOWN = 44
+"""Characters of a message beside what was understood of it."""
+
+What = Annotated[
+    str,
+    typer.Argument(
+        help="Ready profile, a TOML file, or with --job the name of a source in it.",
+        metavar="PROFILE",
+        autocompletion=profiles,
+    ),
+]
+Port = Annotated[
+    str,
+    typer.Argument(
+        help="/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME.",
+        metavar="PORT",
+        show_default="that of the job",
+    ),
+]
+Job = Annotated[
+    Path | None, typer.Option("--job", help="Job folder whose source is meant.", metavar="JOB", show_default="none")
+]
+
+
+@app.callback()
+def _alone(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        list_all()
+
+
+@app.command("list", epilog=examples("instruments list", "instruments list --json"))
+def list_all(json: Json = False) -> None:
+    """List the ready profiles and the serial ports of this computer."""
+    from cmm_uq.app.commands.instruments import listed
+
+    found = listed()
+    if json:
+        keys = ("name", "title", "tried")
+        put_data(
+            {"profiles": [dict(zip(keys, row, strict=True)) for row in found.profiles], "ports": dict(found.ports)}
+        )
+        return
+    wide = max(len(name) for name, _, _ in found.profiles)
+    for name, title, _ in found.profiles:
+        say(f"{name:{wide}}  {title}")
+    say()
+    for port, told in found.ports:
+        say(f"{port}  {told}".rstrip())
+    if not found.ports:
+        say("No serial port is here.")
+
+
+@app.command(
+    "test",
+    epilog=examples("instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job"),
+)  # fmt: skip
+def try_out(
+    profile: What,
+    port: Port = "",
+    job: Job = None,
+    seconds: Annotated[float, typer.Option(help="How long.", metavar="S", min=0.1, max=86400)] = 5.0,
+    json: Json = False,
+) -> None:
+    """Try an instrument for a few seconds: who it is, and each message beside what was understood of it.
+
+    Exit code 2 when nothing was, with what was seen, what was expected and what to check.
+    """
+    attempt = _attempt(profile, port, job)
+    for event in attempt.events(seconds):
+        if not json:
+            _show(event)
+    attempt.trial.conclude()
+    trial, identity = attempt.trial, attempt.source.identity()
+    if json:
+        put_data({
+            "identity": vars(identity), "messages": trial.messages, "with_values": trial.with_values, "wrong": trial.wrong,
+            "quantities": trial.quantities,
+        })  # fmt: skip
+        return
+    who = ", ".join(printable(f"{key} {value}") for key, value in vars(identity).items() if value and key != "name")
+    say()
+    say(f"{identity.name}: {who or 'does not say who it is'}")
+    say(f"{trial.messages} messages, {trial.with_values} with values, {trial.wrong} with something wrong")
+
+
+@app.command("watch", epilog=examples("instruments watch line-logger socket://logger:4001"))
+def watch(
+    profile: What,
+    port: Port = "",
+    job: Job = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="How long.", metavar="S", min=0.1, show_default="until it is interrupted")
+    ] = None,
+) -> None:
+    """Show each message beside what is understood of it, gaps and returns too, until it is interrupted."""
+    from cmm_uq.base.output.interruption import speaking
+
+    attempt = _attempt(profile, port, job)
+    with speaking(attempt.source.close):
+        for event in attempt.events(seconds):
+            _show(event)
+
+
+class Parity(StrEnum):
+    """Of a serial line."""
+
+    NONE, EVEN, ODD = "none", "even", "odd"
+
+
+@app.command(
+    "new",
+    epilog=examples(
+        "instruments new my-gauge.toml",
+        "instruments new my-gauge.toml --line 'T=20.13 C<CR><LF>' --quantity temp_c=1 --ask 'T?<CR>'",
+    ),
+)
+def new(
+    file: Annotated[Path, typer.Argument(help="New file: NAME.toml.", metavar="FILE")],
+    line: Annotated[
+        str,
+        typer.Option(
+            help="An example line with its end: T=20.13 C<CR><LF>.",
+            metavar="TEXT",
+            show_default="asked for on a terminal",
+        ),
+    ] = "",
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Name of a quantity with its unit at its end, and which number of the line it is: temp_c=1.",
+            metavar="NAME=N",
+            show_default="asked for on a terminal",
+        ),
+    ] = None,
+    limits: Annotated[
+        list[str] | None,
+        typer.Option("--range", help="Plausible values: temp_c=0:40.", metavar="NAME=LOW:HIGH", show_default="none"),
+    ] = None,
+    ask: Annotated[
+        str, typer.Option(help="What is sent to get a line: T?<CR>.", metavar="TEXT", show_default="nothing is sent")
+    ] = "",
+    every: Annotated[float, typer.Option(help="Seconds from one question to the next.", metavar="S", min=0.01)] = 1.0,
+    title: Annotated[
+        str, typer.Option(help="What the instrument is.", metavar="TEXT", show_default="the file's name")
+    ] = "",
+    baud: Annotated[int, typer.Option(help="Bits per second.", metavar="N", min=50)] = 9600,
+    bits: Annotated[int, typer.Option(help="Data bits.", metavar="N", min=5, max=8)] = 8,
+    parity: Annotated[Parity, typer.Option(help="Parity.", show_default="none")] = Parity.NONE,
+    stop: Annotated[int, typer.Option(help="Stop bits.", metavar="N", min=1, max=2)] = 1,
+) -> None:
+    """Write a profile from an example line; on a terminal it asks for what no option says."""
+    from cmm_uq.app.commands.instruments import write_profile
+    from cmm_uq.laboratory.live.instruments.draft import Drafted, range_of
+
+    settings = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
+    places = {_whole(text, name): name for name, text in _pairs(quantity, "--quantity", "temp_c=1")}
+    ranges = {name: range_of(text, name) for name, text in _pairs(limits, "--range", "temp_c=0:40")}
+    if not line:
+        if sys.stdin is None or not sys.stdin.isatty():
+            raise CmmUqError("no example line is given", where="--line", fix="Give one: --line 'T=20.13 C<CR><LF>'")
+        from cmm_uq.app.cli.asking_instrument import asked
+
+        line, places, ranges, ask, title, settings = asked(title or file.stem)
+    write_profile(file, Drafted(file.stem, title or file.stem, line, places, ranges, ask, every, settings))
+    say(str(file))
+    say(f"Try it: cmm-uq instruments test {file} PORT")
+
+
+@app.command("simulate", epilog=examples("instruments simulate fluke-1502a", "instruments simulate ipp"))
+def simulate(
+    profile: Annotated[str, typer.Argument(help="Ready profile.", metavar="PROFILE", autocompletion=profiles)],
+    way: Annotated[
+        str, typer.Option(help="pty (a port of this computer), socket or rfc2217.", metavar="WAY", show_default="pty")
+    ] = "",
+    seconds: Annotated[
+        float | None, typer.Option(help="How long.", metavar="S", min=0.1, show_default="until it is interrupted")
+    ] = None,
+) -> None:
+    """Be an instrument without hardware, at a port that is printed, until it is interrupted."""
+    from cmm_uq.app.commands.instruments import simulating
+
+    with simulating(profile, way) as port:
+        say(port)
+        sys.stdout.flush()
+        _wait(seconds)
+
+
+def _attempt(profile: str, port: str, job: Path | None) -> Any:
+    defer_scipy()
+    from cmm_uq.app.commands.instruments import Attempt
+
+    return Attempt(profile, port, job)
+
+
+def _show(event: Any) -> None:
+    from cmm_uq.laboratory.live.instruments.trial import beside
+
+    raw, told = beside(event)
+    shown = raw if len(raw) <= SHOWN else f"{raw[: SHOWN - 1]}…"
+    say(f"{shown:{SHOWN}}  {printable(told)}".rstrip())
+    sys.stdout.flush()
+
+
+def _wait(seconds: float | None) -> None:
+    import time
+
+    if seconds is not None:
+        time.sleep(seconds)
+    while seconds is None:
+        time.sleep(0.1)
+
+
+def _pairs(given: list[str] | None, option: str, like: str) -> list[tuple[str, str]]:
+    found = []
+    for text in given or ():
+        name, equals, value = text.partition("=")
+        if not equals or not name.strip() or not value.strip():
+            raise CmmUqError(f"{text!r} says nothing", where=option, fix=f"Write it as {like}")
+        found.append((name.strip(), value.strip()))
+    return found
+
+
+def _whole(text: str, name: str) -> int:
+    if not text.isdecimal():
+        raise CmmUqError(f"{text!r} is no number of the line", where=f"--quantity {name}", fix="Write it as temp_c=1")
+    return int(text)

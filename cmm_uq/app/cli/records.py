@@ -1,0 +1,199 @@
+"""``cmm-uq records verify | head | import | backup | restore | retain | migrate``: the history itself."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cmm_uq.app.cli import NOT_CONFORMING
+from cmm_uq.app.cli.options import Json, Quiet, Records, examples
+from cmm_uq.app.cli.printing import helped, put_data, say
+from cmm_uq.base.errors import CmmUqError, printable
+
+app = typer.Typer(
+    help="The history of machines and certificates: verified, backed up, imported, kept small, brought to a new version.",
+    epilog=examples("records import reports", "records verify --head HASH", "records backup records-2026.db"),
+    rich_markup_mode=None,
+)
+app.callback(invoke_without_command=True)(helped)
+
+SHOWN = 50
+"""Findings that are printed."""
+
+
+def _entries(count: int) -> str:
+    return "1 entry" if count == 1 else f"{count} entries"
+
+
+@app.command("verify", epilog=examples("records verify", "records verify --head 5f2c… --no-files"))
+def verify(
+    records: Records = None,
+    head: Annotated[
+        str | None,
+        typer.Option(
+            "--head", help="Hash that records head printed, filed elsewhere.", metavar="HASH", show_default="none"
+        ),
+    ] = None,
+    files: Annotated[bool, typer.Option("--files/--no-files", help="Compare the files of the reports too.")] = True,
+    json: Json = False,
+) -> None:
+    """Find every entry that was altered, deleted or exchanged, every table and file that is not as it was recorded.
+
+    Exit code 4 where something is wrong. Files that are gone are told; they may only have been moved.
+    """
+    from cmm_uq.laboratory.records import open_records
+
+    with open_records(records, read_only=True) as opened:
+        found = opened.verify(None if head is None else head.strip().lower(), files=files)
+        number, last = opened.head()
+    wrong = [finding for finding in found if finding.kind != "missing"]
+    if json:
+        put_data({
+            "records": str(opened.shown), "entries": number, "head": last, "sound": not wrong,
+            "findings": [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in found],
+        })  # fmt: skip
+    else:
+        for one in found[:SHOWN]:
+            say(
+                printable(
+                    f"{one.kind}: entry {one.entry}: {one.problem}" if one.entry else f"{one.kind}: {one.problem}"
+                )
+            )
+        if len(found) > SHOWN:
+            say(f"and {len(found) - SHOWN} more")
+        say(f"{_entries(number)}, {'sound' if not wrong else 'NOT sound'}; the last has the hash {last}")
+    if wrong:
+        raise typer.Exit(NOT_CONFORMING)
+
+
+@app.command("head", epilog=examples("records head"))
+def head(records: Records = None, json: Json = False) -> None:
+    """Print number and hash of the last entry, to be filed elsewhere: on paper, in a mail, on another machine."""
+    from cmm_uq.laboratory.records import open_records
+
+    with open_records(records, read_only=True) as opened:
+        number, last = opened.head()
+    if json:
+        put_data({"entries": number, "head": last})
+    else:
+        say(f"{number} {last}")
+
+
+@app.command("import", epilog=examples("records import reports", "records import /archive/2025 --records lab.db"))
+def import_reports(
+    folders: Annotated[list[Path], typer.Argument(help="Folders that hold reports, at any depth.", metavar="FOLDER…")],
+    records: Records = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Record reports and diagnoses that were written before; what is recorded already is passed over."""
+    from cmm_uq.app.commands import records_kept
+    from cmm_uq.laboratory.records import open_records
+
+    reports = records_kept.reports_in(folders)  # told before records are made for them
+    with open_records(records, create=True) as opened:
+        done = records_kept.import_reports(opened, reports)
+    if json:
+        put_data({
+            "recorded": len(done.added), "recorded_before": len(done.known),
+            "without_inputs": [str(path) for path in done.bare],
+            "refused": [{"report": str(path), "error": str(error)} for path, error in done.refused],
+        })  # fmt: skip
+    elif not quiet:
+        say(f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused")
+        for path in done.bare:
+            say(printable(f"{path}: the inputs of its job cannot be read, so only results.json was gone by"))
+    if done.refused:
+        for path, error in done.refused[1 : SHOWN + 1]:
+            say(printable(f"{path}: not recorded: {error}"))
+        raise done.refused[0][1]
+
+
+@app.command("backup", epilog=examples("records backup records-2026-11-22.db"))
+def backup(
+    file: Annotated[Path, typer.Argument(help="New file of the backup.", metavar="FILE")],
+    records: Records = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Write everything into one new SQLite file, while others go on writing, and verify its chain."""
+    from cmm_uq.laboratory.records import open_records
+    from cmm_uq.laboratory.records.backup import back_up
+
+    with open_records(records) as opened:
+        number, last = back_up(opened, file)
+    if json:
+        put_data({"backup": str(file), "entries": number, "head": last})
+    elif not quiet:
+        say(f"{_entries(number)} in {file}; the last has the hash {last}")
+
+
+@app.command("restore", epilog=examples("records restore records-2026-11-22.db --records reports/records.db"))
+def restore(
+    file: Annotated[Path, typer.Argument(help="File of a backup.", metavar="FILE")],
+    records: Records = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
+    from cmm_uq.laboratory.records import backup as backups
+    from cmm_uq.laboratory.records.place import place_of, shown
+
+    place = place_of(records)
+    if place is None:
+        raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
+    number, last = backups.restore(file, place)
+    if json:
+        put_data({"records": shown(place), "entries": number, "head": last})
+    elif not quiet:
+        say(f"{_entries(number)} restored; the last has the hash {last}")
+
+
+@app.command("retain", epilog=examples("records retain --keep-years 10 --dry-run"))
+def retain(
+    keep_years: Annotated[int, typer.Option(help="Years for which files are kept.", metavar="N", min=1, max=1000)],
+    records: Records = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Remove the files of older reports; what they stated stays in the records, and so does what was removed.
+
+    Entries are never removed. Only files that are as they were written are; years count from the day of the measurement.
+    """
+    from cmm_uq.app.commands.records_kept import remove_retained, retention
+    from cmm_uq.laboratory.records import open_records
+
+    with open_records(records, read_only=dry_run) as opened:
+        found = retention(opened, keep_years, dt.datetime.now(dt.UTC).date())
+        if not dry_run:
+            remove_retained(opened, found, keep_years)
+    if json:
+        put_data({
+            "removed": not dry_run, "files": [str(path) for path in found.files], "certificates": len(found.certificates),
+        })  # fmt: skip
+    elif not quiet:
+        for path in found.files:
+            say(printable(str(path)))
+        would = "would be removed" if dry_run else "removed"
+        say(f"{len(found.files)} files of {len(found.certificates)} reports {would}")
+
+
+@app.command("migrate", epilog=examples("records backup before.db", "records migrate"))
+def migrate(records: Records = None, quiet: Quiet = False, json: Json = False) -> None:
+    """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
+    from cmm_uq.laboratory.records import migrations
+    from cmm_uq.laboratory.records.place import place_of, shown
+
+    place = place_of(records)
+    if place is None:
+        raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
+    before, after = migrations.migrate(place)
+    if json:
+        put_data({"records": shown(place), "from": before, "to": after})
+    elif not quiet:
+        told = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
+        say(f"{shown(place)}: {told}")

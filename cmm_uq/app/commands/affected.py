@@ -1,0 +1,199 @@
+"""Which issued certificates a correction of the package touches: recomputed from their inputs, compared figure by figure."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from math import isclose
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq import __version__
+from cmm_uq.app.commands.corrections import Correction, Inputs, between, order, said
+from cmm_uq.app.commands.reading import in_language, job_of
+from cmm_uq.app.commands.recording import called
+from cmm_uq.app.commands.records_kept import RESULTS, inputs_of
+from cmm_uq.app.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
+from cmm_uq.app.commands.written import Stage, silent
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.language import ENGLISH, code_of
+from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.results_file import as_json
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.laboratory.records import content as contents
+from cmm_uq.laboratory.records.facts import STANDING, Certificate, Value
+from cmm_uq.laboratory.records.place import NONE
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.records.store import Records
+
+JOB = "job.toml"
+
+SAME = 1e-9
+"""Relative difference within which figures are the same: results.json has ten digits."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One figure that is another one now.
+
+    Parameters
+    ----------
+    name, quantity, unit : of the figure.
+    before, after : value, u, lower and upper end of the interval; ``None`` where there is none.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    before: tuple[float, float, float, float] | None
+    after: tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Affected:
+    """One certificate that corrections touch.
+
+    Parameters
+    ----------
+    certificate : as recorded.
+    corrections : that touch it.
+    changes : of its figures; ``None`` where it was not computed again.
+    decision, diagnosis : as they are now.
+    problem : why it was not computed again.
+    written : folder of the draft that is to replace it.
+    """
+
+    certificate: Certificate
+    corrections: tuple[Correction, ...]
+    changes: tuple[Change, ...] | None = None
+    decision: str = ""
+    diagnosis: str = ""
+    problem: str = ""
+    written: Path | None = None
+
+    @property
+    def changed(self) -> bool:
+        """Whether a figure, the decision or the verdict is another one now."""
+        now = (self.decision, self.diagnosis)
+        return self.changes is not None and (
+            bool(self.changes) or now != (self.certificate.decision, self.certificate.diagnosis)
+        )
+
+
+def affected(
+    records: Records, first: str, last: str, *, recompute: bool = True, out: Path | None = None, where: str | None = NONE,
+    stage: Stage = silent,
+) -> Iterator[Affected]:  # fmt: skip
+    """Certificates of versions from the first on that corrections up to the last touch, by day.
+
+    Parameters
+    ----------
+    records : that they are in.
+    first, last : versions; only the installed one can compute anew.
+    recompute : whether they are computed again.
+    out : folder for drafts that are to replace those that changed; ``None`` to write none.
+    where : records that the drafts are kept in.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : the versions are none, or not those of this package.
+    """
+    if order(last) > order(__version__):
+        raise CmmUqError(
+            f"this is version {__version__}", where=f"--to {last}", fix="Install the version that has the corrections"
+        )
+    if order(first) > order(last):
+        raise CmmUqError(f"{last} is before {first}: nothing was corrected between them", where=f"--version {first}",
+                         fix="Give the version that the oldest certificates were made by")  # fmt: skip
+    if recompute and order(last) < order(__version__):
+        raise CmmUqError(f"only version {last} computes as version {last} does, and this is {__version__}",
+                         where=f"--to {last}", fix="Leave it out, or give --list")  # fmt: skip
+    found = [
+        one for one in records.certificates(origin=None, states=STANDING, command=None)
+        if not said(one.version) or order(first) <= said(one.version) < order(last)
+    ]  # fmt: skip
+    jobs = Counter((one.command, one.job) for one in found)
+    for count, certificate in enumerate(found):
+        stage(f"Computing again: {certificate.job}", count / len(found))
+        files, problem = _inputs(records, certificate)
+        inputs = Inputs.of(files) if files else None
+        touching = tuple(one for one in between(certificate.version, last) if one.touches(certificate, inputs))
+        if not touching:
+            continue
+        if recompute and files:
+            one_of_many = jobs[certificate.command, certificate.job] > 1
+            name = f"{certificate.job}-{certificate.entry}" if one_of_many else certificate.job
+            yield _again(certificate, touching, files, out and out / name, where)
+        else:
+            yield Affected(certificate, touching, problem=problem)
+
+
+def _inputs(records: Records, certificate: Certificate) -> tuple[dict[str, bytes], str]:
+    """Files of its job as its PDF carries them, or why they are not to be had."""
+    try:
+        files = inputs_of(Path(certificate.folder))
+    except CmmUqError as error:
+        return {}, str(error)
+    recorded = next(records.entries(certificate.entry)).data.get("inputs")
+    if recorded != {name: sha256(content).hexdigest() for name, content in files.items()}:
+        return {}, f"{certificate.folder}: holds the report of other inputs by now"
+    if JOB not in files:
+        return {}, f"{certificate.folder}: its PDF carries no {JOB}"
+    return files, ""
+
+
+def _again(
+    certificate: Certificate, touching: tuple[Correction, ...], files: Mapping[str, bytes], folder: Path | None,
+    where: str | None,
+) -> Affected:  # fmt: skip
+    try:
+        job, outcome = _outcome(certificate, job_of(files))
+        data = json.loads(as_json(outcome.results))
+        changes = tuple(compared(certificate.values, [Value(*row) for row in contents.values(data, called)]))
+        verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
+        found = Affected(certificate, touching, changes, Verdicts.of_results(data).overall, verdict)
+        if folder is None or not found.changed:
+            return found
+        form = REPORT if certificate.command == "report" else DIAGNOSE
+        folder = folder if form is REPORT else folder / form.below
+        form.write(job, lambda: outcome, folder, records=where)
+        return replace(found, written=folder)
+    except CmmUqError as error:
+        return Affected(certificate, touching, problem=str(error))
+
+
+def _outcome(certificate: Certificate, job: Job) -> tuple[Job, Outcome]:
+    """In the language and with the seed of the first time."""
+    before: Mapping[str, Any] = json.loads((Path(certificate.folder) / RESULTS).read_bytes())
+    seed = int((before.get("sampling") or {}).get("seed") or 0)
+    job = in_language(job, code_of(before["job"].get("language", ENGLISH)))
+    again = report_outcome if certificate.command == "report" else diagnosis_outcome
+    return job, again(job, seed=seed)
+
+
+def compared(before: tuple[Value, ...], after: list[Value]) -> Iterator[Change]:
+    """Figures that differ, or are only there before or after, in the order of those before."""
+    new = {value.name: value for value in after}
+    old = {value.name: value for value in before}
+    for name in dict.fromkeys((*old, *new)):
+        a, b = old.get(name), new.get(name)
+        if a is not None and b is not None and a.unit == b.unit and _same(a, b):
+            continue
+        told = b or a
+        if told is not None:
+            yield Change(name, told.quantity, told.unit, _figures(a), _figures(b))
+
+
+def _same(a: Value, b: Value) -> bool:
+    pairs = zip(_figures(a) or (), _figures(b) or (), strict=True)
+    return all(isclose(x, y, rel_tol=SAME, abs_tol=SAME * max(a.u, b.u)) for x, y in pairs)
+
+
+def _figures(value: Value | None) -> tuple[float, float, float, float] | None:
+    return None if value is None else (value.value, value.u, value.lower, value.upper)

@@ -1,0 +1,88 @@
+"""From a model file to its written budget."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.app.commands.written import Stage, silent
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.language import ENGLISH, Code
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.certificate.fonts import fonts_of
+from cmm_uq.maths.uncertainty.evaluation import Evaluation
+from cmm_uq.maths.uncertainty.model_file import read_model_file
+
+FILES = ("budget.html", "budget.pdf", "results.json")
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenBudget:
+    """What was found, contents of results.json, and what was written, by name."""
+
+    evaluation: Evaluation
+    results: bytes
+    files: dict[str, Path]
+
+
+def write_budget(
+    file: Path,
+    out: Path | None = None,
+    *,
+    seed: int | None = None,
+    force: bool = False,
+    stage: Stage = silent,
+    language: Code = ENGLISH,
+) -> WrittenBudget:
+    """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none.
+
+    Parameters
+    ----------
+    file : the model, in TOML.
+    out : where to write; ``reports/<name of the file>`` by default.
+    seed : instead of the file's.
+    force : keep what stands in the way instead of refusing.
+    stage : told of progress.
+    language : of the documents.
+
+    Raises
+    ------
+    CmmUqError : the model cannot be evaluated, or something in the folder is not this command's.
+    OutputError : the folder cannot be written to.
+    """
+    fonts_of(language)  # refused before anything is computed
+    model = read_model_file(file)
+    folder = out or Path("reports") / file.stem
+    if file.name in FILES:
+        raise CmmUqError("has the name of a file that this command writes", where=str(file), fix="Rename it")
+    owner = Owner("budget", _identity(file))
+    with staged(folder, owner, inputs=(file,), force=force, expected=FILES) as place:
+        stage("Propagating the uncertainty", 0.0)
+        evaluation = model.evaluate(seed)
+        stage("Rendering", 0.7)
+        from cmm_uq.certificate.budget_page import budget_document
+        from cmm_uq.certificate.html import render_html
+        from cmm_uq.certificate.in_language import said
+        from cmm_uq.certificate.lettering import lettered_in
+        from cmm_uq.certificate.pdf import render_pdf
+        from cmm_uq.certificate.results_file import as_json
+        from cmm_uq.maths.uncertainty.budget_results import results_of
+
+        data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256},
+                        **({"language": language} if language != ENGLISH else {})})  # fmt: skip
+        with lettered_in(language):
+            document = said(budget_document(model, evaluation, file.name), language)
+        pdf = render_pdf(document, {file.name: model.content, "results.json": data})
+        contents = {"budget.html": render_html(document).encode(), "budget.pdf": pdf, "results.json": data}
+        files = place.write(contents)
+    return WrittenBudget(evaluation, data, files)
+
+
+def _identity(file: Path) -> str:
+    """Two models of one name are two: the path from the working folder, which moves with its reports, or a mark of another."""
+    path = file.absolute()
+    if path.is_relative_to(Path.cwd()):
+        return path.relative_to(Path.cwd()).as_posix()
+    return f"{file.stem}-{hashlib.sha256(os.fsencode(path.parent)).hexdigest()[:8]}"

@@ -1,0 +1,159 @@
+"""Compensated recordings: a job's readings corrected by its machine's error maps."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from cmm_uq.app.commands.reading import job_of, read_job
+from cmm_uq.app.commands.refusals import refuse_planned
+from cmm_uq.app.commands.simulate import recording
+from cmm_uq.artefacts import kind_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.base.points import AXES, Points
+from cmm_uq.jobs.derived_job import (
+    IN_THE_RECORDING,
+    PROGRAM,
+    derived_toml,
+    is_compensated,
+    kept_inputs,
+    recording_name,
+)  # fmt: skip
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.logged_temperatures import log_of
+from cmm_uq.jobs.origin import first_line
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.temperature_log import TemperatureLog
+from cmm_uq.machine.model.machine_maps import maps_of
+from cmm_uq.machine.physics.compensation import compensate_points, machine_compensation
+from cmm_uq.machine.physics.error_map_text import error_map_text
+from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
+
+PROVENANCE = "compensation.json"
+"""How the coordinates were corrected, in the folder of a compensated job."""
+
+
+def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
+    """The recording of a job at the coordinates that its error maps make of it, and how it came about.
+
+    Parameters
+    ----------
+    job : with ``[machine] error_map``.
+    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
+
+    Raises
+    ------
+    CmmUqError : the job has no error map, or it does not serve these points.
+    """
+    maps = maps_of(job)
+    refuse_planned(job)
+    if not job.facts.artefact.with_recording:
+        raise kind_of(job).refused("compensated")
+    log = log_of(job.facts.machine, job.inputs, job.folder)
+    compensation = machine_compensation(job.points, ErrorMaps(maps), beyond=beyond)
+    try:
+        return compensate_points(_with_probe(job), compensation), compensation.provenance() | _of_the_log(
+            job.points, log
+        )
+    except CmmUqError as error:
+        where = ", ".join(part for part in (job.recording_path, error.where) if part)
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from error
+
+
+def write_compensated(
+    job: Path, out: Path, *, beyond: Beyond = "refuse", map_text_c: float | None = None, force: bool = False
+) -> dict[str, Path]:  # fmt: skip
+    """Write a job folder with the compensated recording, marked as such; its job.toml names no error map any more.
+
+    Parameters
+    ----------
+    map_text_c : temperature, °C, at which the error map is written beside it in the contractors' text form.
+
+    Returns and raises as :func:`~cmm_uq.app.commands.simulate.write_simulation`.
+    """
+    read = read_job(job)
+    _refuse(read)
+    text = {} if map_text_c is None else _map_text(read, map_text_c, beyond)
+    owner = Owner("compensate", read.facts.job.id, read.origin)
+    with staged(out, owner, inputs=read.paths, force=force, expected=(*read.inputs, *text, PROVENANCE)) as place:
+        return place.write(_files(read, beyond, text))
+
+
+def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
+    """The job that :func:`write_compensated` writes, in memory.
+
+    Parameters
+    ----------
+    job : with ``[machine] error_map``.
+    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
+
+    Raises
+    ------
+    CmmUqError : the job has no error map, or it does not serve these points.
+    """
+    _refuse(job)
+    return job_of(_files(job, beyond, {}))
+
+
+def _refuse(read: Job) -> None:
+    """Refuse what is not compensated, or not in one go."""
+    if is_compensated(read):
+        raise CmmUqError("is compensated already", where=f"{read.folder / 'job.toml'} [job] origin",
+                         fix="Compensate the measured recording")  # fmt: skip
+    if read.facts.recording.earlier is not None:
+        raise CmmUqError("the recordings of two dates are not compensated together",
+                         where=f"{read.folder / 'job.toml'} [recording] earlier",
+                         fix="Compensate each as a job of its own, then name the earlier result")  # fmt: skip
+
+
+def _files(read: Job, beyond: Beyond, text: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Every file of the compensated job; ``text`` are maps written in the contractors' form."""
+    points, provenance = compensate_job(read, beyond=beyond)
+    told = {"software": PROGRAM, "inputs_sha256": sha256(read.inputs), **provenance}
+    files = {
+        **kept_inputs(read),
+        recording_name(read): first_line("compensate", PROGRAM, f"; see {PROVENANCE}").encode() + recording(points),
+        **text,
+        PROVENANCE: (json.dumps(told, indent=2, ensure_ascii=False) + "\n").encode(),
+    }  # fmt: skip
+    toml = derived_toml(read, "compensate", files, without=("error_map", "squareness_arcsec", *IN_THE_RECORDING))
+    return {"job.toml": toml, **files}
+
+
+def _map_text(job: Job, temperature: float, beyond: Beyond) -> dict[str, bytes]:
+    """The error map at one temperature in the contractors' text form, by the name of its file."""
+    name = f"error-map-{temperature:g}C.txt"
+    if name in job.inputs:
+        raise CmmUqError(
+            f"has a file {name!r}, the name of the map to be written", where=str(job.folder), fix="Rename it"
+        )
+    found = ErrorMaps(maps_of(job)).map_at(temperature, beyond=beyond)
+    return {name: error_map_text(found, name=name).encode()}
+
+
+def _with_probe(job: Job) -> Points:
+    """The recording, with tip offsets where its kind finds them from what it recorded."""
+    facts = job.facts.artefact
+    if not facts.carries_probe or "tip_x_mm" in job.points.columns:
+        return job.points
+    found = kind_of(job).observing("compensated")(facts, job.points, where=job.recording_path).points.columns
+    tips = {name: found[name] for name in (f"tip_{axis}_mm" for axis in AXES)}
+    return replace(job.points, columns={**job.points.columns, **tips})
+
+
+def _of_the_log(points: Points, log: TemperatureLog | None) -> dict[str, object]:
+    """How the temperatures of the scales came about, where a log gave them."""
+    if log is None:
+        return {}
+    times = points.columns["time_s"]
+    return {
+        "temperature_log": {
+            "file": log.source,
+            "rule": "mean of the thermocouples of each scale, linear in time",
+            "largest_u_interpolation_k": round(float(log.u_at(times).max()), 6),
+            "largest_spread_k": round(float(log.spread_at(times).max()), 6),
+        }
+    }

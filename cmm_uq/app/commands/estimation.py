@@ -1,0 +1,283 @@
+"""The steps of the recipe between a screened recording and its posterior, and what follows from that posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
+from cmm_uq.analysis.conformity.measurement_lines import ALIGNED
+from cmm_uq.analysis.screening.copies import counted_with
+from cmm_uq.analysis.screening.finding import finding
+from cmm_uq.analysis.screening.moved import moved_stretches, recurring_points, words_of_point, words_of_stretch
+from cmm_uq.analysis.screening.screened import Finding, gross_outliers
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import MICROMETRE, PPM, unit
+from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction, Noise
+from cmm_uq.machine.model import Estimate, MeasurementModel
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.display import of_last_digit
+from cmm_uq.machine.model.doubt import growth
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.maths.inference.combinations import uncertainty_of_sum
+from cmm_uq.maths.inference.doubt import Cause, Doubt, gain
+from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly
+from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
+from cmm_uq.maths.inference.posterior import NoisyPosterior, Posterior
+from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
+
+_LINES = 2000
+"""Draws of the sizes of the noise, over which a line's uncertainty is taken."""
+
+_ON_LINE = 0.05
+"""Extent of points across a line over that along it."""
+
+
+def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
+    """The model without gross outliers, and what they are; the figures of performance still count them."""
+    artefact, used = model.artefact, model.used.copy()
+    chosen, estimate = np.flatnonzero(used), model.estimate()
+    least = of_last_digit(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
+    outliers = gross_outliers(estimate.linear, artefact.measurement[chosen], least)
+    times_off = {int(chosen[index]): times for index, times in outliers}
+    rows = {i: int(artefact.rows[i][0]) for i in times_off}
+    outlying = np.array(sorted(set(rows.values())), dtype=np.int64)
+    recurring = recurring_points(artefact.points, outlying)
+    kept = {row for each in recurring for row in each.tolist()}  # what is so each time is no gross error
+    used[[i for i in times_off if rows[i] not in kept]] = False
+    return replace(model, used=used), list(_told(artefact, times_off, rows, recurring))
+
+
+def _told(
+    artefact: Artefact, times_off: Mapping[int, float], rows: Mapping[int, int], recurring: Sequence[Ints]
+) -> Iterator[Finding]:
+    """Outliers one by one, but those of one cause together, where the worst of them stands.
+
+    Parameters
+    ----------
+    times_off : of each observation, in its own standard deviations.
+    rows : of the recording, of each of these observations.
+    recurring : rows that stay, of points that are off each time.
+    """
+    points, untold = artefact.points, dict(times_off)
+    outliers = np.array(sorted(set(rows.values())), dtype=np.int64)
+    causes = [
+        *((each, words_of_point, False) for each in recurring),
+        *((each, words_of_stretch, True) for each in moved_stretches(points, outliers)),
+    ]
+    for i, times in times_off.items():
+        if i not in untold:
+            continue
+        for together, words, aside in causes:
+            if rows[i] in together:
+                off = [untold.pop(j) for j in tuple(untold) if rows[j] in together]
+                yield replace(finding("outlier", points, together, words(points, together, off)), set_aside=aside)
+                break
+        else:
+            why = say(
+                "{what} is {times:.1f} of its standard deviations off what the others say",
+                what=artefact.words_of(i), times=times,
+            )  # fmt: skip
+            yield replace(finding("outlier", points, artefact.rows[i], why), set_aside=True)
+
+
+def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, float | None]:
+    """Estimate; where the residuals contradict the stated noise, they replace it. Also the χ² test's probability."""
+    estimate = model.estimate()
+    result = estimate.least_squares
+    if model.sigma is None or result.degrees_of_freedom < 1:
+        return model, estimate, None
+    squares = float(np.sum((result.residuals / estimate.linear.noise_scale) ** 2))
+    p_value = float(special.chdtrc(result.degrees_of_freedom, squares / model.sigma**2))
+    if p_value < LACK_OF_FIT:
+        model = replace(model, sigma=None)
+        estimate = model.estimate()
+    return model, estimate, p_value
+
+
+def parameters(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Quantity]]:
+    """Reported parameters of each effect, by effect and name, of draws (N, k) of the unknowns."""
+    found = _quantities(model, values)
+    return {effect.name: found[effect.name] for effect in model.effects}
+
+
+def named_draws(
+    model: MeasurementModel, components: Components, posterior: NoisyPosterior, values: Floats, *, mixture: bool
+) -> Draws:  # fmt: skip
+    """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
+
+    Parameters
+    ----------
+    values : (N, k) of the model's unknowns.
+    mixture : whether they are of a mixture, row after row independent, and not of the posterior, row by row. They go with no
+        size of the noise then: those are taken evenly from the posterior, and an ensemble is a chain.
+    """
+    units, columns, steps = {}, [], posterior.steps // posterior.every
+    for (owner, name), (draws, own) in model.reported(values).items():
+        units[f"{owner}.{name}"] = own
+        columns.append(draws)
+    noise = {name: each / MICROMETRE for name, each in sizes_of_noise(components, posterior).items()}
+    units |= {f"noise.{name}_um": unit("µm") for name in noise}
+    if not mixture:
+        return Draws(units, by_chain(np.column_stack([*columns, *noise.values()]), steps), posterior.every)
+    kept = evenly(len(posterior.draws), len(values))
+    chains = by_ensemble(np.column_stack([each[kept] for each in noise.values()]), steps, len(posterior.draws))
+    mixed = [each.reshape(*chains.shape[:2], 1) for each in columns]
+    return Draws(units, np.concatenate([*mixed, chains], axis=2))
+
+
+def sizes(model: MeasurementModel, values: Floats) -> dict[str, Quantity]:
+    """Sizes of the artefact, by name, of draws (N, k) of the unknowns."""
+    return _quantities(model, values).get(ARTEFACT, {})
+
+
+def _quantities(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Quantity]]:
+    found: dict[str, dict[str, Quantity]] = {}
+    for (owner, name), (draws, own) in model.reported(values).items():
+        found.setdefault(owner, {})[name] = Quantity.of_draws(draws, own)
+    return found
+
+
+def sizes_of_noise(components: Components, posterior: NoisyPosterior) -> dict[str, Floats]:
+    """Draws (N,), mm, of the reading noise, all axes and each, and of every other component that the recording could show.
+
+    A reading is what the display shows: its steps are part of it.
+    """
+    sizes, rounding = posterior.sizes, components.display / np.sqrt(12)
+    found = {"coordinate": np.hypot(sizes.coordinate, rounding)}
+    if AXES in components.possible:
+        found |= dict(zip("xyz", np.hypot(sizes.reading, rounding).T, strict=True))
+    each = {PLACING: sizes.placing, GROWTH: sizes.growth, SLOW: sizes.slow}
+    return found | {name: values for name, values in each.items() if name in components.possible}
+
+
+def noise(
+    estimate: Estimate,
+    components: Components,
+    posterior: NoisyPosterior,
+    stated_um: float | None,
+    p_value: float | None,
+) -> Noise:
+    """What the noise is, by component, and what it does to the uncertainties."""
+    found = {
+        name: Component(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
+        for name, values in sizes_of_noise(components, posterior).items()
+    }
+    coordinate = found.pop("coordinate").size
+    apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
+    step = components.display / MICROMETRE
+    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
+
+
+def _wider(estimate: Estimate, posterior: Posterior) -> float:
+    """Largest ratio of an uncertainty to what it would be under white noise; 1 where nothing is determined."""
+    ls = estimate.least_squares
+    free = ls.determined & ~np.array([u.known for u in ls.unknowns], dtype=bool)
+    white = np.sqrt(np.diag(ls.covariance)[free])
+    return float(np.max(posterior.draws.std(axis=0)[free] / white, initial=1.0, where=white > 0))
+
+
+def with_doubt(
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, draws: Floats, causes: Sequence[Cause]
+) -> tuple[Floats, Doubt]:  # fmt: skip
+    """Draws (N, k) of the model's unknowns with what is in doubt about all observations together; as they are without."""
+    if not causes:
+        return draws, Doubt(())
+    weights = gain(estimate.linear, float(np.median(posterior.sigma)))
+    doubt = Doubt.of([cause.at(model.used) for cause in causes], weights)
+    return doubt.widened(draws, posterior.seed), doubt
+
+
+def contradictions(
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, averaged: Floats
+) -> tuple[Contradiction, ...]:  # fmt: skip
+    """Averaged scales of axes that lines along these deny: of each the line that does most.
+
+    An average may give to a scale what another explanation takes away from it again. Nobody may use the scale without that,
+    so what the lines along the axis alone say of it, all other named effects as they are on average, must agree with it: all
+    of them, within the joint 95 % uncertainty.
+
+    Parameters
+    ----------
+    averaged : (N, k) draws of the model's unknowns over all explanations that remain.
+    """
+    linear, along = estimate.linear, growth(model.artefact)
+    if along is None:
+        return ()
+    components, sizes, mean = (
+        noise_of(model),
+        posterior.sizes.at(evenly(len(posterior.draws), _LINES)),
+        averaged.mean(axis=0),
+    )
+    lines: dict[int, list[tuple[float, float, Contradiction]]] = {}
+    along_axis = (1 - 2 * ALIGNED**2) * PPM
+    for number, weights in _lines(model, along[model.used], linear.freedoms):
+        slope = weights @ linear.design
+        spoken = [i for i in np.flatnonzero(np.abs(slope) >= along_axis).tolist() if linear.unknowns[i].unit == "ppm"]
+        if not spoken:
+            continue
+        left = float(weights @ linear.observed - slope @ mean)
+        expected = float(expanded_of(averaged @ slope, slope @ mean))
+        u, U = uncertainty_of_sum(components, sizes, weights)
+        for i in spoken:
+            off, wide = left / slope[i], np.array([u, U]) / abs(slope[i])
+            value, unknown = float(mean[i] + off), linear.unknowns[i]
+            alone = Quantity(value, float(wide[0]), (value - float(wide[1]), value + float(wide[1])), unknown.unit)
+            own = float(np.hypot(expected / slope[i], wide[1]))
+            lines.setdefault(i, []).append((abs(off), own, Contradiction(unknown.key, number, alone)))
+    found = []
+    for each in lines.values():
+        factor = float(special.ndtri(0.5 + 0.5 * 0.95 ** (1 / len(each))) / special.ndtri(0.975))
+        off, own, line = max(each, key=lambda one: one[0] / one[1])
+        if off > factor * own:
+            found.append(line)
+    return tuple(found)
+
+
+def _lines(model: MeasurementModel, along: Floats, placings: Freedoms) -> Iterator[tuple[int, Floats]]:
+    """Each measurement of points on one line, and the weights (m,) of the used observations in its slope, mm/mm."""
+    measurement, points = model.artefact.measurement[model.used], model.artefact.points
+    for number in np.unique(measurement).tolist():
+        xyz = points.xyz[points.measurement == number]
+        extents = np.linalg.svd(xyz - xyz.mean(axis=0), compute_uv=False)
+        own = np.where(measurement == number, along, 0.0)
+        about = placings.without(own[:, None])[:, 0]
+        if extents[1] <= _ON_LINE * extents[0] and about @ about > 0:
+            yield number, about / (about @ about)
+
+
+def accuracy(
+    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, causes: Sequence[Cause], seed: int
+) -> Mapping[str, Quantity]:
+    """Figures of performance of all recorded lengths, the noise drawn anew; empty for an artefact that has none.
+
+    What is in doubt is drawn anew with the noise, the same for all set-ups and for each by itself; the larger U stands.
+    """
+    artefact = model.artefact
+    lengths = artefact.lengths()
+    if lengths is None:
+        return {}
+    every = replace(model, used=np.ones_like(model.used))
+    linear, components, sizes = every.linearised(estimate.about), noise_of(every), posterior.sizes
+    chosen = repeated_draws(len(posterior.draws), len(lengths))
+    predicted, sizes = lengths - linear.observed + posterior.draws[chosen] @ linear.design.T, sizes.at(chosen)
+    copies = counted_with(artefact.points)[artefact.rows[:, 0]]
+
+    def figures(apart: bool) -> dict[str, Quantity]:
+        def again(some: Ints, times: int, random: np.random.Generator) -> Floats:
+            readings = components.repeated(sizes.at(some), times, random)
+            for cause in causes:
+                readings += cause.drawn((len(some), times), random, apart=apart)
+            return readings
+
+        return with_uncertainty(lengths, predicted, again, seed, copies)
+
+    found = figures(apart=False)
+    other = figures(apart=True) if causes else found
+    return {name: max(one, other[name], key=lambda quantity: quantity.expanded) for name, one in found.items()}

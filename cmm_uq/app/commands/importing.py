@@ -1,0 +1,114 @@
+"""A laboratory's export read without a job: shown, written in the project's own format, or made the beginning of a job."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.output.new_file import write_new
+from cmm_uq.base.plugins import naming_package
+from cmm_uq.base.points import Machine
+from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.recording import WHOLE, points_of
+
+_FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
+_MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
+
+
+@naming_package()
+def read_export(path: Path, keys: ImportKeys | None = None) -> Imported:
+    """A file in any format that is known.
+
+    Parameters
+    ----------
+    path : of the file.
+    keys : what it leaves open.
+
+    Raises
+    ------
+    CmmUqError : it is of no known format, damaged or hostile, or can be read in two ways that no key settles.
+    """
+    content = content_of(path, TABLE_BYTES, "Check its name")
+    found = imported(content, str(path), keys or ImportKeys())
+    points_of(found.columns, found.lines.tolist(), str(path), Machine())  # refused as a job refuses it
+    return found
+
+
+def own_format(found: Imported) -> bytes:
+    """The same in the project's own format: numbers with as many digits as they need to be read back the same."""
+    names = [name for name in _FIRST if name in found.columns]
+    names += [name for name in found.columns if name not in _FIRST]
+    columns = [
+        map(repr, (values.astype(np.int64) if name in WHOLE else values).tolist())
+        for name in names
+        for values in (found.columns[name],)
+    ]
+    lines = [",".join(names), *(",".join(row) for row in zip(*columns, strict=True))]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def write_recording(path: Path, found: Imported, out: Path) -> None:
+    """Write a recording in the project's own format, whole or not at all, and over nothing.
+
+    Parameters
+    ----------
+    path : of the export; a first line that says what a recording was made by is kept.
+    found : what was read of it.
+    out : to write to.
+
+    Raises
+    ------
+    OutputError : something is there, or it cannot be written.
+    """
+    mark = _MARK.match(content_of(path, TABLE_BYTES, "Check its name"))
+    content = (mark[0].removeprefix(b"\xef\xbb\xbf") if mark else b"") + own_format(found)
+    write_new(out, content)
+
+
+@naming_package()
+def write_job_of_export(
+    kind: str, export: Path, folder: Path, given: Mapping[str, Mapping[str, Any]], keys: ImportKeys
+) -> dict[str, Path]:
+    """Write the folder of a new job around an export that was measured: the export itself lies in it, and is imported.
+
+    Nothing is made up: artefact, limits and travel are those that are given, whatever a new job of the kind would begin with.
+
+    Parameters
+    ----------
+    kind : of measurement.
+    export : the file.
+    folder : that does not exist, or is empty.
+    given : what job.toml is to say, by table and key; the machine's name at least.
+    keys : what the export leaves open.
+
+    Returns
+    -------
+    path of each file.
+
+    Raises
+    ------
+    CmmUqError : the folder is not empty, or the readers of a job refuse the export or what is given.
+    OutputError : the folder cannot be written to.
+    """
+    from cmm_uq.app.commands.new import check_empty, job_id, job_of_export
+    from cmm_uq.base.output import Owner, staged
+
+    check_empty(folder)
+    if not given.get("machine", {}).get("name"):
+        raise CmmUqError("the machine that was measured has no name", fix='Give --machine "…"')
+    content = content_of(export, TABLE_BYTES, "Check its name")
+    said = {key: value for key, value in keys.model_dump().items() if value not in (None, {})}
+    name = job_id(folder, given)
+    tables = {**given, "recording": {"file": export.name, **said, **given.get("recording", {})}}
+    files = job_of_export(kind, tables, {export.name: content}, id=name)
+    with staged(folder, Owner("new", name), expected=files, inputs=(export,)) as place:
+        check_empty(folder, but=".unfinished-")
+        return place.write(files)

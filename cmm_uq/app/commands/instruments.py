@@ -1,0 +1,155 @@
+"""Instruments from the command line: which profiles there are, one tried at its port, a new one from an example line."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import tempfile
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.output.new_file import write_new
+from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.laboratory.live.instruments.draft import Drafted, drafted
+from cmm_uq.laboratory.live.instruments.library import ENDING, profile_named, profile_of, ready
+from cmm_uq.laboratory.live.instruments.opening import open_source
+from cmm_uq.laboratory.live.instruments.ports import serial_ports
+from cmm_uq.laboratory.live.instruments.source import Event, Source
+from cmm_uq.laboratory.live.instruments.trial import Trial
+
+
+@dataclass(frozen=True)
+class Listed:
+    """What ``cmm-uq instruments list`` shows.
+
+    Parameters
+    ----------
+    profiles : name, title and what each was tried on.
+    ports : name and description.
+    """
+
+    profiles: tuple[tuple[str, str, str], ...]
+    ports: tuple[tuple[str, str], ...]
+
+
+def listed() -> Listed:
+    """Ready profiles, and the serial ports of this computer."""
+    profiles = [profile_named(name) for name in ready()]
+    return Listed(tuple((one.name, one.title, one.facts.tried) for one in profiles), tuple(serial_ports()))
+
+
+def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Path]:
+    """The source that is meant, and the folder that its files lie in.
+
+    Parameters
+    ----------
+    what : a profile, or the name of a source where a job is given.
+    port : at which it is; empty where the job says it.
+    job : folder.
+
+    Raises
+    ------
+    CmmUqError : there is no such source, or no port is named.
+    """
+    if job is None:
+        name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(ENDING))
+        return DeclaredSource.model_construct(name=name or "instrument", profile=what, port=port), Path()
+    from cmm_uq.app.commands.reading import read_job
+
+    read = read_job(job, recorded=False)
+    sources = {source.name: source for source in read.facts.acquire.source}
+    if what not in sources:
+        raise CmmUqError(f"the job has no source {what!r}", where=f"{job}: [acquire]", fix=suggestion(what, sources))
+    source = sources[what]
+    return (source.model_copy(update={"port": port}) if port else source), read.folder
+
+
+class Attempt:
+    """An instrument that is open, and what came of it so far.
+
+    Parameters
+    ----------
+    what, port, job : see :func:`declared`.
+
+    Raises
+    ------
+    CmmUqError : it cannot be opened.
+    """
+
+    def __init__(self, what: str, port: str, job: Path | None) -> None:
+        source, folder = declared(what, port, job)
+        self.trial = Trial(profile_named(source.profile, folder), source.port)
+        self.source: Source = open_source(source, folder=folder)
+        self._stop = threading.Event()
+
+    def events(self, seconds: float | None) -> Iterator[Event]:
+        """What comes, for some time or until nobody asks any more."""
+        timer = threading.Timer(seconds, self._stop.set) if seconds is not None else None
+        if timer is not None:
+            timer.daemon = True
+            timer.start()
+        try:
+            for event in self.source.events(self._stop):
+                self.trial.take(event)
+                yield event
+        finally:
+            if timer is not None:
+                timer.cancel()
+            self.source.close()
+
+
+def write_profile(out: Path, wanted: Drafted) -> None:
+    """Write a new profile that reads its own example.
+
+    Raises
+    ------
+    CmmUqError : it cannot be made of what was said.
+    OutputError : something is there, or it cannot be written.
+    """
+    if out.suffix != ENDING:
+        raise CmmUqError("a profile's file ends in .toml", where=str(out), fix=f"Name it {out.stem or 'my-gauge'}.toml")
+    content = drafted(wanted)
+    profile_of(content, out)
+    write_new(out, content)
+
+
+@contextlib.contextmanager
+def simulating(profile: str, way: str) -> Iterator[str]:
+    """A simulated instrument, at the port that is given, until it is left.
+
+    Parameters
+    ----------
+    profile : a ready one.
+    way : ``pty``, ``socket`` or ``rfc2217``; empty for the usual one.
+
+    Raises
+    ------
+    CmmUqError : there is no simulation of it, or no such way.
+    """
+    from cmm_uq.laboratory.live.instruments.simulated.line import WAYS, simulated
+    from cmm_uq.laboratory.live.instruments.simulated.speakers import SPEAKERS
+
+    if profile_named(profile).protocol == "ipp":
+        from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
+
+        machine = SimulatedMachine()
+        try:
+            yield machine.url
+        finally:
+            machine.close()
+        return
+    if profile not in SPEAKERS:
+        raise CmmUqError(f"there is no simulation of {profile!r}", fix=suggestion(profile, SPEAKERS))
+    usual = "socket" if os.name == "nt" else "pty"
+    chosen = next((one for one in WAYS if one == (way or usual)), None)
+    if chosen is None or (chosen == "pty" and os.name == "nt"):
+        raise CmmUqError(f"{way!r} is no way to a simulated instrument here", where="--way", fix=suggestion(way, WAYS))
+    with (
+        tempfile.TemporaryDirectory(prefix="cmm-uq-") as folder,
+        simulated(SPEAKERS[profile](), chosen, Path(folder)) as line,
+    ):
+        yield line.port

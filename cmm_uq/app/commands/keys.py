@@ -1,0 +1,74 @@
+"""A new key for trying, in a file that only its owner may read, and its certificate."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.app.commands.signing import Asking, secret
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.certificate.sign import signing_time, trial_key
+
+PRIVATE, PUBLIC = 0o600, 0o644
+
+
+@dataclass(frozen=True)
+class Made:
+    """What was made.
+
+    Parameters
+    ----------
+    key : PKCS#12 file.
+    certificate : PEM file of its certificate.
+    until : last day of the certificate.
+    """
+
+    key: Path
+    certificate: Path
+    until: dt.date
+
+
+def new_test_key(path: Path, name: str, asking: Asking) -> Made:
+    """Make a test key; a file that is there is not written over.
+
+    Parameters
+    ----------
+    path : of the PKCS#12 file; its certificate comes beside it, ``.pem`` in place of the suffix.
+    name : of whom it is for.
+    asking : for the passphrase where the environment has none.
+
+    Raises
+    ------
+    CmmUqError : a file is there already, or name or passphrase are none.
+    OutputError : the folder cannot be written to.
+    """
+    beside = path.with_suffix(".pem")
+    if beside == path:
+        raise CmmUqError("is the name of its certificate", where=str(path), fix="Name the key .p12")
+    for one in (path, beside):
+        if os.path.lexists(one):
+            raise CmmUqError("is there already", where=str(one), fix="Choose another name: no key is written over")
+    made = trial_key(name, secret("Passphrase of the new key: ", asking), signing_time())
+    _write(path, made.key, PRIVATE)
+    try:
+        _write(beside, made.certificate, PUBLIC)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            path.unlink()
+        raise
+    return Made(path, beside, made.until)
+
+
+def _write(path: Path, content: bytes, mode: int) -> None:
+    """A new file that others may read, or not, from its first byte on."""
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), mode)
+        with os.fdopen(descriptor, "wb") as file:
+            file.write(content)
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written: {error.strerror}", where=str(path), fix="Choose another folder"
+        ) from None

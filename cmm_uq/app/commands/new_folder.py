@@ -1,0 +1,138 @@
+"""The folder of a new job: job.toml with every other key as a comment, its schema, and what to do next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.schemas import shipped
+from cmm_uq.artefacts import kind_named, names
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.toml_file import as_toml
+from cmm_uq.jobs.beginning import Beginning
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import EXAMPLE, SIMULATED
+from cmm_uq.jobs.recording import REQUIRED
+from cmm_uq.jobs.toml_text import commented
+from cmm_uq.machine.model.kind import Kind
+
+RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
+KEPT = (SCHEMA, README)
+"""Files beside those of the job itself."""
+
+PLAN, BUDGET = "plan", "budget"
+"""Names beside those of kinds."""
+
+Tables = Mapping[str, Mapping[str, Any]]
+
+
+def job_files(
+    kind: str, tables: Tables, files: Mapping[str, bytes], examples: Collection[str] = (), *,
+    begin: Beginning | None = None,
+) -> dict[str, bytes]:  # fmt: skip
+    """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next.
+
+    Parameters
+    ----------
+    kind : of measurement.
+    tables : what job.toml says.
+    files : the recording that it names, and other files.
+    examples : dotted keys whose figures are an example's; a measured recording is refused beside them.
+    begin : what the job begins with, if not what its kind does.
+
+    Raises
+    ------
+    CmmUqError : the readers of a job refuse it.
+    """
+    found = kind_or_refused(kind)
+    job = read_new(found, tables, files)
+    begin = found.beginning(kind) if begin is None else begin
+    return {
+        "job.toml": _job_text(found, begin, tables, examples), **files, README: _readme_text(job, begin).encode(),
+        SCHEMA: shipped("job").encode(),
+    }  # fmt: skip
+
+
+def kind_or_refused(name: str) -> Kind:
+    """The kind of this name.
+
+    Raises
+    ------
+    CmmUqError : there is none.
+    """
+    found = kind_named(name)
+    if found is None:
+        raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, names()))
+    return found
+
+
+def read_new(kind: Kind, tables: Tables, files: Mapping[str, bytes]) -> Job:
+    """The job as any command reads it."""
+    return job_of(
+        {"job.toml": as_toml(tables, "job.toml"), **files}, recorded=bool(files) or not kind.table.with_recording
+    )
+
+
+def example_keys(tables: Mapping[str, Any], given: Tables) -> set[str]:
+    """Dotted keys of machine, artefact, test and limits that nobody gave, and the date of what nobody has measured yet."""
+    dated = set() if "date" in given.get("job", {}) else {"job.date"}
+    return dated | {
+        f"{table}.{key}"
+        for table in ("machine", "artefact", "conformity", "test_uncertainty", "rated_conditions")
+        for key in (tables[table][0] if table == "conformity" and table in tables else tables.get(table, {}))
+        if key not in (*given.get(table, ()), "kind", "error_map")
+    }
+
+
+def _job_text(kind: Kind, begin: Beginning, tables: Tables, examples: Collection[str]) -> bytes:
+    """job.toml with a comment for whatever else a job of this kind may say."""
+    out = {"job.derived_from", *(f"job.{key}" for key in ("as_found",) if SIMULATED in tables["job"].values())}
+    if not kind.tested:
+        out |= {"conformity", "short_gauge", "test_uncertainty", "rated_conditions"} - set(tables)
+    if kind.plan is None:
+        out |= {"plan"}
+    if not kind.table.with_recording:
+        out |= {"recording"}
+    if not kind.table.with_earlier:
+        out |= {"recording.earlier", "recording.earlier_date"}
+    head = [
+        f"#:schema ./{SCHEMA}",
+        f"# {begin.title}. What stands behind # is the default, or what may be said besides.",
+    ]
+    if tables["job"].get("origin") == SIMULATED:
+        head.append(
+            "# THE READINGS ARE SIMULATED: put in your own, then take away their first line and origin below. Figures marked "
+            f"{EXAMPLE} are nobody's."
+        )
+    body = commented(json.loads(shipped("job")), tables, out, kind.name, examples=examples)
+    return ("\n".join(head) + "\n\n" + body).encode()
+
+
+def _readme_text(job: Job, begin: Beginning) -> str:
+    """What lies here, and what to do next, in ten lines or so."""
+    facts = job.facts
+    columns = ", ".join(f"`{name}`" for name in (*REQUIRED, *begin.columns))
+    further = ", ".join(f"`{name}`" for name in ("repeat", *begin.further))
+    simulated = facts.job.origin == SIMULATED
+    lines = [
+        f"# {begin.title}", "",
+        f"`cmm-uq {begin.command} .` in this folder makes the pages; `cmm-uq check .` says what is missing or wrong.", "",
+        f"- `job.toml`: machine, artefact and limits. Editors that know TOML schemas explain every key (`{SCHEMA}`).",
+    ]  # fmt: skip
+    if facts.recording.file:
+        lines += [
+            f"- `{facts.recording.file}`: one row a point. {begin.numbering}",
+            f"- Its columns: {columns}; it may have {further} and temperatures besides.",
+        ]
+    if simulated:
+        lines.append(
+            "- **The figures are simulated**, and all that is made of them says so. Put in your own, then take away their "
+            f'first line and `origin = "simulated"` in job.toml, and state what is marked {EXAMPLE} there.'
+        )
+    if begin.command == PLAN:
+        lines.append(
+            f"- Nothing is recorded yet: the plan writes `plan.csv`, to be filled in as `{facts.recording.file}`."
+        )
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,277 @@
+"""A plan as a document for the operator and for whoever answers for it."""
+
+from __future__ import annotations
+
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.analysis.diagnosis.power import POWER, SIZES
+from cmm_uq.app.commands.plan_noise import averaging_note, noise_facts, worth
+from cmm_uq.app.commands.plan_words import (
+    CRITERIA,
+    STATUS,
+    absorbed,
+    base_name,
+    combination,
+    expected,
+    expected_white,
+    named,
+    pairs,
+    smallest,
+    title_of,
+    unit_of,
+)
+from cmm_uq.app.commands.planning import RECORDED, Plan
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, number, plural, say
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures
+from cmm_uq.certificate.program import program
+from cmm_uq.certificate.working_page import working_page
+
+MET, NOT_MET = Verbatim("✓"), Verbatim("✗")
+
+
+def plan_document(plan: Plan) -> Document:
+    """The page of a plan."""
+    facts = plan.job.facts
+    return working_page(
+        facts,
+        say("Measurement plan"),
+        _artefact(plan),
+        particulars=(
+            Facts(
+                (
+                    (say("Machine"), Verbatim(facts.machine.name)),
+                    (say("Artefact"), _artefact(plan)),
+                    (say("Effects to determine"), (commas(names(facts.model.effects)) or say("the error of one axis"))),
+                )
+            ),
+            Facts(
+                (
+                    (say("Start from"), base_name(plan)),
+                    (say("To be measured"), to_measure_words(plan)),
+                    *noise_facts(plan),
+                )
+            ),
+        ),
+        warnings=_warnings(plan),
+        sections=_sections(plan),
+        attachments=(Verbatim("plan.csv"), Verbatim("results.json"))
+        if plan.to_measure
+        else (Verbatim("results.json"),),
+        produced_by=program(plan.job),
+        end=say("End of plan"),
+    )
+
+
+def _artefact(plan: Plan) -> Text:
+    facts = plan.job.facts.artefact
+    return Verbatim(facts.name) if facts.name else Verbatim(facts.kind.replace("_", " "))
+
+
+def to_measure_words(plan: Plan) -> Text:
+    """How many placings are still to be measured, and how long that takes."""
+    count, total = len(plan.to_measure), sum(plan.minutes)
+    if not count:
+        return say("nothing more: the placings are recorded")
+    return plural(
+        count,
+        one=say("{count} placing, about {total:.0f} min", count=count, total=total),
+        many=say("{count} placings, about {total:.0f} min", count=count, total=total),
+    )
+
+
+def _warnings(plan: Plan) -> list[Text]:
+    said: list[Text] = [
+        say("Not met: {what}.", what=condition.what) for condition in plan.conditions if not condition.met
+    ]
+    found = plan.outlook.identifiability
+    if found is not None and not found.complete:
+        free = commas(named(p) for p in found.parameters if p.status == "free")
+        said.append(say("Not determined by these placings: {free}.", free=free))
+    return said
+
+
+def _sections(plan: Plan) -> tuple[Section, ...]:
+    return (
+        Section(say("Placings"), _placings(plan)),
+        Section(
+            say("Pictures of the placings"),
+            tuple(placing_pictures(plan.to_measure, plan.setting.volume.box, plan.first) if plan.to_measure else ()),
+        ),
+        Section(say("What these placings determine"), _determined(plan)),
+        Section(say("Repeats or placings"), worth(plan)),
+        Section(say("What a better plan gains"), _gain(plan)),
+        Section(say("Smallest effects that the diagnosis would find"), _smallest(plan)),
+        Section(
+            say("Conditions of the standard"),
+            tuple(
+                Paragraph(say("{mark} {what}", mark=MET if condition.met else NOT_MET, what=condition.what))
+                for condition in plan.conditions
+            ),
+        ),
+    )
+
+
+def placing_rows(plan: Plan) -> list[tuple[Text, ...]]:
+    """Number, title, from and to, points and time of every placing to be measured."""
+    return [
+        (number(first), placing.title, placing.ends, number(len(placing.points)), number(time, ".0f"))
+        for first, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
+    ]
+
+
+def _placings(plan: Plan) -> tuple[Block, ...]:
+    if not plan.to_measure:
+        return ()
+    heads = (
+        Column(say("No.")),
+        Column(say("Set up"), numeric=False),
+        Column(say("From → to, scale readings in mm"), numeric=False),
+        Column(say("Points")),
+        Column(say("Time"), unit("min")),
+    )
+    notes = [say("Every point {repeats} times; points count repeats.", repeats=plan.setting.plan.repeats)]
+    if plan.measured:
+        notes.append(say("{measured} measurements are recorded already.", measured=plan.measured))
+    return (Table(say("Placings in the order of measurement"), heads, tuple(placing_rows(plan)), tuple(notes)),)
+
+
+def _determined(plan: Plan) -> tuple[Block, ...]:
+    found = plan.outlook.identifiability
+    blocks: list[Block] = [Paragraph(say("No reading shows: {text}.", text=text)) for text in plan.free]
+    if found is None:
+        return tuple(blocks)
+    heads = (
+        Column(say("Parameter"), numeric=False), Column(say("Expected u")), Column(say("Under white noise")),
+        Column(say("Unit"), numeric=False), Column(say("Allowed by physics")), Column(NOTHING, numeric=False),
+    )  # fmt: skip
+    rows = tuple(
+        (
+            named(p),
+            expected(p),
+            expected_white(p),
+            unit_of(p),
+            (number(p.unknown.prior_sd, ".3g") if p.unknown.prior_sd < 1e6 else say("any")),
+            STATUS[p.status],
+        )
+        for p in found.parameters
+    )
+    note = say(
+        "u is the standard uncertainty of the least-squares estimate, certificates included. "
+        "“Allowed by physics” is the standard deviation that the effect may have before anything is "
+        "measured."
+    )
+    blocks.append(Table(say("What to expect"), heads, rows, (note, *averaging_note(plan))))
+    blocks += [
+        Paragraph(say("Stays free: {combination}.", combination=combination(parts)), tone="warning")
+        for parts in found.free
+    ]
+    blocks += [Paragraph(say("Could not be told apart: {text}.", text=text)) for text in pairs(found)]
+    blocks += [
+        Paragraph(say("If it acts, it will be taken for what the job names: {text}.", text=text))
+        for text in absorbed(found)
+    ]
+    if found.unseen:
+        blocks.append(
+            Paragraph(
+                say("Nothing would show of: {effects}.", effects=commas(title_of(name) for name in found.unseen)),
+                tone="note",
+            )
+        )
+    return tuple(blocks)
+
+
+def _gain(plan: Plan) -> tuple[Block, ...]:
+    start, better = plan.start.identifiability, plan.better.identifiability if plan.better else None
+    criterion = plan.setting.plan.criterion
+    if start is None or better is None or plan.better is None or criterion is None:
+        return ()
+    both = (say("the recording") if plan.name == RECORDED else plan.name, say("the better plan"))
+    count, before = len(plan.better.placings), len(plan.start.placings)
+    blocks: list[Block] = [
+        Paragraph(
+            say(
+                "Searched for: {criteria}, by greedy choice and exchange. {before} placings before, {better} "
+                "in the better plan, {kept} of them kept. Pairs that could not be told apart: {alike_before} "
+                "before, {alike_after} after; effects of which nothing shows, or that pass for named ones: "
+                "{hidden_before} before, {hidden_after} after.",
+                criteria=CRITERIA[criterion],
+                before=before,
+                better=count,
+                kept=plan.kept,
+                alike_before=len(start.alike),
+                alike_after=len(better.alike),
+                hidden_before=len(start.unseen) + len(start.absorbed),
+                hidden_after=len(better.unseen) + len(better.absorbed),
+            )
+        )
+    ]
+    blocks += _beside(
+        [(named(p), p.u, q.u, unit_of(p), expected(p), expected(q))
+         for p, q in zip(start.parameters, better.parameters, strict=True)],
+        both, say("Expected standard uncertainty"),
+    )  # fmt: skip
+    if plan.start.powers and plan.better.powers:
+        blocks += _beside(
+            [
+                (
+                    title_of(p.effect),
+                    p.identifiable,
+                    q.identifiable,
+                    p.unit,
+                    smallest(p.identifiable),
+                    smallest(q.identifiable),
+                )
+                for p, q in zip(plan.start.powers, plan.better.powers, strict=True)
+                if p.identifiable is not None or q.identifiable is not None
+            ],
+            both,
+            say("Smallest effect named rightly"),
+        )
+    return tuple(blocks)
+
+
+def _beside(
+    rows: list[tuple[Text, float | None, float | None, Text, Text, Text]], names: tuple[Text, Text], quantity: Text
+) -> list[Block]:
+    """Both plans beside each other as a picture and in numbers: label, both values, unit, both in words."""
+    if not rows:
+        return []
+    heads = (Column(quantity, numeric=False), Column(names[0]), Column(names[1]), Column(say("Unit"), numeric=False))
+    table = Table(
+        say("{quantity} with both plans", quantity=quantity),
+        heads,
+        tuple((row[0], row[4], row[5], row[3]) for row in rows),
+    )
+    picture = gain_plot(
+        [row[0] for row in rows], [row[1] for row in rows], [row[2] for row in rows], names=names, quantity=quantity
+    )
+    return [picture, table]
+
+
+def _smallest(plan: Plan) -> tuple[Block, ...]:
+    if not plan.outlook.powers:
+        return ()
+    heads = (Column(say("Effect not in the job's model"), numeric=False), Column(say("Parameter"), numeric=False),
+             Column(say("Detected from")), Column(say("Named rightly from")), Column(say("Unit"), numeric=False))  # fmt: skip
+    rows = tuple(
+        (title_of(p.effect), Verbatim(p.parameter), smallest(p.detectable), smallest(p.identifiable), p.unit)
+        for p in plan.outlook.powers
+    )
+    note = say(
+        "Size found in {power:.0f} of 100 recordings, at {false_alarms:g} % of false alarms. Named "
+        "rightly: the effect alone is more probable than any other and than none, and no other is "
+        "left as possible. – where that is so for no size that physics allows, or for none up to "
+        "{sizes:.0f} times the noise in all observations together.",
+        power=100 * POWER,
+        false_alarms=100 * FALSE_ALARMS,
+        sizes=SIZES[-1],
+    )
+    notes: tuple[Text, ...] = (note,)
+    if plan.setting.plan.repeats > 1:
+        optimistic = say(
+            "With repeats, what changes from placing to placing looks in part like set-up offsets: such an effect may have to "
+            "be larger than is said here."
+        )
+        notes = (note, optimistic)
+    return (Table(say("Smallest effects"), heads, rows, notes),)

@@ -1,0 +1,198 @@
+"""Simulated recordings: drawn from exactly the model that the estimator fits."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.app.commands.reading import job_of, read_job
+from cmm_uq.artefacts import kind_of
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import JOB_BYTES
+from cmm_uq.base.files.table import LONGEST_MM
+from cmm_uq.base.files.toml_file import as_toml, checked
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.base.overflow import refusing_overflow
+from cmm_uq.base.plugins import naming_package
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.program import program
+from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import PLANNED, first_line
+from cmm_uq.jobs.truth import NoiseFacts, Truth
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.effect import Effect
+
+TRUTH = "truth.toml"
+"""Name of the truth in the folder of a simulated job."""
+
+_TRUTH_GIVES = "It gives the effects, the noise and the seed"
+_FIX = "Give effects, sizes and noise that a machine can have"
+
+
+@naming_package()
+def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
+    """The points of a recording with the placings of the job's own.
+
+    Parameters
+    ----------
+    job : its recording gives the placings and the columns.
+    truth : what acts.
+    seed : instead of the one in ``truth``.
+    truth_path : file that it was read from, for messages.
+
+    Raises
+    ------
+    CmmUqError : an unknown effect, parameter or size, or a column that an effect needs is missing.
+    """
+    columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
+    points = replace(job.points, columns={**job.points.columns, **columns})
+    observe = kind_of(job).observing("simulated")
+    if not job.planned:
+        from cmm_uq.app.commands.recorded import refuse_unfit  # the screening, which a plan's coordinates need not pass
+
+        refuse_unfit(job)
+    artefact = observe(job.facts.artefact, points, where=job.recording_path)
+    where = f"{truth_path} [effects]"
+    acting = tuple(_acting(artefact, effect, where) for effect in effects(tuple(truth.effects), where=where))
+    _refuse_unrecorded(points, acting, truth, truth_path)
+    given = [_given(effect, truth, truth_path) for effect in acting]
+    model = MeasurementModel(
+        artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
+    )
+    noise = _noise(truth.noise)
+    random = np.random.default_rng(truth.seed if seed is None else seed)
+    coefficients = np.concatenate([np.zeros(0), *(values for values, _ in given)])
+    with refusing_overflow(truth_path, _FIX):
+        drawn = model.simulate(coefficients, _sizes(artefact, truth, truth_path), noise, random)
+    if not np.all(np.abs(drawn) <= LONGEST_MM):
+        raise CmmUqError(f"the coordinates would go beyond {LONGEST_MM:g} mm", where=truth_path, fix=_FIX)
+    return points.at(drawn)
+
+
+def _acting(artefact: Artefact, effect: Effect, where: str) -> Effect:
+    """An effect as it acts on this artefact."""
+    try:
+        return artefact.acting(effect)
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
+
+
+def _given(effect: Effect, truth: Truth, truth_path: str) -> tuple[Floats, tuple[float, ...]]:
+    """Coefficients and shape of an effect that acts."""
+    try:
+        return effect.from_reported(truth.effects[effect.name])
+    except CmmUqError as error:
+        where = f"{truth_path} [effects.{effect.name}]"
+        raise CmmUqError(error.problem, where=error.where or where, fix=error.fix) from None
+
+
+def _refuse_unrecorded(points: Points, acting: Sequence[Effect], truth: Truth, truth_path: str) -> None:
+    """Refuse effects and slow noise that go by columns which neither the recording nor the truth has."""
+    asked = [(f"[effects.{effect.name}]", effect.name, column) for effect in acting for column in effect.columns]
+    asked += [("[noise] slow_um", "slow noise", "time_s")] if truth.noise.slow_um else []
+    for key, what, column in asked:
+        if column not in points.columns:
+            raise CmmUqError(f"{what} needs the column {column}, which the recording has not", where=f"{truth_path} {key}",
+                             fix=f"Record {column}, give it in [columns], or leave this out")  # fmt: skip
+
+
+def write_simulation(
+    job: Path, truth: Path, out: Path, *, seed: int | None = None, force: bool = False
+) -> dict[str, Path]:  # fmt: skip
+    """Write a job folder with a simulated recording, marked as such, and the truth that it was drawn from.
+
+    Returns
+    -------
+    path of each file.
+
+    Raises
+    ------
+    CmmUqError : bad input, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
+    """
+    read = read_job(job)
+    kind_of(read).observing("simulated")
+    content = content_of(truth, JOB_BYTES, _TRUTH_GIVES)
+    checked(content, truth, Truth)
+    owner = Owner("simulate", read.facts.job.id, read.origin)
+    with staged(out, owner, inputs=(*read.paths, truth), force=force, expected=(*read.inputs, TRUTH)) as place:
+        return place.write(_files(read, content, truth, seed))
+
+
+def simulated_job(job: Job, truth: Path | Mapping[str, Any], *, seed: int | None = None) -> Job:
+    """The job that :func:`write_simulation` writes, in memory.
+
+    Parameters
+    ----------
+    job : whose recording gives the placings and the columns.
+    truth : what acts, as the path of a ``truth.toml``, or as what such a file says.
+    seed : instead of the one in ``truth``.
+
+    Raises
+    ------
+    CmmUqError : bad input.
+    """
+    kind_of(job).observing("simulated")
+    if isinstance(truth, Path):
+        return job_of(_files(job, content_of(truth, JOB_BYTES, _TRUTH_GIVES), truth, seed))
+    return job_of(_files(job, as_toml(truth, TRUTH), Path(TRUTH), seed))
+
+
+def _files(job: Job, content: bytes, truth: Path, seed: int | None) -> dict[str, bytes]:
+    """Every file of the simulated job; ``truth`` is where ``content`` was read, for messages."""
+    drawn = checked(content, truth, Truth)
+    points = simulate(job, drawn, seed=seed, truth_path=str(truth))
+    how = f", seed {drawn.seed if seed is None else seed}, from {TRUTH}"
+    files = {
+        **kept_inputs(job),
+        recording_name(job): first_line("simulate", program(job, drawn.effects), how).encode() + recording(points),
+        TRUTH: content,
+    }
+    return {"job.toml": derived_toml(job, "simulate", files, without=IN_THE_RECORDING), **files}
+
+
+def recording(points: Points) -> bytes:
+    """Points as a recording's CSV: coordinates to 0.1 nm, everything else as it was read."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    names = ["measurement", "point", "repeat", *(f"{axis}_mm" for axis in AXES), *points.columns]
+    writer.writerow(names)
+    for i in range(len(points)):
+        numbers = [points.measurement[i], points.point[i], points.repeat[i]]
+        coordinates = [f"{value:.7f}" for value in points.xyz[i]]
+        writer.writerow([*numbers, *coordinates, *(f"{values[i]:.10g}" for values in points.columns.values())])
+    return text.getvalue().encode()
+
+
+def to_fill_in(points: Points) -> bytes:
+    """Points at nominal coordinates as the CSV of a recording that is still to be measured."""
+    return PLANNED.encode() + recording(points)
+
+
+def _noise(given: NoiseFacts) -> Noise:
+    x, y, z = (sd * MICROMETRE for sd in given.coordinates_um)
+    return Noise(
+        (x, y, z), given.placing_um * MICROMETRE, given.growth_um * MICROMETRE, given.slow_um * MICROMETRE,
+        inf if given.slow_time_s == "never" else given.slow_time_s, given.tails_dof or 0.0, given.resolution_um * MICROMETRE,
+    )  # fmt: skip
+
+
+def _sizes(artefact: Artefact, truth: Truth, path: str) -> Floats:
+    names = [size.name for size in artefact.sizes]
+    for name in truth.artefact:
+        if name not in names:
+            raise CmmUqError(f"a {artefact.kind} has no size {name!r}", where=f"{path} [artefact]",
+                             fix=suggestion(name, names) if names else "Leave it out")  # fmt: skip
+    return np.array([truth.artefact.get(size.name, size.nominal) for size in artefact.sizes], dtype=np.float64)

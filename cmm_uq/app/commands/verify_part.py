@@ -1,0 +1,234 @@
+"""Is the report of a part what it says? Its figures and inputs, the machine's certificate inside, and all computed again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Finding, Inquiry
+from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.written import Finished, Stage
+    from cmm_uq.jobs.part.job import PartJob
+
+TRUSTED = "whose signature the machine's certificate has"
+
+
+def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
+    """Figures, decisions, inputs and the machine's certificate of a part's report; its job, where the inputs are sound.
+
+    Parameters
+    ----------
+    rerun : whether the machine's certificate is computed again.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody.
+    """
+    if given.results is None:
+        return None
+    from cmm_uq.certificate.verify.consistent import check_verdicts
+    from cmm_uq.certificate.verify.inputs import check_results, inputs_of
+    from cmm_uq.certificate.verify.part_decided import check_part_decisions
+    from cmm_uq.certificate.verify.part_figures import check_part_figures
+
+    name, data, _ = given.results
+    with inquiry.reading("figures", name):
+        check_results(inquiry, given)
+        check_part_figures(inquiry, data, name)
+        check_part_decisions(inquiry, data, name)
+        check_verdicts(inquiry, data, name)
+        _check_stated(inquiry, given)
+    inputs = inputs_of(inquiry, given)
+    if inputs is None:
+        inquiry.left(f"the machine's certificate and {AGAIN}", "the inputs are not there as results.json names them")
+        return None
+    try:
+        job = part_job(inputs, data)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", "inputs", "", f"are no job that this version reads: {error}")
+        return None
+    try:
+        _check_job(inquiry, job, data, name)
+        _check_machine(inquiry, job, data, name, rerun=rerun, trust=trust)
+    except (KeyError, TypeError, AttributeError) as error:
+        inquiry.wrong("inputs", name, "", f"has not the parts that cmm-uq writes ({type(error).__name__}: {error})")
+        return None
+    return job
+
+
+def _check_stated(inquiry: Inquiry, given: Given) -> None:
+    """What page and PDF state; their words are compared with each other besides, where both are there."""
+    from cmm_uq.certificate.verify.part_stated import check_part_stated
+
+    if given.results is None:
+        return
+    name, data, _ = given.results
+    if given.html is not None:
+        check_part_stated(inquiry, data, given.html[1].text, files=(given.html[0], name))
+    if given.pdf is not None:
+        check_part_stated(inquiry, data, _without_feet(given), files=(given.pdf[0], name))
+
+
+def _without_feet(given: Given) -> str:
+    from cmm_uq.certificate.verify.views_agree import squashed, without_foot
+
+    if given.pdf is None:
+        return ""
+    pdf = given.pdf[1]
+    title = squashed(pdf.information.get("/Title", ""))
+    pages = enumerate(pdf.pages, 1)
+    return "".join(without_foot(squashed(text), title, number, len(pdf.pages))[0] for number, text in pages)
+
+
+def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
+    """The job of the inputs of a part's report, with those of the machine's job where that was analysed.
+
+    Raises
+    ------
+    CmmUqError : they are no job of a part.
+    """
+    from cmm_uq.app.commands.part_history import FILE as HISTORY
+    from cmm_uq.app.commands.part_machine import CALIBRATION, with_history
+    from cmm_uq.app.commands.part_written import in_language
+    from cmm_uq.jobs.part.job import part_of
+
+    language = language_of(data)
+    stated = {name: content for name, content in inputs.items() if name != HISTORY}
+    own = {name: content for name, content in stated.items() if not name.startswith(CALIBRATION)}
+    job = in_language(part_of(own), language)
+    if job.facts.machine_state.job is None:
+        job = job if len(own) == len(stated) else in_language(part_of(stated), language)
+    else:
+        job = replace(job, inputs={**job.inputs, **stated})
+    return with_history(job, inputs.get(HISTORY))
+
+
+def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str) -> None:
+    from cmm_uq.analysis.parts.result import evaluated
+    from cmm_uq.app.commands.part_plan import plan_of
+    from cmm_uq.certificate.verify.part_job import check_part_job
+
+    inquiry.looked("inputs")
+    if sorted(data["job"]["inputs_sha256"]) != sorted(job.inputs):
+        inquiry.wrong("inputs", file, "job.inputs_sha256", "names other files than the job",
+                      sorted(data["job"]["inputs_sha256"]), sorted(job.inputs))  # fmt: skip
+    try:
+        plan = plan_of(job)
+        measured = None if job.measured is None else evaluated(plan, job.measured)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", file, "", f"is of a job that cannot be evaluated: {error}")
+        return
+    check_part_job(inquiry, job, plan, measured, data, file)
+
+
+def _check_machine(
+    inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str, *, rerun: bool, trust: Iterable[Path] | None
+) -> None:
+    """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
+    from cmm_uq.app.commands.part_machine import attached_calibration, standing_of, verified
+    from cmm_uq.certificate.verify.part_job import check_standing
+    from cmm_uq.jobs.reading import sha256
+
+    said = data["machine"]
+    if job.facts.machine_state.job is not None:
+        inquiry.looked("inputs")
+        hashes = sha256(attached_calibration(job))
+        if said["inputs_sha256"] != hashes:
+            inquiry.wrong(
+                "inputs",
+                file,
+                "machine.inputs_sha256",
+                "are not the machine's job inside",
+                said["inputs_sha256"],
+                hashes,
+            )
+        inquiry.notes.append("No certificate states the machine: its job was analysed, and is inside.")
+        return
+    held = bool(said["signatures_held_to_trusted"])
+    if held and trust is None:
+        inquiry.left(TRUSTED, "it was held to trusted certificates, and none are given (--trust)")
+    where = ", ".join(job.stated_by)
+    try:
+        found = verified(job, rerun=rerun, trust=trust if held else None)
+    except CmmUqError as error:
+        inquiry.wrong("inputs", where, "", f"is no certificate that states the machine: {error}")
+        return
+    _merge(inquiry, found.inquiry, where)
+    if found.inquiry.findings:
+        return
+    inquiry.looked("dates")
+    try:
+        standing = standing_of(job, found)
+    except CmmUqError as error:
+        inquiry.wrong("dates", where, "", f"does not hold for this part: {error.problem}")
+        return
+    check_standing(inquiry, standing, data, file)
+
+
+def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
+    """What was found of the certificate inside, named as such."""
+    for one in inner.findings:
+        inquiry.findings.append(
+            Finding(one.check, _within(where, one.file), one.place, one.problem, one.stands, one.should)
+        )
+    for left in inner.unchecked:
+        if (left.what, left.why) != (AGAIN, NOT_ASKED):
+            inquiry.left(f"{where}: {left.what}", left.why)
+    inquiry.notes += [f"{where}: {note}" for note in inner.notes]
+    for check, count in inner.done.items():
+        inquiry.looked(check, count)
+
+
+def _within(where: str, file: str) -> str:
+    """A file of the certificate inside; the certificate itself by the name that it has among the inputs."""
+    return where if where.rpartition("/")[2] == file else f"{where}: {file}"
+
+
+def part_again(
+    inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], finished: Finished, *, trust: Iterable[Path] | None, stage: Stage
+) -> tuple[dict[str, bytes], tuple[str, ...]] | None:  # fmt: skip
+    """Files that the inputs of a part's report give, by name, and which of them are not inside the PDF.
+
+    ``None`` where that cannot be known, with the reason kept.
+
+    Parameters
+    ----------
+    data : of results.json.
+    finished : what becomes of a document before the next is made of it.
+
+    Raises
+    ------
+    CmmUqError : they give nothing.
+    """
+    from cmm_uq.app.commands.part_history import FILE as HISTORY
+    from cmm_uq.app.commands.part_written import Asked, contents_of, found_of
+
+    said, simulation = data["machine"], data["simulation"]
+    held = bool(said["signatures_held_to_trusted"])
+    if held and trust is None:
+        inquiry.left(AGAIN, "the machine's certificate was held to trusted certificates, and none are given (--trust)")
+        return None
+    history = job.inputs.get(HISTORY)
+    if history is not None:
+        inquiry.notes.append(
+            "The machine's changes since its calibration follow from its history inside, as records had it."
+        )
+    asked = Asked(
+        _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
+        _asked_again(said), tuple(trust or ()) if held else None, None, history,
+    )  # fmt: skip
+    found = found_of(job, asked, stage)
+    return contents_of(found, stage, finished=finished), tuple(found.files)
+
+
+def _asked_again(said: Mapping[str, Any]) -> bool:
+    """Whether the machine's certificate was to be computed again, with ``--rerun``; another version may have made it."""
+    return {"what": AGAIN, "why": NOT_ASKED} not in said["not_checked"]
+
+
+def _whole(value: Any, key: str) -> int:
+    if not isinstance(value, int) or value < 0:
+        raise CmmUqError(f"{value!r} is none", where=f"{RESULTS}: simulation.{key}")
+    return value

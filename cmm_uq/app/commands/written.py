@@ -1,0 +1,233 @@
+"""From an outcome to the files of a command: rendered, and written as one set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cmm_uq.app.commands.recording import ledger_of, opened
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.certificate.fonts import fonts_of
+from cmm_uq.certificate.in_short import Summary
+from cmm_uq.certificate.outcome import Found, Outcome
+from cmm_uq.jobs.job import Job
+from cmm_uq.laboratory.records.place import NONE
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.signing import Signing
+
+Stage = Callable[[str, float], None]
+"""Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
+
+Told = Callable[[Job], None]
+"""Told of the job as it was read, before anything is computed of it."""
+
+REPORTS, RESULTS = Path("reports"), "results.json"
+
+
+Finished = Callable[[str, bytes], bytes]
+"""What becomes of a document that was made, by its name."""
+
+
+def unchanged(name: str, content: bytes) -> bytes:
+    """A document as it was made."""
+    return content
+
+
+def silent(what: str, part: float) -> None:
+    """Nobody is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """What a command found and wrote.
+
+    Parameters
+    ----------
+    outcome : what was found.
+    results : contents of results.json.
+    files : what was written, by name.
+    records : what it was recorded in, as it is shown; empty where it was not.
+    """
+
+    outcome: Outcome
+    results: bytes
+    files: dict[str, Path]
+    records: str = ""
+
+    @property
+    def found(self) -> Found:
+        """In the kind's own terms."""
+        return self.outcome.found
+
+    @property
+    def name(self) -> str:
+        """Id of the job."""
+        return self.found.job.facts.job.id
+
+    @property
+    def origin(self) -> str:
+        """Of the recording, and what became of it."""
+        return self.found.job.origin
+
+    @property
+    def recorded(self) -> str:
+        """Where it was recorded, in a sentence; empty where it was not."""
+        if not self.records:
+            return ""
+        named = self.found.job.facts.machine.serial
+        nameless = "" if named else "; the machine has no [machine] serial and is known by its name"
+        return f"Recorded in {self.records}{nameless}."
+
+    @property
+    def summary(self) -> Summary:
+        """For the end of the command."""
+        return self.outcome.summary
+
+    @property
+    def conforming(self) -> bool:
+        """See :class:`~cmm_uq.certificate.outcome.Outcome`."""
+        return self.outcome.conforming
+
+
+@dataclass(frozen=True)
+class Form:
+    """In which files a command writes an outcome, and where.
+
+    Parameters
+    ----------
+    command : of ``cmm-uq``.
+    documents : their names, in the order in which they are made: a digital certificate (``.xml``) carries the page before it,
+        and is attached to the PDF after it; those of a recording that was not measured carry its origin.
+    below : folder in ``reports/<job id>`` that is written to by default.
+    further : names of files that come with it.
+    recorded : whether what it writes is kept in records.
+    """
+
+    command: str
+    documents: tuple[str, ...]
+    below: str = ""
+    further: tuple[str, ...] = ()
+    recorded: bool = False
+
+    def write(
+        self,
+        job: Job,
+        outcome: Callable[[], Outcome],
+        out: Path | None = None,
+        *,
+        force: bool = False,
+        stage: Stage = silent,
+        records: str | Path | None = NONE,
+        signing: Signing | None = None,
+    ) -> Written:
+        """Make sure of the folder, then compute, render and write, all or none, and record it with that.
+
+        Parameters
+        ----------
+        job : that the outcome is of.
+        outcome : computes it.
+        out : folder to write to.
+        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+        stage : told of progress.
+        records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
+        signing : who signs the documents; ``None`` for nobody.
+
+        Raises
+        ------
+        CmmUqError : as computing does, the documents cannot be signed, or something in the folder that this command did not
+            write for this job.
+        OutputError : the folder, or the records, cannot be written to.
+        """
+        fonts_of(job.facts.job.language)  # refused before anything is computed
+        owner = self.owner(job)
+        folder = out or REPORTS / owner.job / self.below
+        expected = (*self.names(job), RESULTS, *self.further)
+        with (
+            opened(records if self.recorded else NONE, out) as history,
+            staged(folder, owner, inputs=job.paths, force=force, expected=expected) as place,
+        ):
+            found = outcome()
+            finished = unchanged if signing is None else _signed_by(signing, job)
+            contents = self.contents(found, stage, finished=finished)
+            stage(f"Writing: {len(contents)} files to {folder}", 0.95)
+            ledger = None if history is None else ledger_of(history, job, self.command, folder, contents, RESULTS)
+            files = place.write(contents, ledger=ledger)
+            where = "" if history is None else history.shown
+        stage("Done", 1.0)
+        return Written(found, contents[RESULTS], files, where)
+
+    def owner(self, job: Job) -> Owner:
+        """Of what is written for a job."""
+        return Owner(self.command, job.facts.job.id, job.origin)
+
+    def contents(
+        self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
+    ) -> dict[str, bytes]:  # fmt: skip
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
+
+        Parameters
+        ----------
+        outcome : that is written.
+        stage : told of progress.
+        results_only : whether nothing but ``results.json`` is wanted.
+        finished : what becomes of a document before the next is made of it, as of one that is signed.
+        """
+        from cmm_uq.certificate.results_file import as_json
+
+        if results_only:
+            return {RESULTS: as_json(outcome.results)}
+        from cmm_uq.certificate.html import render_html
+        from cmm_uq.certificate.in_language import said
+        from cmm_uq.certificate.origin import marked
+        from cmm_uq.certificate.pdf import render_pdf
+        from cmm_uq.certificate.provenance import FILE, provenance
+
+        job, data = outcome.found.job, as_json(outcome.results)
+        document = said(marked(outcome.document, job), job.facts.job.language)
+        for name in {*outcome.files, *({FILE} & {*self.further})} & job.inputs.keys():
+            raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / name),
+                             fix="Rename it, in job.toml too")  # fmt: skip
+        rendered: dict[str, bytes] = {}
+        further = {RESULTS: data, **outcome.files}
+        for name in self.names(job):
+            stage(f"Rendering: {name}", 0.8)
+            if name.endswith(".html"):
+                made = render_html(document).encode()
+            elif name.endswith(".xml"):
+                made = _digital(job, data, rendered)
+            else:
+                if FILE in self.further:
+                    further[FILE] = finished(FILE, provenance(job, outcome.results, {**rendered, **further}))
+                digital = {one: content for one, content in rendered.items() if one.endswith(".xml")}
+                made = render_pdf(document, {**job.inputs, **digital, **further})
+            rendered[name] = finished(name, made)
+        return {**rendered, **further}
+
+    def names(self, job: Job) -> list[str]:
+        """Of the documents of a job."""
+        from cmm_uq.certificate.origin import file_name
+
+        return [file_name(document, job.origin) for document in self.documents]
+
+
+def _digital(job: Job, results: bytes, rendered: Mapping[str, bytes]) -> bytes:
+    """The digital certificate, of results.json and the job alone, with the page as its human-readable copy."""
+    from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
+    from cmm_uq.jobs.dcc import written
+
+    page = next((content for name, content in rendered.items() if name.endswith(".html")), None)
+    return written(digital_certificate(json.loads(results), job, html=page, file=results))
+
+
+def _signed_by(signing: Signing, job: Job) -> Finished:
+    """What signs the documents of a job, in its language."""
+    language = job.facts.job.language
+    return signing.finished(
+        job.facts.laboratory.model_dump(), language=language, said=lambda text: said_in(text, language)
+    )

@@ -1,0 +1,90 @@
+"""The kinds of measurement, a folder each: all that is particular to a ballbar, a plate, an axis read in shifted places.
+
+This is the registry: the built-in kinds by name, and those of other packages, which name them as entry points of the group
+``cmm_uq.kinds``. A kind is imported when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib import import_module
+from types import MappingProxyType
+from typing import Any
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.plugins import KINDS, Plugin, named, offered
+from cmm_uq.base.points import Points
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.job import Job
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.kind import Kind
+
+BUILT_IN: Mapping[str, str] = MappingProxyType({
+    "ballbar": "ballbar", "bryan": "bryan", "step_gauge": "step_gauge", "gauge_blocks": "gauge_blocks", "plate": "plate",
+    "triangle": "triangle", "sphere": "sphere", "plane": "plane", "shift": "shifting", "error_map": "error_maps",
+    "digitizer": "digitizer",
+})  # fmt: skip
+"""Folder of each built-in kind."""
+
+
+def names() -> tuple[str, ...]:
+    """Of all kinds, those of other packages last."""
+    return (*BUILT_IN, *(plugin.name for plugin in _offered() if plugin.name not in BUILT_IN))
+
+
+@cache
+def kind_named(name: str) -> Kind | None:
+    """A kind by its name; ``None`` where there is none. A built-in kind cannot be replaced.
+
+    Raises
+    ------
+    CmmUqError : another package offers it, but cannot be loaded, or two packages do.
+    """
+    if name in BUILT_IN:
+        found: Kind = import_module(f"cmm_uq.artefacts.{BUILT_IN[name]}.kind").KIND
+        return found
+    outside = named(_offered(), name)
+    return None if outside is None else outside.loaded(Kind)
+
+
+def kind_of(job: Job) -> Kind:
+    """The kind of a job.
+
+    Raises
+    ------
+    CmmUqError : there is none of this name.
+    """
+    return _known(job.facts.artefact.kind)
+
+
+def table_of(name: str) -> type[ArtefactFacts] | None:
+    """Keys that ``[artefact]`` of a kind may have; ``None`` where there is no such kind."""
+    kind = kind_named(name)
+    return None if kind is None else kind.table
+
+
+def artefact_facts(**keys: Any) -> ArtefactFacts:
+    """``[artefact]`` as a job says it, checked by the table of its kind."""
+    return _known(keys["kind"]).table.model_validate(keys)
+
+
+def artefact_of(facts: ArtefactFacts, points: Points, *, where: str | None = None) -> Artefact:
+    """The artefact that a job describes, with its recording.
+
+    Raises
+    ------
+    CmmUqError : this kind is not known, has no artefact, or the recording does not fit it.
+    """
+    return _known(facts.kind).observing("observed as an artefact")(facts, points, where=where)
+
+
+def _known(name: str) -> Kind:
+    found = kind_named(name)
+    if found is None:
+        raise CmmUqError(f"no kind {name!r}", where="job.toml [artefact] kind", fix=f"Known: {', '.join(names())}")
+    return found
+
+
+def _offered() -> tuple[Plugin, ...]:
+    return offered(KINDS, Plugin)

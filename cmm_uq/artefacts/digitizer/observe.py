@@ -1,0 +1,176 @@
+"""Laser digitizer on a reference sphere, in several attitudes: where its mount lies (Harris 2004 sections 4.4 and 5.3).
+
+With the mount at true coordinates D, a point of the scan plane lies at D + q, q = E·([u v 0] − [U1 V1 W1]). Recorded are
+the points of the sphere (``u_mm``, ``v_mm``, and the scale readings as x, y, z), or the readings with the origin of the scan
+plane at its centre (u = v = 0). The offset [U1 V1 W1] is what is sought, the sphere's place is free; the rotations of the
+carriages turn q (eq. 35), so q is the stylus tip offset of each point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.artefacts.digitizer.attitudes import alignments, check_angles, refuse_undetermined, scan_of
+from cmm_uq.artefacts.digitizer.facts import AlignmentFacts
+from cmm_uq.artefacts.digitizer.target import Centre, ScannedSphere, Target
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Verbatim, say
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.machine.model.artefact import Artefact, Size
+from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.physics.alignment import Alignment, MountOffset, mount_offset
+from cmm_uq.machine.physics.scanning import attitudes
+from cmm_uq.maths.inference.freedoms import Freedoms
+
+OFFSET = ("U1", "V1", "W1")
+
+_FAR = 0.2
+"""Part of the offset by which a drawing may be off before a unit or a column is taken for mistaken."""
+
+
+class Digitizer(Artefact):
+    """A laser digitizer in several attitudes, each a ``measurement``.
+
+    Parameters
+    ----------
+    facts : what the job says of it.
+    points : the recording, with ``alpha_deg``, ``beta_deg``, ``gamma_deg``; scale readings as x, y, z.
+
+    Attributes
+    ----------
+    attitude : (n, 3, 3) of each point: columns u, v, w in machine axes.
+    alignments : of each measurement by itself.
+    start : the offset from these alone.
+    poses : which points were recorded in which attitude.
+
+    Raises
+    ------
+    CmmUqError : no attitudes, or such that do not determine the offset; points of no sphere; another digitizer.
+    """
+
+    kind = "digitizer"
+    title = say("Laser digitizer")
+
+    def __init__(self, facts: AlignmentFacts, points: Points, *, where: str | None = None) -> None:
+        check_angles(points, where)
+        self.poses = Placings.of(points.measurement)
+        self.attitude = attitudes(points)
+        scan = scan_of(points)
+        self.scanned = scan is not None
+        self._seen = np.zeros((len(points), 3)) if scan is None else np.column_stack([scan, np.zeros(len(scan))])
+        self.alignments: tuple[Alignment, ...] = alignments(points, where)
+        refuse_undetermined(self.alignments, where)
+        self.start: MountOffset = mount_offset(self.alignments)
+        self._refuse_another(facts, points, where)
+        carried = self._carried(self.start.offset)
+        self.points = replace(
+            points, machine=replace(points.machine, tip_on_every_carriage=True),
+            columns={**points.columns, **{f"tip_{axis}_mm": carried[:, i] for i, axis in enumerate(AXES)}},
+        )  # fmt: skip
+        self._tip = carried
+        # observations, sizes and place are all seen along the directions of the recorded points: taken anew at fitted
+        # ones, they would differ by the noise, and what no recording determines would seem determined
+        self._seen_at = points.xyz + carried
+        self.target: Target = (
+            ScannedSphere(facts, points.at(self._seen_at), where) if self.scanned else Centre(len(points))
+        )
+        self.rows, self.noise_scale = self.target.rows, self.target.noise_scale
+        self.measurement, self.repeat = points.measurement[self.rows[:, 0]], points.repeat[self.rows[:, 0]]
+        self.u_turn, self.u_shift = facts.u_attitude_arcsec, facts.u_centre_um
+        self.sizes = (*self._offset_sizes(), *self.target.sizes, *self._set_up_sizes())
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """See :meth:`Artefact.fit`: where the mount was for the points to lie on one sphere."""
+        own = len(self.target.sizes)
+        carried = self._carried(sizes[:3]) + self._set_up @ sizes[3 + own :]
+        return self.target.fit(true_xyz + carried, sizes[3 : 3 + own]) - carried
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """See :meth:`Artefact.project`: away from the sphere's centre, or every coordinate."""
+        return self.target.project(self._seen_at, displacement)
+
+    def placing(self, xyz: Floats) -> Floats | Freedoms:
+        """See :meth:`Artefact.placing`: the place of the sphere."""
+        return self.target.placing(self._seen_at)
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`: of offset, sphere, and set-ups."""
+        moved = np.concatenate([self.attitude, -self._set_up], axis=2)
+        shown = self.target.project(self._seen_at, moved)
+        return np.hstack([shown[:, :3], self.target.size_change(), shown[:, 3:]])
+
+    def centre(self, xyz: Floats, sizes: Floats) -> Floats:
+        """(3,) centre of the sphere, mm, for true coordinates (n, 3) of the mount and these sizes."""
+        own = len(self.target.sizes)
+        seen = xyz + self._carried(sizes[:3]) + self._set_up @ sizes[3 + own :]
+        if isinstance(self.target, ScannedSphere):
+            return np.asarray(self.target.centres(seen, float(sizes[3]))[0], dtype=np.float64)
+        return np.asarray(seen.mean(axis=0), dtype=np.float64)
+
+    def _carried(self, offset: Floats) -> Floats:
+        """(n, 3) from the mount to what it sees, mm, in machine axes."""
+        return np.asarray(np.einsum("nij,nj->ni", self.attitude, self._seen - offset), dtype=np.float64)
+
+    @cached_property
+    def _set_up(self) -> Floats:
+        """(n, 3, j) what each size of a set-up moves of the points that were recorded in it, mm per unit of the size."""
+        freedoms = []
+        if self.u_turn:
+            freedoms.append(ARCSECOND * np.cross(np.eye(3)[None], self._tip[:, None, :]))
+        if any(self.u_shift):
+            freedoms.append(np.broadcast_to(MICROMETRE * np.eye(3), (len(self._tip), 3, 3)))
+        if not freedoms:
+            return np.zeros((len(self._tip), 3, 0))
+        return (
+            self.poses.columns(np.concatenate(freedoms, axis=1).transpose(0, 2, 1))
+            .dense()
+            .reshape(len(self._tip), 3, -1)
+        )
+
+    def _offset_sizes(self) -> tuple[Size, ...]:
+        return tuple(
+            Size(f"{name}_mm", Verbatim(name), unit("mm"), float(value), np.inf, role="sought")
+            for name, value in zip(OFFSET, self.start.offset, strict=True)
+        )
+
+    def _set_up_sizes(self) -> tuple[Size, ...]:
+        """In the order of :attr:`_set_up`."""
+        found = []
+        for number in self.poses.numbers.tolist():
+            if self.u_turn:
+                found += [
+                    Size(
+                        f"turn_{a}_{number}_arcsec",
+                        say("Turn of measurement {number} about {axis}", number=number, axis=Verbatim(a.upper())),
+                        unit("″"), 0.0, self.u_turn, role="set-up",
+                    )
+                    for a in AXES
+                ]  # fmt: skip
+            if any(self.u_shift):
+                found += [
+                    Size(
+                        f"shift_{a}_{number}_um",
+                        say("Shift of measurement {number} along {axis}", number=number, axis=Verbatim(a.upper())),
+                        unit("µm"), 0.0, u, role="set-up",
+                    )
+                    for a, u in zip(AXES, self.u_shift, strict=True)
+                ]  # fmt: skip
+        return tuple(found)
+
+    def _refuse_another(self, facts: AlignmentFacts, points: Points, where: str | None) -> None:
+        if not np.ptp(points.xyz, axis=0).any():
+            raise CmmUqError("the scale readings are all the same: nothing moved between the attitudes", where=where,
+                             fix="Record the scale readings D, E, F as x_mm, y_mm, z_mm")  # fmt: skip
+        if facts.offset_mm is None:
+            return
+        drawn = np.array(facts.offset_mm)
+        if np.linalg.norm(self.start.offset - drawn) > _FAR * np.linalg.norm(drawn):
+            found = ", ".join(f"{value:.3f}" for value in self.start.offset)
+            raise CmmUqError(
+                f"the alignments give [U1 V1 W1] = [{found}] mm, far from offset_mm", where=where,
+                fix="Check the units, the Euler angles, and offset_mm in job.toml [artefact]",
+            )  # fmt: skip

@@ -1,0 +1,159 @@
+"""What a certificate shows of a digitizer: the offset of its mount, every attitude, and the offset by other ways."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cmm_uq.artefacts.digitizer.analysis import DigitizerFigures, results
+from cmm_uq.artefacts.digitizer.attitudes import words
+from cmm_uq.artefacts.digitizer.observe import OFFSET, Digitizer
+from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.plots import length_plot
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import expanded
+from cmm_uq.maths.uncertainty.rounding import alike, rounded
+
+MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
+
+
+def sections(result: Result) -> list[Section]:
+    """The offset, the attitudes, the residuals."""
+    found = DigitizerFigures(result)
+    offset = (_offset(found), *_assumed(found.digitizer), _two_ways(found))
+    return [
+        Section(say("Offset of the mount"), offset),
+        Section(say("Attitudes"), (_attitudes(found), _residuals(result, found.digitizer))),
+    ]
+
+
+def _offset(found: DigitizerFigures) -> Table:
+    rows = []
+    for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
+        value, U, k = expanded(quantity)
+        rows.append((Verbatim(name), value, U, k, unit("mm"), *(signed(one, ".2f") for one in found.correlation[i])))
+    columns = (
+        Column(say("Component"), numeric=False), Column(say("Estimate")), Column(say("U")), Column(say("k")),
+        Column(say("Unit"), numeric=False),
+        *(Column(say("Correlation with {name}", name=Verbatim(name))) for name in OFFSET),
+    )  # fmt: skip
+    x, y, z = (signed(value, ".4f") for value in found.sphere)
+    notes = (
+        MEANING,
+        say("U is the expanded uncertainty for a coverage probability of 95 %; k = U/u."),
+        say("Centre of the reference sphere: ({x}, {y}, {z}) mm in the recorded frame.", x=x, y=y, z=z),
+    )
+    return Table(say("Offset of the mount"), columns, tuple(rows), notes)
+
+
+def _assumed(digitizer: Digitizer) -> list[Block]:
+    """What of the set-ups enters the uncertainty, and what does not."""
+    known: list[Text] = []
+    missing: list[Text] = []
+    if digitizer.u_turn:
+        known.append(say("attitude, u = {u:g}″ about each axis", u=digitizer.u_turn))
+    else:
+        missing.append(say("of the attitudes"))
+    if any(digitizer.u_shift):
+        x, y, z = digitizer.u_shift
+        known.append(say("the sphere's centre as a whole, u = ({x:g}, {y:g}, {z:g}) µm along x, y, z", x=x, y=y, z=z))
+    else:
+        missing.append(say("of what shifts a whole scan: form of the ball, digitizer, scales"))
+    said: list[Block] = []
+    if known:
+        said.append(Paragraph(say("In each attitude by itself, U contains: {known}.", known=semicolons(known))))
+    if len(missing) == 1:
+        said.append(Paragraph(say("U contains no uncertainty {missing}.", missing=missing[0]), tone="note"))
+    if len(missing) == 2:
+        first, second = missing
+        both = say("U contains no uncertainty {first} and none {second}.", first=first, second=second)
+        said.append(Paragraph(both, tone="note"))
+    return said
+
+
+def _two_ways(found: DigitizerFigures) -> Table:
+    start, closed = found.digitizer.start.offset, found.closed_form
+    rows = []
+    for i, (name, quantity) in enumerate(zip(OFFSET, found.offset, strict=True)):
+        value, _ = rounded(quantity.value, quantity.expanded)
+        each, _ = rounded(float(start[i]), quantity.expanded)
+        by_source = DASH if closed is None else rounded(float(closed[i]), quantity.expanded)[0]
+        rows.append((Verbatim(name), value, each, by_source, unit("mm")))
+    columns = (
+        Column(say("Component"), numeric=False), Column(say("Fitted model")), Column(say("By centres")),
+        Column(say("Closed form")), Column(say("Unit"), numeric=False),
+    )  # fmt: skip
+    notes = (
+        say(
+            "By centres: the centre of the sphere in each attitude by itself, then all equations by weighted least "
+            "squares. Closed form: Harris 2004 eq. 19–21, for its three attitudes."
+        ),
+    )
+    return Table(say("The offset by other ways"), columns, tuple(rows), notes)
+
+
+def _attitudes(found: DigitizerFigures) -> Table:
+    rows = [
+        (
+            number(pose.measurement), *(signed(angle, "g") for angle in pose.angles_deg), number(pose.points),
+            *(signed(value, ".4f") for value in pose.reading_mm), *(signed(value, ".1f") for value in pose.off_um),
+            DASH if pose.rms_um is None else number(pose.rms_um, ".1f"),
+        )
+        for pose in found.poses
+    ]  # fmt: skip
+    columns = (
+        Column(say("No.")), *(Column(Verbatim(name), unit("°")) for name in "αβγ"), Column(say("Points")),
+        *(Column(Verbatim(f"{name}0"), unit("mm")) for name in "DEF"),
+        *(Column(say("Off {axis}", axis=Verbatim(axis)), unit("µm")) for axis in "xyz"), Column(say("Rms"), unit("µm")),
+    )  # fmt: skip
+    direction, times = found.times
+    notes = (
+        say(
+            "D0, E0, F0: scale reading with the origin of the scan plane at the centre of the sphere, from this attitude "
+            "by itself. Off: this minus what the fitted offset gives. Rms: of the residuals."
+        ),
+        say(
+            "These attitudes tell least of the offset along {direction}: {times:.2g} times the uncertainty of one centre.",
+            direction=words(direction),
+            times=times,
+        ),
+    )
+    return Table(say("Every attitude"), columns, tuple(rows), notes)
+
+
+def _residuals(result: Result, digitizer: Digitizer) -> Plot:
+    after = result.residuals / MICROMETRE
+    before = _before(digitizer) / MICROMETRE
+    expanded_um = result.noise.expanded
+    what = (
+        say("radial distance of each point of the sphere")
+        if digitizer.scanned
+        else say("each coordinate of the centre")
+    )
+    low, high, low_after, high_after = alike(before.min(), before.max(), after.min(), after.max())
+    return length_plot(
+        digitizer.measurement.astype(float), before, after, expanded_before_um=expanded_um, expanded_after_um=expanded_um,
+        reference=say("fitted sphere") if digitizer.scanned else say("common centre"), flagged=result.flagged,
+        position_label=say("Attitude (its observations side by side)"), before_label=say("With the offset by centres"),
+        caption=say(
+            "Residuals, {what}, with U (k = {k}) of a coordinate.", what=what, k=number(result.noise.coverage_factor, ".2f")
+        ),
+        alternative=say(
+            "{count} observations: with the offset by centres they deviate by {low} to {high} µm; after the "
+            "fitted model {low_after} to {high_after} µm remain.",
+            count=len(after), low=low, high=high, low_after=low_after, high_after=high_after,
+        ),
+    )  # fmt: skip
+
+
+def _before(digitizer: Digitizer) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Residuals (m,), mm, about the offset from the centres, without any effect of the machine."""
+    nominal = np.array([size.nominal for size in digitizer.sizes])
+    xyz = digitizer.points.xyz
+    fitted = digitizer.fit(xyz, nominal)
+    return digitizer.project(fitted, (xyz - fitted)[:, :, None])[:, 0]
+
+
+PAGE = Page(sections, results)

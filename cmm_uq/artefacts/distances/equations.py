@@ -1,0 +1,269 @@
+"""The distance equations of US 4,437,151: scale errors and axis angles from positions a known distance apart.
+
+    d² = (1+e1)dX² + 2e2 dXdY + 2e3 dXdZ + (1+e4)dY² + 2e5 dYdZ + (1+e6)dZ²                     (100), (110)
+
+A second way to the six factors, beside the measurement model, with the model's answer to compare: to first order e1, e4 and
+e6 are twice the scale errors, and e2, e3, e5 the squareness errors XY, ZX, YZ with the opposite sign. Any artefact with two
+positions a known distance apart serves; a swept bar gives them once its fixed ball is found (108).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.artefacts.distances.symmetric_systems import by_doolittle, by_jacobi
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, commas, plural, say
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
+from cmm_uq.certificate.stating import AtLeast, as_evaluated
+from cmm_uq.machine.physics.rigid_body import SCALE, SQUARENESS
+from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
+
+UNKNOWNS = 6
+
+FACTORS = tuple((effect.name, "ppm") for effect in SCALE.values()) + tuple(
+    (effect.name, "angle_arcsec") for effect in SQUARENESS.values()
+)
+"""Effects that the equations give, with their parameters."""
+
+POORLY_POSED = 1e-3
+"""Ratio of singular values of the equations for unit distances below which a factor hangs on set-up and noise."""
+
+SOLUTIONS: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "QR": lambda A, b: _by_qr(A, b),
+    "Doolittle": lambda A, b: by_doolittle(A.T @ A, A.T @ b),
+    "Jacobi": lambda A, b: by_jacobi(A.T @ A, A.T @ b),
+}
+"""Orthogonal factorisation, which is reported, and the patent's two ways to solve its normal equations."""
+
+PLACINGS: dict[Text, tuple[int, int, int]] = {
+    say("along X"): (1, 0, 0), say("along Y"): (0, 1, 0), say("along Z"): (0, 0, 1),
+    say("along a diagonal of X and Y"): (1, 1, 0), say("along the other diagonal of X and Y"): (1, -1, 0),
+    say("along a diagonal of Y and Z"): (0, 1, 1), say("along the other diagonal of Y and Z"): (0, 1, -1),
+    say("along a diagonal of Z and X"): (1, 0, 1), say("along the other diagonal of Z and X"): (1, 0, -1),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class DistanceSolution:
+    """What the distance equations say of a machine.
+
+    Parameters
+    ----------
+    e : (6,) e1 … e6.
+    covariance : (6, 6) of them, from the residuals.
+    residuals : (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm.
+    residual_sd : mm; 0 without degrees of freedom.
+    relative_length_u : relative standard uncertainty of the distance, where it is certified; 0 where it is taken as known.
+    bias : (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not taken off, and
+        counts as a standard uncertainty.
+    open_scales : whether nothing says the distance, so that scales are not determined.
+    """
+
+    e: Floats
+    covariance: Floats
+    residuals: Floats
+    residual_sd: float
+    relative_length_u: float = 0.0
+    bias: Floats = field(default_factory=lambda: np.zeros(UNKNOWNS))
+    open_scales: bool = False
+
+    @property
+    def scales_ppm(self) -> Floats:
+        """(3,) scale errors of X, Y, Z: SE = √(1+e) − 1 (102)–(104)."""
+        return np.asarray((np.sqrt(1 + self.e[[0, 3, 5]]) - 1) / PPM)
+
+    @property
+    def angles_rad(self) -> Floats:
+        """(3,) angles between the axes X–Y, Y–Z, Z–X (105)–(107)."""
+        return np.asarray(np.arccos(_cosines(self.e)), dtype=np.float64)
+
+    @property
+    def squareness_arcsec(self) -> Floats:
+        """(3,) squareness X–Y, Y–Z, Z–X: what each angle has more than 90°."""
+        return np.asarray((self.angles_rad - np.pi / 2) / ARCSECOND)
+
+    def expanded(self, at_least: AtLeast = as_evaluated) -> tuple[tuple[float, float], ...] | None:
+        """U and k of each of the six factors; ``None`` where the residuals have no degrees of freedom.
+
+        Parameters
+        ----------
+        at_least : raises a U that a certificate does not state; by default none.
+        """
+        factors = self.coverage_factors
+        if factors is None:
+            return None
+        return tuple(
+            at_least(f"distance_equations.{effect}.{parameter}", factors[i] * float(self.u[i]), factors[i],
+                     unit("ppm" if parameter == "ppm" else "″"))
+            for i, (effect, parameter) in enumerate(FACTORS)
+        )  # fmt: skip
+
+    def as_data(self, at_least: AtLeast = as_evaluated) -> dict[str, Any]:
+        """For results.json: e1 … e6 with their covariance, the six factors and the angles that they give."""
+        u, stated = self.u.tolist(), self.expanded(at_least)
+        values = [*self.scales_ppm.tolist(), *self.squareness_arcsec.tolist()]
+        known = [not (self.open_scales and parameter == "ppm") for _, parameter in FACTORS]
+        return {
+            "e": self.e.tolist(),
+            "e_covariance": self.covariance.tolist(),
+            "factors": {
+                effect: {
+                    parameter: {
+                        "value": values[i] if known[i] else None,
+                        "u": u[i] if known[i] else None,
+                        "U": None if stated is None or not known[i] else stated[i][0],
+                        "k": None if stated is None or not known[i] else stated[i][1],
+                    }
+                }
+                for i, (effect, parameter) in enumerate(FACTORS)
+            },
+            "angles_deg": dict(zip(SQUARENESS, np.degrees(self.angles_rad).tolist(), strict=True)),
+            "residual_sd_um": self.residual_sd / MICROMETRE,
+        }
+
+    @property
+    def u(self) -> Floats:
+        """(6,) standard uncertainties of the three scales, ppm, and the three squarenesses, ″, distance and bias included."""
+        of_distance = self.relative_length_u / PPM * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+        return np.hypot(np.hypot(self._u_of_residuals, of_distance), self.bias)
+
+    @property
+    def conditional_on(self) -> str:
+        """What its uncertainties are conditional on, and those of the fitted model are not."""
+        return "white noise" if self.relative_length_u else "white noise, and the distance as known"
+
+    @property
+    def coverage_factors(self) -> tuple[float, ...] | None:
+        """Of each for 95 %: Student's t with its effective degrees of freedom (JCGM 100, G.4); ``None`` without any."""
+        freedom, residual = len(self.residuals) - UNKNOWNS, self._u_of_residuals
+        if freedom < 1 or not np.all(residual > 0):
+            return None
+        return tuple(float(k) for k in coverage_factor(freedom * (self.u / residual) ** 4, 0.95))
+
+    @property
+    def _u_of_residuals(self) -> Floats:
+        """(6,) of these, from the residuals alone."""
+        step = 1e-6
+        changes = [
+            (_reported(self.e + step * unit) - _reported(self.e - step * unit)) / (2 * step)
+            for unit in np.eye(UNKNOWNS)
+        ]
+        jacobian = np.column_stack(changes)
+        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", jacobian, self.covariance, jacobian)), dtype=np.float64)
+
+
+def second_way_data(second_way: DistanceSolution | Text, at_least: AtLeast) -> dict[str, Any]:
+    """A solution, or why there is none, and what its uncertainties are conditional on, for results.json."""
+    if isinstance(second_way, str):
+        return {"distance_equations": {"refused": second_way}}
+    return {
+        "distance_equations": second_way.as_data(at_least),
+        "conditional": {"distance_equations": second_way.conditional_on},
+    }
+
+
+def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:
+    """Solve equation 100 for e1 … e6 by least squares.
+
+    Parameters
+    ----------
+    differences : (m, 3) readings of one position minus those of the other, mm.
+    distance : the known distance, one or (m,), mm.
+    method : a key of :data:`SOLUTIONS`.
+
+    Raises
+    ------
+    CmmUqError : the distances do not determine all six factors; the message names the placings that would.
+    """
+    differences = np.asarray(differences, dtype=np.float64)
+    d = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(differences))
+    refuse_poor_placings(differences)
+    # divided by 2d, an equation is one of lengths: its noise is that of a length, the same for all
+    A = quadratic_terms(differences) / (2 * d)[:, None]
+    b = (d**2 - np.sum(differences**2, axis=1)) / (2 * d)
+    e = SOLUTIONS[method](A, b)
+    residuals = b - A @ e
+    freedom = len(b) - UNKNOWNS
+    sd = float(np.sqrt(residuals @ residuals / freedom)) if freedom else 0.0
+    inverse = np.linalg.inv(np.linalg.qr(A, mode="r"))
+    return DistanceSolution(e, sd**2 * inverse @ inverse.T, residuals, sd)
+
+
+def quadratic_terms(differences: Floats) -> Floats:
+    """Coefficients (m, 6) of e1 … e6 in equation 100."""
+    x, y, z = differences.T
+    return np.column_stack([x * x, 2 * x * y, 2 * x * z, y * y, 2 * y * z, z * z])
+
+
+def missing_placings(differences: Floats) -> tuple[Text, ...]:
+    """Placings, in words and as few as possible, that determine what these (m, 3) leave open; none when they leave nothing."""
+    directions = differences / np.linalg.norm(differences, axis=1, keepdims=True)
+    candidates = np.array(list(PLACINGS.values()), dtype=np.float64)
+    candidates /= np.linalg.norm(candidates, axis=1, keepdims=True)
+    _, s, Vt = np.linalg.svd(quadratic_terms(directions), full_matrices=len(directions) < UNKNOWNS)
+    open_space = Vt[np.append(s, np.zeros(UNKNOWNS))[:UNKNOWNS] < POORLY_POSED * s[0]].T
+    wanted = []
+    while open_space.shape[1]:
+        seen = quadratic_terms(candidates) @ open_space
+        best = int(np.argmax(np.round(np.linalg.norm(seen, axis=1), 6)))
+        wanted.append(list(PLACINGS)[best])
+        open_space = open_space @ np.linalg.svd(seen[best : best + 1])[2][1:].T
+    return tuple(wanted)
+
+
+def refuse_poor_placings(differences: Floats) -> None:
+    """Refuse distances that do not determine all six factors.
+
+    Raises
+    ------
+    CmmUqError : too few, all parallel, all in one plane, or otherwise too much alike.
+    """
+    apart = np.linalg.norm(differences, axis=1)
+    if np.any(apart == 0):
+        raise CmmUqError(
+            say("distance {number} is zero: both positions are the same", number=int(np.argmin(apart)) + 1),
+            where="recording", fix=say("Record two different positions"),
+        )  # fmt: skip
+    wanted = missing_placings(differences)
+    if not wanted:
+        return
+    directions = differences / apart[:, None]
+    spread, count = np.linalg.svd(directions, compute_uv=False), len(differences)
+    if len(differences) < UNKNOWNS:
+        problem = say("{count} distances are too few for the six factors of scale and squareness", count=count)
+    elif spread[1] < POORLY_POSED * spread[0]:
+        problem = say("all {count} distances are parallel, so they tell the scale in one direction only", count=count)
+    elif spread[2] < POORLY_POSED * spread[0]:
+        problem = say("all {count} distances lie in one plane, so they tell nothing of the axis across it", count=count)
+    else:
+        problem = say("the directions of the {count} distances leave a factor of scale or squareness open", count=count)
+    raise CmmUqError(
+        problem,
+        where="recording",
+        fix=plural(
+            len(wanted),
+            one=say("Add {count} placing: {wanted}", count=len(wanted), wanted=commas(wanted)),
+            many=say("Add {count} placings: {wanted}", count=len(wanted), wanted=commas(wanted)),
+        ),
+    )
+
+
+def _by_qr(A: Floats, b: Floats) -> Floats:
+    Q, R = np.linalg.qr(A)
+    return np.asarray(np.linalg.solve(R, Q.T @ b), dtype=np.float64)
+
+
+def _cosines(e: Floats) -> Floats:
+    x, y, z = np.sqrt(1 + e[[0, 3, 5]])
+    return np.array([e[1] / (x * y), e[4] / (y * z), e[2] / (x * z)])
+
+
+def _reported(e: Floats) -> Floats:
+    scales = (np.sqrt(1 + e[[0, 3, 5]]) - 1) / PPM
+    return np.concatenate([scales, (np.arccos(_cosines(e)) - np.pi / 2) / ARCSECOND])

@@ -1,0 +1,67 @@
+"""Symmetric equations as US 4,437,151 solves them: Doolittle's triangular factors, and Jacobi's eigenvalues.
+
+Both work on normal equations, whose condition number is the square of that of the equations themselves. They are here to be
+compared with an orthogonal factorisation, which is what the package reports.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+
+_SWEEPS = 30
+"""Of Jacobi rotations; convergence is quadratic, and ten suffice for rounding accuracy at this size."""
+
+
+def by_doolittle(matrix: Floats, right: Floats) -> Floats:
+    """Solve by matrix = L·U with a unit diagonal in L, in order, without pivoting.
+
+    Raises
+    ------
+    CmmUqError : a pivot is zero.
+    """
+    n = len(matrix)
+    L, U = np.eye(n), np.zeros((n, n))
+    for i in range(n):
+        U[i, i:] = matrix[i, i:] - L[i, :i] @ U[:i, i:]
+        if U[i, i] == 0:
+            raise CmmUqError(f"normal equations: pivot {i + 1} is zero", fix="Record placings in more directions")
+        L[i + 1 :, i] = (matrix[i + 1 :, i] - L[i + 1 :, :i] @ U[:i, i]) / U[i, i]
+    return np.asarray(np.linalg.solve(U, np.linalg.solve(L, right)), dtype=np.float64)
+
+
+def by_jacobi(matrix: Floats, right: Floats) -> Floats:
+    """Solve by matrix = V·diag(values)·Vᵀ from Jacobi rotations.
+
+    Raises
+    ------
+    CmmUqError : an eigenvalue is zero within rounding.
+    """
+    values, V = jacobi_eigenvalues(matrix)
+    if np.abs(values).min() <= np.finfo(np.float64).eps * np.abs(values).max():
+        raise CmmUqError("normal equations: an eigenvalue is zero", fix="Record placings in more directions")
+    return np.asarray(V @ ((V.T @ right) / values), dtype=np.float64)
+
+
+def jacobi_eigenvalues(matrix: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (n,) and eigenvectors (n, n) of a symmetric matrix, by cyclic Jacobi rotations (Golub & Van Loan, 8.5)."""
+    A, n = matrix.astype(np.float64, copy=True), len(matrix)
+    V = np.eye(n)
+    for _ in range(_SWEEPS):
+        if np.linalg.norm(A - np.diag(np.diag(A))) <= np.finfo(np.float64).eps * np.linalg.norm(A):
+            break
+        for p, q in combinations(range(n), 2):
+            if A[p, q] == 0:
+                continue
+            half = (A[q, q] - A[p, p]) / (2 * A[p, q])
+            t = np.copysign(1.0, half) / (abs(half) + np.hypot(half, 1.0))
+            c = 1 / np.hypot(t, 1.0)
+            turn = np.array([[c, t * c], [-t * c, c]])
+            A[:, [p, q]] = A[:, [p, q]] @ turn
+            A[[p, q], :] = turn.T @ A[[p, q], :]
+            V[:, [p, q]] = V[:, [p, q]] @ turn
+    return np.diag(A).copy(), V

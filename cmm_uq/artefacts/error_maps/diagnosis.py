@@ -1,0 +1,210 @@
+"""The diagnosis of a set of error maps: what changes with temperature, and which maps contradict the others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis.diagnosis import LeftOut
+from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.diagnosis.location import region_of
+from cmm_uq.artefacts.error_maps.columns import MapColumn, turned
+from cmm_uq.artefacts.error_maps.expansion import expansion
+from cmm_uq.artefacts.error_maps.fit import function, held_out, noise_of, residual
+from cmm_uq.artefacts.error_maps.search import ColumnComparison, Rival, column_comparison
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.machine.physics.catalogue import effects as effects_named
+from cmm_uq.maths.inference.ensembles import Progress
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+_WELL_KNOWN = 0.95
+"""Probability from which no other explanation is named beside one."""
+
+_BAND = 2.0
+"""Standard uncertainties of a band that is not to hold zero."""
+
+_NAMED = 0.05
+"""Probability from which another explanation is named."""
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """How the maps of one error differ beyond any known effect.
+
+    Parameters
+    ----------
+    column : the error.
+    rival : the explanation in words, with the map that differs if one does.
+    probability : of it.
+    instead : others that could stand in its place.
+    maps : numbers of the maps that it, or one of those, has differ from the others, from 0 as their temperatures.
+    region : of the position, mm, where it exceeds half its largest value and its band does not hold zero.
+    p_value : of "these maps differ by noise alone", corrected for all errors that were compared.
+    amplitude : largest value, in the column's unit.
+    curve : position in mm, difference and its standard uncertainty in the column's unit, each (p,).
+    turned : whether the map would agree if its sign were turned.
+    """
+
+    column: MapColumn
+    rival: Rival
+    probability: float
+    instead: tuple[Text, ...]
+    maps: frozenset[int]
+    region: tuple[float, float]
+    p_value: float
+    amplitude: float
+    curve: tuple[Floats, Floats, Floats]
+    turned: bool
+
+    @property
+    def amplitude_um(self) -> float:
+        """Largest value in µm; of a rotation at a lever of one metre."""
+        return self.amplitude * self.column.unit[1] / MICROMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class MapsDiagnosis:
+    """See the module's docstring.
+
+    Parameters
+    ----------
+    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
+    p_value, alpha : of "the maps differ by noise alone", and the rate of false alarms asked for.
+    comparisons : every error that was compared.
+    effects : what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ.
+    differences : beyond them, the most significant first.
+    displacement, rotation : noise of a reading, µm and ″; ``None`` where no such error was compared.
+    improvement : parts of the travel predicted from the rest; a rotation counts as µm at one metre.
+    """
+
+    verdict: str
+    p_value: float
+    alpha: float
+    comparisons: tuple[ColumnComparison, ...]
+    effects: tuple[LeftOut, ...]
+    differences: tuple[Difference, ...]
+    displacement: Quantity | None
+    rotation: Quantity | None
+    improvement: Improvement
+
+    def p_of(self, compared: ColumnComparison) -> float:
+        """Of "these maps differ by noise alone" for one error, corrected for all that were compared."""
+        return min(1.0, len(self.comparisons) * compared.p_value)
+
+
+def diagnose_maps(
+    columns: Sequence[MapColumn],
+    named: Sequence[str],
+    *,
+    alpha: float,
+    seed: int,
+    progress: Progress | None = None,
+) -> MapsDiagnosis:
+    """Diagnose what error maps of one machine have in common and where they differ.
+
+    Parameters
+    ----------
+    columns : errors of carriages in every map.
+    named : effects that the job names.
+    alpha : false-alarm rate over all columns.
+    seed : of everything random.
+    progress : told the part done.
+    """
+    comparisons, effects, differences = [], [], []
+    for i, column in enumerate(columns):
+        compared = column_comparison(column, named, seed)
+        comparisons.append(compared)
+        p_value = len(columns) * compared.p_value
+        if p_value < alpha:
+            if found := expansion_shown(compared):
+                effects.append(found)
+            differences += [_difference(compared, index, p_value) for index in compared.unknown]
+        if progress:
+            progress((i + 1) / len(columns))
+    p_value = min([1.0, *(len(comparisons) * compared.p_value for compared in comparisons)])
+    verdict = "consistent" if p_value >= alpha else "unexplained" if not effects else "explained"
+    if verdict == "explained" and differences:
+        verdict = "partial"
+    return MapsDiagnosis(
+        verdict, p_value, alpha, tuple(comparisons), tuple(sorted(effects, key=lambda e: -e.probability)),
+        tuple(sorted(differences, key=lambda d: -d.amplitude_um)), _noise(comparisons, alpha, rotations=False),
+        _noise(comparisons, alpha, rotations=True), _improvement(comparisons, alpha),
+    )  # fmt: skip
+
+
+def expansion_shown(compared: ColumnComparison) -> LeftOut | None:
+    """An effect that the maps of a column show: probable, not zero, and better at predicting what was held out."""
+    if compared.effect is None:
+        return None
+    without = [v for v in compared.versions if v.explanation != compared.effect]
+    gain = held_out(compared, compared.versions)[1] - held_out(compared, without)[1]
+    draws = expansion(compared, compared.effect)
+    (effect,) = effects_named((str(compared.rivals[compared.effect].effect),))
+    reported = effect.to_reported(draws[:, None], np.zeros((len(draws), 0)))
+    units = {parameter.name: parameter.unit for parameter in effect.reported}
+    parameters = {name: Quantity.of_draws(values, units[name]) for name, values in reported.items()}
+    sure = all(q.interval95[0] > 0 or q.interval95[1] < 0 for q in parameters.values())
+    if not sure or gain.sum() <= np.sqrt(len(gain)) * gain.std(ddof=1):
+        return None
+    whole, rest, left = (float(np.sum(residual(compared, some) ** 2)) for some in ((), without, compared.versions))
+    probability = compared.combinations.of(compared.effect)
+    return LeftOut(
+        effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
+    )  # fmt: skip
+
+
+def _difference(compared: ColumnComparison, index: int, p_value: float) -> Difference:
+    column, rival = compared.column, compared.rivals[index]
+    value, u = function(compared, index)
+    unit = column.unit[1]
+    probability = compared.combinations.of(index)
+    others = compared.instead(_NAMED) if probability < _WELL_KNOWN else ()
+    sure = np.abs(value) > _BAND * u
+    instead = tuple(compared.rivals[i] for i in others)
+    return Difference(
+        column, rival, probability, tuple(one.name for one in instead),
+        frozenset(one.map for one in (rival, *instead) if one.map is not None),
+        region_of(column.positions, value, sure if sure.any() else None), p_value,
+        float(np.abs(value).max()) / unit, (column.positions, value / unit, u / unit),
+        rival.map is not None and turned(column, rival.map),
+    )  # fmt: skip
+
+
+def _improvement(comparisons: Sequence[ColumnComparison], alpha: float) -> Improvement:
+    """Over all columns, with what was found in those that differ."""
+    rms: list[list[Floats]] = [[], [], [], []]
+    gains = [np.zeros(0)]
+    for compared in comparisons:
+        versions = compared.versions if len(comparisons) * compared.p_value < alpha else ()
+        early, late = held_out(compared, ()), held_out(compared, versions)
+        for place, values in zip(
+            rms, (residual(compared, ()), residual(compared, versions), early[0], late[0]), strict=True
+        ):
+            place.append(values)
+        gains.append(late[1] - early[1])
+    gain = np.concatenate(gains)
+    left, modelled, before_um, after_um = (
+        float(np.sqrt(np.mean(np.concatenate(v) ** 2))) / MICROMETRE if v else 0.0 for v in rms
+    )
+    se = float(np.sqrt(len(gain)) * gain.std(ddof=1)) if len(gain) > 1 else 0.0
+    return Improvement(left, modelled, before_um, after_um, float(gain.sum()), se, say("parts of the travel"))
+
+
+def _noise(comparisons: Sequence[ColumnComparison], alpha: float, *, rotations: bool) -> Quantity | None:
+    """Root mean square, over the columns, of the noise of a reading once everything found is modelled."""
+    chosen = [compared for compared in comparisons if (compared.column.component >= 3) == rotations]
+    if not chosen:
+        return None
+    unit, factor = chosen[0].column.unit
+    found = [
+        noise_of(compared, compared.versions if len(comparisons) * compared.p_value < alpha else ())
+        for compared in chosen
+    ]
+    variances, freedoms = np.array(found).T
+    value = float(np.sqrt(variances.mean())) / factor
+    u = value * float(np.sqrt(np.sum(variances**2 / (2 * freedoms)))) / float(variances.sum())
+    return Quantity(value, u, (max(value - 1.96 * u, 0.0), value + 1.96 * u), unit)

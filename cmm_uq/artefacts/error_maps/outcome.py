@@ -1,0 +1,24 @@
+"""The diagnosis of error maps as a page."""
+
+from __future__ import annotations
+
+from cmm_uq.artefacts.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
+from cmm_uq.artefacts.error_maps.overview import told
+from cmm_uq.artefacts.error_maps.page import maps_document
+from cmm_uq.artefacts.error_maps.results import maps_results
+from cmm_uq.certificate.diagnosis.words import summary_of
+from cmm_uq.certificate.lettering import lettered_in
+from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
+
+
+def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
+    """What there is to write of it."""
+    verdict = found.diagnosis.verdict
+    short = summary_of(found.job.facts, verdict, told(found), found.findings)
+    with lettered_in(found.job.facts.job.language):
+        document = maps_document(found, seed)
+    consistent = verdict == "consistent"
+    return Outcome(found, lambda: document, maps_results(found, seed), short, document.warnings, in_order=consistent)
+
+
+OWN = OwnAnalysis(diagnose=Recipe(diagnose_error_maps, outcome))

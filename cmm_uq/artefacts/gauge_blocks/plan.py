@@ -1,0 +1,33 @@
+"""Placings of gauge blocks: the seven lines of the standard, and anywhere in the volume."""
+
+from __future__ import annotations
+
+from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
+from cmm_uq.analysis.planning.placing import Pattern, Placing
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.artefacts.gauge_lines.patterns import block, blocks_of, five_of, seven_lines
+from cmm_uq.base.points import Floats
+
+
+def iso_lines(setting: Setting) -> tuple[Placing, ...]:
+    """Seven lines through the middle of the volume (ISO 10360-2:2009, 6.3)."""
+
+    def shapes(fitting: Floats) -> list[Pattern]:
+        return [block(float(length), setting.plan) for length in fitting]
+
+    return seven_lines(setting, blocks_of(setting.artefact, setting.plan), shapes)
+
+
+def _shape(setting: Setting) -> Shape:
+    lengths = blocks_of(setting.artefact, setting.plan)
+
+    def fitting_pattern(attitude: Floats) -> Pattern | None:
+        fitting = five_of(lengths, setting.volume.chord(attitude[:, 0]))
+        return block(float(fitting[-1]), setting.plan) if len(fitting) else None
+
+    return fitting_pattern
+
+
+_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
+
+PLANNING = Planning({"ISO 10360-2": iso_lines}, _PLACES.candidates, _PLACES.elsewhere)

@@ -1,0 +1,268 @@
+"""Step gauge and gauge blocks: faces at certified distances along one line, in several places.
+
+Every face is an observation: how far along the line it was found, against its certified distance. The line runs from the
+first to the farthest face as recorded, so its two directions across cost nothing, and its position is free in each
+measurement. What lies across the line (where on a face the probe touched) says nothing and is left as it is.
+
+What the certificate leaves open is its uncertainty of every length by itself (``u_between``). Where several lengths are taken
+together it is one error of the gauge that all have in common, in proportion to the lengths where a number is stated, since
+that is the part that no number of faces averages out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import unit
+from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.machine.model.artefact import Artefact, Indications, Size
+from cmm_uq.machine.model.certified_places import CertifiedPlaces
+from cmm_uq.machine.model.own_faults import by_certificate, faults
+from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.own_body import Body
+from cmm_uq.machine.physics.own_errors import ALONG_A_LINE
+from cmm_uq.maths.inference.doubt import Cause
+from cmm_uq.maths.inference.freedoms import Freedoms
+
+_LAPPED_UM = 5.0
+"""Standard deviation of the faces of a gauge without a certificate from their nominal places, µm."""
+
+_SAME_FACE = 1e-6
+"""mm; certified distances closer than this belong to one face."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reversals:
+    """Faces reached from both sides.
+
+    Parameters
+    ----------
+    measurement : (p,) of each such face.
+    reference : (p,) its certified distance, mm.
+    gap : (p,) found when travelling away from the first face minus when travelling towards it, mm.
+    weights : (n,) of every observation in the gap of its face; 0 of a face that was not reached from both sides.
+    """
+
+    measurement: Ints
+    reference: Floats
+    gap: Floats
+    weights: Floats
+
+
+class StepGauge(Artefact):
+    """Faces at certified distances along lines: n observations of n points.
+
+    Parameters
+    ----------
+    facts : what the job says of the gauge; ``length_mm`` is its longest distance, by default of those recorded.
+    points : the recording, with ``reference_mm``.
+
+    Raises
+    ------
+    CmmUqError : no certified distances, a line with a single face, or distances that a mistaken unit explains.
+    """
+
+    kind = "step_gauge"
+    title = say("Step gauge")
+
+    def __init__(self, facts: ReferencedFacts, points: Points, *, where: str | None = None) -> None:
+        self.points = points
+        self._facts = facts
+        self.reference = columns_needed(points, ("reference_mm",), self.title.lower(), where)[:, 0]
+        self._lines = Placings.of(points.measurement)
+        self._ends = _ends(self.reference, self._lines)
+        self._refuse_what_is_no_gauge(where)
+        self.measurement, self.repeat = points.measurement, points.repeat
+        self.rows = np.arange(len(points))[:, None]
+        self.noise_scale = np.ones(len(points))
+        self.expansion = expansion(facts, points)
+        spans = self._lines.sums(self._ends * self.reference)
+        length = facts.length_mm or float(spans.max())
+        self.certificate = CertifiedPlaces.of(facts, points, self.reference[:, None])
+        longest = np.flatnonzero(self._lines.index == np.argmax(spans))
+        first, last = (int(longest[pick(self.reference[longest])]) for pick in (np.argmin, np.argmax))
+        self._ends_of_longest = first, last
+        self.sizes = (
+            Size(
+                "length_mm",
+                say("Length of the {title:small}", title=self.title),
+                unit("mm"),
+                length,
+                self.certificate.sd(length, first, last),
+                say("length"),
+            ),
+        )
+        self._together = self.reference / length
+        if not self.certificate.plain and self.sizes[0].certified:
+            self._together = self.certificate.together(
+                self.reference[:, None], self.sizes[0].sd, *self._ends_of_longest
+            )[:, 0]
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """See :meth:`Artefact.fit`: every point moved along its line to its certified distance."""
+        directions = self.directions(true_xyz)
+        gap = self._distances(sizes[0]) - np.einsum("ni,ni->n", true_xyz, directions)
+        return np.asarray(true_xyz + (gap - self._lines.means(gap))[:, None] * directions, dtype=np.float64)
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """See :meth:`Artefact.project`: displacement along the line."""
+        return np.asarray(np.einsum("ni,nik->nk", self.directions(xyz), displacement), dtype=np.float64)
+
+    def own_faults(self) -> Iterable[Effect]:
+        """See :meth:`Artefact.own_faults`: along its line."""
+        places = np.column_stack([self.reference, np.zeros((len(self.reference), 2))])
+        body = Body.of(self.points, places, ("reference_mm",))
+        known = by_certificate(self.certificate.u_um(self.sizes[0].sd), _LAPPED_UM)
+        return faults(self._facts, self.points, body, known, axes=1, geometry=ALONG_A_LINE)
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`: in proportion to the distance, or as its uncertainty grows with it."""
+        if self.certificate.plain:
+            return np.asarray((self.reference * self.expansion / self.sizes[0].nominal)[:, None], dtype=np.float64)
+        return np.asarray((self._together * self.expansion)[:, None], dtype=np.float64)
+
+    def placing(self, xyz: Floats) -> Freedoms:
+        """See :meth:`Artefact.placing`: the position along each line."""
+        return self._lines.columns(np.ones((len(xyz), 1)))
+
+    def calibration(self) -> Cause | None:
+        """See :meth:`Artefact.calibration`: of each face."""
+        change = self.size_change()[:, 0]
+        return self.certificate.beyond(self.sizes[0], *self._ends_of_longest, change, self.expansion)
+
+    def indications(self) -> Indications | None:
+        """Distances from the first recorded face of each (measurement, repeat), against the certified ones."""
+        if not self.sizes[0].certified:
+            return None
+        number = self.points.point.astype(np.float64)
+        runs = Placings.of(self.points.group)
+        order = np.lexsort((number, runs.index))
+        first = order[np.cumsum(runs.sizes) - runs.sizes][runs.index]
+        lengths = self.reference - self.reference[first]
+        found = self.positions() - self.positions()[first]
+        certified = self._distances(self.sizes[0].nominal) - self._distances(self.sizes[0].nominal)[first]
+        chosen = np.abs(lengths) > _SAME_FACE
+        errors = (np.sign(lengths) * (found - certified) / self.expansion)[chosen]
+        lengths = np.abs(lengths)[chosen]
+        rows = np.column_stack([first, np.arange(len(first))])[chosen]
+        return Indications(errors, lengths, self.certificate.u_between(rows[:, 0], rows[:, 1]), rows)
+
+    def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
+        """See :meth:`Artefact.lines_of`.
+
+        The line is that of all faces: where on a face the probe touched would turn a short length by degrees.
+        """
+        return self._lines.means(self.points.xyz)[rows[:, 1]], self.directions()[rows[:, 1]]
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
+        """See :meth:`Artefact.bidirectional`: by the senses of travel."""
+        sense = self.approach()
+        return None if sense is None else np.asarray(sense[rows[:, 0]] * sense[rows[:, 1]] < 0)
+
+    def directions(self, xyz: Floats | None = None) -> Floats:
+        """Unit vector of each point's line, (n, 3), in the sense of growing distances."""
+        bars = self._lines.sums(self._ends[:, None] * (self.points.xyz if xyz is None else xyz))
+        return np.asarray((bars / np.linalg.norm(bars, axis=1, keepdims=True))[self._lines.index], dtype=np.float64)
+
+    def positions(self) -> Floats:
+        """Where each face was found along its line, about the middle of the line, (n,) mm."""
+        s = np.einsum("ni,ni->n", self.points.xyz, self.directions())
+        return np.asarray(s - self._lines.means(s), dtype=np.float64)
+
+    def deviations(self) -> Floats:
+        """Found minus certified, about the mean of each line, (n,) mm."""
+        gap = self.positions() - self._distances(self.sizes[0].nominal)
+        return np.asarray(gap - self._lines.means(gap), dtype=np.float64)
+
+    def approach(self) -> Floats | None:
+        """Sense of travel into each face along its line, (n,) −1, 0 or +1; ``None`` when it was not recorded."""
+        if not all(f"approach_{a}" in self.points.columns for a in AXES):
+            return None
+        travel = np.column_stack([self.points.columns[f"approach_{a}"] for a in AXES])
+        along = np.einsum("ni,ni->n", travel, self.directions())
+        return np.where(np.abs(along) > 1e-3, np.sign(along), 0.0)
+
+    def reversals(self) -> Reversals | None:
+        """Faces that were reached from both sides; ``None`` when no approach was recorded."""
+        sense = self.approach()
+        if sense is None:
+            return None
+        faces = np.column_stack([self.points.measurement, np.round(self.reference / _SAME_FACE)])
+        _, first, index = np.unique(faces, axis=0, return_index=True, return_inverse=True)
+        index, deviations = index.ravel(), self.deviations()
+        counts, means = [], []
+        for side in (1.0, -1.0):
+            chosen = sense == side
+            count = np.bincount(index[chosen], minlength=len(first))
+            means.append(np.bincount(index[chosen], deviations[chosen], len(first)) / np.maximum(count, 1))
+            counts.append(count)
+        both = (counts[0] > 0) & (counts[1] > 0)
+        weights = sense / np.maximum(np.where(sense > 0, counts[0][index], counts[1][index]), 1) * both[index]
+        return Reversals(self.points.measurement[first[both]], self.reference[first[both]],
+                         (means[0] - means[1])[both], weights)  # fmt: skip
+
+    def _distances(self, length: float) -> Floats:
+        if self.certificate.plain:
+            return np.asarray(self.reference * self.expansion * (length / self.sizes[0].nominal), dtype=np.float64)
+        longer = (length - self.sizes[0].nominal) * self._together
+        return np.asarray((self.reference + longer) * self.expansion, dtype=np.float64)
+
+    def _refuse_what_is_no_gauge(self, where: str | None) -> None:
+        points, lines, what = self.points, self._lines, self.title.lower()
+        if np.any(at := (points.point == 1) & (np.abs(self.reference) > _SAME_FACE)):
+            raise CmmUqError(
+                f"point 1 has reference_mm = {self.reference[np.argmax(at)]:g}: distances count from point 1, so it has 0",
+                where=place(points, at, where),
+                fix="Subtract the first distance from all of the measurement",
+            )
+        spans = lines.sums(self._ends * self.reference)
+        if np.any(single := spans <= _SAME_FACE):
+            at = points.measurement == lines.numbers[np.argmax(single)]
+            raise CmmUqError(
+                f"measurement {lines.numbers[np.argmax(single)]} has a single face, so it tells no length of the {what}",
+                where=place(points, at, where),
+                fix="Record at least two faces of different reference_mm in each measurement, or leave it out",
+            )
+        bars = np.linalg.norm(lines.sums(self._ends[:, None] * points.xyz), axis=1)
+        if np.any(bars == 0):
+            at = points.measurement == lines.numbers[np.argmin(bars)]
+            raise CmmUqError(
+                f"the first and the farthest face of measurement {lines.numbers[np.argmin(bars)]} lie in one place",
+                where=place(points, at, where),
+                fix="Mend its coordinates or reference_mm",
+            )
+        check_length(float(bars.mean()), float(spans.mean()), "the recorded lines", where)
+
+
+class GaugeBlocks(StepGauge):
+    """Gauge blocks: the two faces of each, in one or several places."""
+
+    kind = "gauge_blocks"
+    title = say("Gauge blocks")
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.bidirectional`: the faces of a block look away from each other."""
+        return np.ones(len(rows), dtype=bool)
+
+
+def _ends(reference: Floats, lines: Placings) -> Floats:
+    """Weights (n,) whose sum over a line is its farthest minus its first face, each the mean of its points."""
+    order = np.argsort(lines.index, kind="stable")
+    starts = np.cumsum(lines.sizes) - lines.sizes
+
+    def mean_of(face: Floats) -> Floats:
+        chosen = (np.abs(reference - face[lines.index]) <= _SAME_FACE).astype(np.float64)
+        return np.asarray(chosen / lines.sums(chosen)[lines.index], dtype=np.float64)
+
+    first = np.minimum.reduceat(reference[order], starts)
+    farthest = np.maximum.reduceat(reference[order], starts)
+    return mean_of(farthest) - mean_of(first)

@@ -1,0 +1,27 @@
+"""``[artefact]`` of a probed plane."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from cmm_uq.base.files.table import Length, Uncertainty
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.certified_value import CertifiedValue
+
+
+class PlaneFacts(ArtefactFacts):
+    """``probe_offset_mm`` is the effective radius by which the plane of the probe's centres is moved to the surface.
+
+    ``acceptance_deg`` is the largest angle between the normal and the direction of approach at which that is believed.
+    """
+
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = ()
+
+    probe_offset_mm: Length | None = None
+    """Effective radius of the probe, by which the plane of its centres is moved to the surface."""
+    u_probe_offset_um: Uncertainty = 0.0
+    """Standard uncertainty of the probe's effective radius."""
+    acceptance_deg: Annotated[float, Field(ge=0.01, le=89.99)] = 60.0
+    """Largest angle between the normal and the direction of approach at which the radius is believed."""

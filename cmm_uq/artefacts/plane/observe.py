@@ -1,0 +1,199 @@
+"""Plane: points probed on a flat surface, whose place and tilt are free in each measurement.
+
+The observation is the distance of each point of contact from the plane. A point 0, where there is one, is the direction
+point just before contact: it tells on which side the probe was (US 4,866,643 claim 1) and is no observation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.artefacts.plane.facts import PlaneFacts
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.machine.model.artefact import Artefact, Size
+from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.recorded import place
+from cmm_uq.machine.physics.probe_offset import DirectionPointError, OffsetPlane, offset_plane
+from cmm_uq.maths.inference.freedoms import Freedoms
+
+DIRECTION_POINT = 0
+LEAST_POINTS = 3
+"""Points of contact in a measurement: three make a plane (US 4,866,643 claim 1 b), a fourth says something of it."""
+
+_ON_A_LINE = 1e-3
+"""Extent across over extent along below which points lie on one line and leave the plane free to turn about it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ProbedPlane:
+    """One plane of a recording.
+
+    Parameters
+    ----------
+    measurement : its number.
+    count : points of contact.
+    flatness : range of the distances from the least-squares plane, mm; ``None`` of three points, which have none.
+    surface : the plane moved by the probe's offset; ``None`` without offset.
+    """
+
+    measurement: int
+    count: int
+    flatness: float | None
+    surface: OffsetPlane | None
+
+
+class PlaneSurface(Artefact):
+    """A probed plane: an observation for every point of contact.
+
+    Parameters
+    ----------
+    facts : what the job says; ``probe_offset_mm`` moves the plane from the probe's centre to the surface, where every
+        measurement has a direction point and all of them are believed.
+    points : the recording.
+
+    Raises
+    ------
+    CmmUqError : too few points of contact, points on one line, or a direction point that is missing or not accepted.
+    """
+
+    kind = "plane"
+    title = say("Plane")
+
+    def __init__(self, facts: PlaneFacts, points: Points, *, where: str | None = None) -> None:
+        self.points = points
+        contact = np.flatnonzero(points.point != DIRECTION_POINT)
+        self.rows = contact[:, None]
+        self.placings = Placings.of(points.measurement[contact])
+        self.measurement, self.repeat = points.measurement[contact], points.repeat[contact]
+        self.noise_scale = np.ones(len(contact))
+        self.sizes: tuple[Size, ...] = ()
+        self.offset = facts.probe_offset_mm
+        self.u_offset = facts.u_probe_offset_um * MICROMETRE
+        self.acceptance = float(np.radians(facts.acceptance_deg))
+        self._refuse_no_plane(where)
+        if self.offset is not None:
+            self._refuse_no_side(self.offset, where)
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """See :meth:`Artefact.fit`: points of contact dropped on their least-squares plane; direction points stay."""
+        contact = self.rows[:, 0]
+        touched = true_xyz[contact]
+        normals = self._axes(touched)[:, :, 0]
+        off = np.einsum("ni,ni->n", touched - self.placings.means(touched), normals)
+        placed = true_xyz.copy()
+        placed[contact] = touched - off[:, None] * normals
+        return placed
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """See :meth:`Artefact.project`: displacement along the normal."""
+        contact = self.rows[:, 0]
+        normals = self._axes(xyz[contact])[:, :, 0]
+        return np.asarray(np.einsum("ni,nik->nk", normals, displacement[contact]), dtype=np.float64)
+
+    def size_change(self) -> Floats:
+        """See :meth:`Artefact.size_change`: a plane has no size."""
+        return np.zeros((len(self.rows), 0))
+
+    def placing(self, xyz: Floats) -> Freedoms:
+        """See :meth:`Artefact.placing`: height and two tilts of each plane."""
+        touched = xyz[self.rows[:, 0]]
+        about = touched - self.placings.means(touched)
+        across = np.einsum("ni,nij->nj", about, self._axes(touched)[:, :, 1:])
+        return self.placings.columns(np.column_stack([np.ones(len(touched)), across]))
+
+    def unread(self) -> NDArray[np.bool_]:
+        """See :meth:`Artefact.unread`: along the normal."""
+        touched = self.points.xyz[self.rows[:, 0]]
+        return self.placings.unread(touched, self._axes(touched)[:, :, :1])[:, 0]
+
+    def probed(self, u_point: float) -> tuple[ProbedPlane, ...]:
+        """Flatness of each plane, and the surface where the probe's offset is known.
+
+        Parameters
+        ----------
+        u_point : standard uncertainty of a point of contact along the normal, mm; it counts where there are just three,
+            whose scatter nothing shows.
+        """
+        found = []
+        off = self.off_plane()
+        for number in self.placings.numbers:
+            own = off[self.measurement == number]
+            given = u_point if len(own) == LEAST_POINTS else None
+            surface = None if self.offset is None else self._surface(int(number), self.offset, given)
+            flatness = float(np.ptp(own)) if len(own) > LEAST_POINTS else None
+            found.append(ProbedPlane(int(number), len(own), flatness, surface))
+        return tuple(found)
+
+    def _surface(self, number: int, offset: float, u_point: float | None) -> OffsetPlane:
+        """The surface of one measurement; the C1 of a direction point is the lowest point of contact of its own repeat."""
+        points, contact = self.points, self.rows[self.measurement == number, 0]
+        ahead = self._ahead(number)
+        other = points.repeat[contact] != points.repeat[ahead][:, None]
+        first = np.array([np.lexsort((points.repeat[contact], points.point[contact], row))[0] for row in other])
+        return offset_plane(
+            points.xyz[ahead], points.xyz[contact], offset, first=first, acceptance=self.acceptance,
+            u_offset=self.u_offset, u_point=u_point,
+        )  # fmt: skip
+
+    def _ahead(self, number: int) -> Ints:
+        """Rows of the direction points of a measurement."""
+        points = self.points
+        return np.flatnonzero((points.measurement == number) & (points.point == DIRECTION_POINT))
+
+    def _refuse_no_side(self, offset: float, where: str | None) -> None:
+        points = self.points
+        for number in self.placings.numbers:
+            if not len(self._ahead(number)):
+                raise CmmUqError(
+                    f"measurement {number} has no direction point (point 0), so that nothing says to which side the probe's "
+                    "offset goes",
+                    where=place(points, points.measurement == number, where),
+                    fix="Record a point 0 just before contact, or leave out probe_offset_mm",
+                )
+            try:
+                self._surface(number, offset, 1.0)  # an angle depends on no uncertainty
+            except DirectionPointError as rejected:
+                row = np.arange(len(points)) == self._ahead(number)[rejected.index]
+                raise CmmUqError(f"measurement {number}: {rejected.problem}", where=place(points, row, where),
+                                 fix=rejected.fix) from rejected  # fmt: skip
+
+    def off_plane(self) -> Floats:
+        """(n,) distance of each point of contact from its least-squares plane, mm."""
+        xyz = self.points.xyz
+        return self.project(xyz, (xyz - self.fit(xyz, np.zeros(0)))[:, :, None])[:, 0]
+
+    def _axes(self, touched: Floats) -> Floats:
+        """Normal and two directions in the plane, as columns, of each point's placing, (n, 3, 3)."""
+        about = touched - self.placings.means(touched)
+        _, axes = np.linalg.eigh(self.placings.sums(np.einsum("ni,nj->nij", about, about)))
+        normal = axes[:, :, 0]
+        largest = np.take_along_axis(normal, np.argmax(np.abs(normal), axis=1)[:, None], axis=1)
+        axes[:, :, 0] = normal * np.sign(largest)
+        return np.asarray(axes[self.placings.index], dtype=np.float64)
+
+    def _refuse_no_plane(self, where: str | None) -> None:
+        points = self.points
+        for number in np.setdiff1d(points.measurement, self.measurement):
+            raise CmmUqError(f"measurement {number} has no points of contact",
+                             where=place(points, points.measurement == number, where),
+                             fix="Points of contact are numbered 1, 2, …; point 0 is the direction point")  # fmt: skip
+        touched = points.xyz[self.rows[:, 0]]
+        about = touched - self.placings.means(touched)
+        extents = np.linalg.eigvalsh(self.placings.sums(np.einsum("ni,nj->nij", about, about)))
+        few = self.placings.sizes < LEAST_POINTS
+        if np.any(poor := few | (extents[:, 1] <= _ON_A_LINE**2 * extents[:, 2])):
+            which = int(np.argmax(poor))
+            number, count = self.placings.numbers[which], self.placings.sizes[which]
+            problem = (
+                f"{count} points of contact are too few" if few[which] else "all points of contact lie on one line"
+            )
+            raise CmmUqError(
+                f"measurement {number}: {problem}", where=place(points, points.measurement == number, where),
+                fix=f"Record at least {LEAST_POINTS} points spread over the plane",
+            )  # fmt: skip

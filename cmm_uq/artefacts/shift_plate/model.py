@@ -1,0 +1,171 @@
+"""What a plate in several placings reads on a machine with errors in its plane.
+
+    reading + e(reading) = shift_s + R(turn_s) · ball_p + noise
+
+with, for axes i and j (Schwenke et al. 2008, "Geometric error measurement and compensation of machines", 2.3, to first order),
+
+    e_i = scale_i·r_i + linearity_i(r_i) + straightness_j_i(r_j) + c·r_j,
+    e_j = scale_j·r_j + linearity_j(r_j) + straightness_i_j(r_i),
+
+and the rotation about the normal of each carriage that carries another one of the plane. Balls, shifts and turns are free.
+Positions and levers are counted from the middle of what was read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate, rotations
+from cmm_uq.artefacts.shifting.smooth_function import SmoothFunction
+from cmm_uq.artefacts.shifting.smooth_model import SmoothModel
+from cmm_uq.base.points import AXES, Floats
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.machine.physics.kinematics import carried_offset
+from cmm_uq.machine.physics.rigid_body import ROTATION, STRAIGHTNESS
+
+SCALE_SD, SQUARENESS_SD = 300 * PPM, 500 * ARCSECOND
+"""What physics allows, as in the effects of the same names."""
+_TYPICAL, _TYPICAL_ROTATION = 5 * MICROMETRE, 5 * ARCSECOND
+_SHORTEST = 1 / 8
+"""Shortest correlation length as a part of the range."""
+_ROUNDS = 4
+_MICRO_PRIOR = 1e-3
+"""Noise over prior in the start's least squares, mm."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneModel:
+    """The linear model about a start, and how its coefficients make balls.
+
+    Parameters
+    ----------
+    smooth : observations: all of the first axis, then all of the second, minus the start.
+    balls : (p, 2) start, mm.
+    to_balls : (2p, q) change of the balls' coordinates by the last q flat coefficients.
+    turning : index of the carriages that have a rotation, in the order of the functions after the fourth.
+    lever : (2, 2) of each such carriage: whether its lever has the readings of the first and of the second axis.
+    known_column : (2p,) change of the balls by the last of the columns; ``None`` where no length is known within a u.
+    """
+
+    smooth: SmoothModel
+    balls: Floats
+    to_balls: Floats
+    turning: tuple[int, ...]
+    lever: tuple[tuple[bool, bool], ...]
+    known_column: Floats | None
+
+
+def plane_model(plate: PlacedPlate, known: KnownSpan | None, chain: str, sigma: float | None) -> PlaneModel:
+    """The model linearised where least squares with scales and squareness puts plate and placings.
+
+    Parameters
+    ----------
+    plate : readings.
+    known : a known distance of two balls, by indices into ``plate.numbers``.
+    chain : of the machine.
+    sigma : standard uncertainty of one reading, mm; ``None`` when it is to be estimated.
+    """
+    balls, turned, moved = plate.balls, plate.turned, plate.moved
+    turning, lever = _turning(plate, chain)
+    functions = _functions(plate, turning, chain)
+    noise = np.tile(plate.noise_scale, 2)
+    for round_ in range(_ROUNDS):
+        tied, held, column = _tie(balls, known)
+        placings, to_readings = _rigid_columns(plate, balls, turned)
+        flat = np.hstack([placings, to_readings @ tied])
+        extra = [] if column is None else [to_readings @ column]
+        columns = np.column_stack([*_machine_columns(plate), *extra])
+        sd = np.array([SCALE_SD, SCALE_SD, SQUARENESS_SD, *([known.u] if known and extra else [])])
+        expected = moved[plate.placing] + np.einsum("nij,nj->ni", rotations(turned)[plate.placing], balls[plate.ball])
+        observed = (plate.flat - expected).T.ravel() - to_readings @ held
+        if round_ == _ROUNDS - 1:
+            break
+        found = _least_squares(flat, columns, sd, observed, noise)
+        change = found[: placings.shape[1]].reshape(-1, 3)
+        moved, turned = moved + np.vstack([np.zeros(2), change[:, :2]]), turned + np.r_[0.0, change[:, 2]]
+        balls = balls + (held + tied @ found[placings.shape[1] : flat.shape[1]]).reshape(-1, 2)
+    smooth = SmoothModel(observed, noise, flat, columns, sd, functions, None if sigma else plate.scatter, sigma)
+    return PlaneModel(smooth, balls + held.reshape(-1, 2), tied, turning, lever, column)
+
+
+def _least_squares(flat: Floats, columns: Floats, sd: Floats, observed: Floats, noise: Floats) -> Floats:
+    design = np.hstack([flat, columns]) / noise[:, None]
+    prior = np.hstack([np.zeros((len(sd), flat.shape[1])), np.diag(_MICRO_PRIOR / sd)])
+    wanted = np.r_[observed / noise, np.zeros(len(sd))]
+    return np.asarray(np.linalg.lstsq(np.vstack([design, prior]), wanted, rcond=None)[0])
+
+
+def _tie(balls: Floats, known: KnownSpan | None) -> tuple[Floats, Floats, Floats | None]:
+    """Free changes of the balls (2p, q), the change (2p,) to the known length, and (2p,) for one mm of its error.
+
+    Along the known length the last ball follows the first; all else is free.
+    """
+    count = 2 * len(balls)
+    free = np.eye(count)
+    if known is None:
+        return free, np.zeros(count), None
+    way = balls[known.last] - balls[known.first]
+    along = way / np.linalg.norm(way)
+    rows = slice(2 * known.last, 2 * known.last + 2)
+    column = np.zeros(count)
+    column[rows] = along
+    first = slice(2 * known.first, 2 * known.first + 2)
+    free[rows, first] = np.outer(along, along)
+    free[rows, 2 * known.last] = (-along[1], along[0])
+    held = column * (known.length - np.linalg.norm(way))
+    return np.delete(free, 2 * known.last + 1, axis=1), held, column if known.u > 0 else None
+
+
+def _rigid_columns(plate: PlacedPlate, balls: Floats, turned: Floats) -> tuple[Floats, Floats]:
+    """Change of the readings (2n, ·) by shifts and turns of all placings but the first, and by the balls (2n, 2p)."""
+    n, count = len(plate.ball), len(plate.placings)
+    R = rotations(turned)[plate.placing]
+    placings, to_readings = np.zeros((2, n, count, 3)), np.zeros((2, n, len(balls), 2))
+    rows = np.arange(n)
+    arm = np.einsum("nij,nj->ni", R, balls[plate.ball])
+    for k, sign in ((0, -1.0), (1, 1.0)):
+        placings[k, rows, plate.placing, k] = 1.0
+        placings[k, rows, plate.placing, 2] = sign * arm[:, 1 - k]
+        to_readings[k, rows, plate.ball] = R[:, k]
+    return placings[:, :, 1:].reshape(2 * n, -1), to_readings.reshape(2 * n, -1)
+
+
+def _machine_columns(plate: PlacedPlate) -> list[Floats]:
+    """−e for one unit of scale of both axes and of c."""
+    i, j = (plate.flat - plate.middle[list(plate.axes)]).T
+    none = np.zeros_like(i)
+    return [np.r_[-i, none], np.r_[none, -j], np.r_[-j, none]]
+
+
+def _turning(plate: PlacedPlate, chain: str) -> tuple[tuple[int, ...], tuple[tuple[bool, bool], ...]]:
+    """Carriages whose rotation shows, and which of the two readings their levers have."""
+    one = np.ones((1, 3))
+    levers = {a: carried_offset(AXES[a], one, chain=chain)[0, list(plate.axes)] > 0 for a in plate.axes}
+    shown = tuple(a for a in plate.axes if levers[a].any())
+    return shown, tuple((bool(levers[a][0]), bool(levers[a][1])) for a in shown)
+
+
+def _functions(plate: PlacedPlate, turning: tuple[int, ...], chain: str) -> tuple[SmoothFunction, ...]:
+    """Linearity of i and j, straightness of i along j and of j along i, then the rotations."""
+    i, j = plate.axes
+    n = len(plate.ball)
+    first, second = np.r_[-np.ones(n), np.zeros(n)], np.r_[np.zeros(n), -np.ones(n)]
+    a, b = AXES[i], AXES[j]
+    shown = [
+        (i, f"linearity_{a}", first, _TYPICAL), (j, f"linearity_{b}", second, _TYPICAL),
+        (i, STRAIGHTNESS[a, b].name, second, _TYPICAL), (j, STRAIGHTNESS[b, a].name, first, _TYPICAL),
+    ]  # fmt: skip
+    for axis in turning:
+        offset = carried_offset(AXES[axis], plate.reading - plate.middle, chain=chain)[:, [i, j]]
+        shown.append((axis, ROTATION[AXES[axis], AXES[3 - i - j]].name, np.r_[offset[:, 1], -offset[:, 0]],
+                      _TYPICAL_ROTATION))  # fmt: skip
+    return tuple(
+        SmoothFunction(
+            name, *plate.span(axis), _SHORTEST * (plate.span(axis)[1] - plate.span(axis)[0]),
+            np.tile(plate.reading[:, axis], 2), factor, typical,
+        )
+        for axis, name, factor, typical in shown
+    )  # fmt: skip

@@ -1,0 +1,180 @@
+"""The errors of two axes and of the plate between them from all its placings at once, with their posterior.
+
+Reported are: linearity of each axis, along the line through the middle of what was read; straightness of each, about the
+line through its ends; squareness, of these lines; the rotation of a carriage that carries another one, about its mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.artefacts.shift_axis.curve import Curve
+from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_plate.model import PlaneModel, plane_model
+from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate
+from cmm_uq.artefacts.shift_plate.undetermined import FreeInPlane, free_in_plane
+from cmm_uq.artefacts.shifting.smooth_model import Coefficients, sampled
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Floats
+from cmm_uq.machine.physics.rigid_body import SCALE
+from cmm_uq.maths.inference.ensembles import Chains, Progress
+
+_FINE = 41
+_LEAST_LEFT = 6
+"""Coordinates beyond balls and placings that must be left to tell of the machine."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneEstimate:
+    """All that the placings say.
+
+    Parameters
+    ----------
+    plate, known : what it was made from.
+    model : linear model about its start.
+    coefficients : joint draws of everything linear.
+    chains : of the hyper-parameters, and how they converged.
+    free : what the placings leave open.
+    seed : of everything random.
+    """
+
+    plate: PlacedPlate
+    known: KnownSpan | None
+    model: PlaneModel
+    coefficients: Coefficients
+    chains: Chains
+    free: FreeInPlane
+    seed: int
+
+    @cached_property
+    def positions(self) -> tuple[Floats, Floats]:
+        """Evenly spaced readings of each axis over what was read, mm."""
+        i, j = (np.linspace(*self.plate.span(axis), _FINE) for axis in self.plate.axes)
+        return i, j
+
+    def _on(self, index: int) -> tuple[Floats, Floats, int]:
+        """Positions and draws (N, m) of one function, and which of the two axes it belongs to."""
+        axes = self.plate.axes
+        which = (0, 1, 0, 1, *(axes.index(a) for a in self.model.turning))[index]
+        return self.positions[which], self.coefficients.function(index, self.positions[which]), which
+
+    def _slope(self, index: int) -> Floats:
+        x, values, _ = self._on(index)
+        return np.asarray((values[:, -1] - values[:, 0]) / (x[-1] - x[0]))
+
+    @cached_property
+    def scales(self) -> tuple[Floats, Floats]:
+        """(N,) draws of the mean of e' of each axis over what was read."""
+        i, j = (self.coefficients.columns[:, k] + self._slope(k) for k in range(2))
+        return i, j
+
+    @cached_property
+    def squareness(self) -> Floats:
+        """(N,) draws of S, rad: the angle between the axes' end lines less 90°."""
+        c = self.coefficients.columns[:, 2] + self._slope(2) + self._slope(3)
+        for index, lever in enumerate(self.model.lever, 4):
+            c = c + (float(lever[0]) - float(lever[1])) * self._on(index)[1].mean(axis=1)
+        return np.asarray(-c)
+
+    @cached_property
+    def linearity(self) -> tuple[Curve, Curve]:
+        """Of each axis, zero at its lowest reading; at its highest too where its scale is not determined."""
+        i, j = (self._linearity(k) for k in range(2))
+        return i, j
+
+    def _linearity(self, which: int) -> Curve:
+        x, values, _ = self._on(which)
+        values = values + self.coefficients.columns[:, which : which + 1] * (x - x[0])
+        values -= values[:, :1]
+        if SCALE[AXES[self.plate.axes[which]]].name in self.free.names:
+            values -= self.scales[which][:, None] * (x - x[0])
+        return Curve(x, values)
+
+    @cached_property
+    def straightness(self) -> tuple[Curve, Curve]:
+        """Of the first axis along the second, and the reverse."""
+        i, j = (self._straightness(k) for k in (2, 3))
+        return i, j
+
+    def _straightness(self, index: int) -> Curve:
+        x, values, _ = self._on(index)
+        return Curve(x, values - values[:, :1] - self._slope(index)[:, None] * (x - x[0]))
+
+    @cached_property
+    def rotations(self) -> dict[int, Curve]:
+        """About the plane's normal, of each carriage that carries the other, rad, mean zero."""
+        found = {}
+        for index, axis in enumerate(self.model.turning, 4):
+            x, values, _ = self._on(index)
+            found[axis] = Curve(x, values - values.mean(axis=1, keepdims=True))
+        return found
+
+    @property
+    def sigma(self) -> Floats:
+        """(N,) draws of the standard uncertainty of one coordinate of one reading, mm."""
+        return self.coefficients.sigma
+
+    @cached_property
+    def balls(self) -> Floats:
+        """(N, p, 2) draws of the balls, mm, from the first, as they lay in the first placing.
+
+        All draws are laid over each other by best fit, to one size where no length is known.
+        """
+        c, model = self.coefficients, self.model
+        change = c.flat[:, -model.to_balls.shape[1] :] @ model.to_balls.T
+        if model.known_column is not None:
+            change += c.columns[:, -1:] * model.known_column
+        places = model.balls + change.reshape(len(change), -1, 2)
+        middle = model.balls - model.balls.mean(axis=0)
+        centred = places - places.mean(axis=1, keepdims=True)
+        turn = np.arctan2(
+            np.sum(middle[:, 0] * centred[..., 1] - middle[:, 1] * centred[..., 0], axis=1),
+            np.sum(middle * centred, axis=(1, 2)),
+        )  # fmt: skip
+        size = np.ones(len(places))
+        if not self.free.size_known:
+            size = np.linalg.norm(middle) / np.linalg.norm(centred, axis=(1, 2))
+        laid = size[:, None] * np.exp(-1j * turn)[:, None] * (centred[..., 0] + 1j * centred[..., 1])
+        laid -= laid[:, 0].mean()
+        return np.stack([laid.real, laid.imag], axis=-1)
+
+    @cached_property
+    def residuals(self) -> tuple[Floats, Floats]:
+        """(n, 2) what does not fit, mm: with scales and squareness alone, and with the curves."""
+        before = self.model.smooth.without_functions(float(self.sigma.mean()))
+        return before.reshape(2, -1).T, self.coefficients.left.reshape(2, -1).T
+
+
+def estimate_plane(
+    plate: PlacedPlate,
+    known: KnownSpan | None = None,
+    *,
+    chain: str = "XYZ",
+    sigma: float | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> PlaneEstimate:
+    """Fit all placings at once.
+
+    Parameters
+    ----------
+    plate : any number of placings, balls missing, repeats averaged.
+    known : a known distance of two balls, by indices into ``plate.numbers``.
+    chain : of the machine; it says whose rotation shows.
+    sigma : standard uncertainty of one coordinate of one reading, mm; from repeats and residuals when left out.
+    seed : of everything random.
+    progress : told the part of the sampling done.
+
+    Raises
+    ------
+    CmmUqError : too few readings.
+    """
+    model = plane_model(plate, known, chain, sigma)
+    if (left := len(model.smooth.observed) - model.smooth.flat.shape[1]) < _LEAST_LEFT:
+        raise CmmUqError(f"{len(plate.ball)} readings of {len(plate.numbers)} balls leave {left} coordinates to compare",
+                         fix="Read more balls in each placing, or one more placing")  # fmt: skip
+    coefficients, chains = sampled(model.smooth, seed, progress)
+    return PlaneEstimate(plate, known, model, coefficients, chains, free_in_plane(plate, model), seed)

@@ -1,0 +1,97 @@
+"""What a certificate shows of a probed sphere: form and size of each, and the radial deviations."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from cmm_uq.artefacts.sphere.analysis import about_centre, deviations_um, results
+from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.base.messages import Number, Text, number, say
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Column, Plot, Section, Table
+from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.plots import length_plot, volume_plot
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import deviating, numbered
+from cmm_uq.maths.uncertainty.rounding import alike, rounded
+
+
+def sections(result: Result) -> list[Section]:
+    """Form and size (ISO 10360-5), radial deviations by point, residuals over the sphere."""
+    sphere = cast("Sphere", result.artefact)
+    return [
+        Section(
+            say("Probing of the sphere"), (_table(result, sphere), _by_point(result, sphere), _over(result, sphere))
+        )
+    ]
+
+
+def _table(result: Result, sphere: Sphere) -> Table:
+    probed, size = sphere.probed(), sphere.sizes[0]
+    noise = result.noise.expanded
+    repeated = probed.repeat.max() > 1
+    rows: list[tuple[Text, ...]] = []
+    for i, measurement in enumerate(probed.measurement):
+        place = numbered(measurement, probed.repeat[i] if repeated else None)
+        form = rounded(float(probed.form[i]) / MICROMETRE, max(sphere.form / MICROMETRE, noise / 10))[0]
+        row: list[Text] = [place, number(probed.count[i]), form]
+        if size.certified:
+            row.append(rounded(float(probed.size[i]) / MICROMETRE, noise)[0])
+        rows.append(tuple(row))
+    columns = [Column(say("Sphere"), numeric=False), Column(say("Points")), Column(say("Form error"), unit("µm"))]
+    notes = [say("Form error: range of the radial distances from the least-squares sphere (ISO 10360-5:2010).")]
+    if size.certified:
+        columns.append(Column(say("Size error"), unit("µm")))
+        u = rounded(0.0, 2 * size.sd / MICROMETRE)[1] if size.sd else Number("0")
+        notes.append(
+            say(
+                "Size error: diameter of the least-squares sphere minus the certified one, whose U is {u} µm (k = 2).",
+                u=u,
+            )
+        )
+    return Table(say("Probing errors"), tuple(columns), tuple(rows), tuple(notes))
+
+
+def _by_point(result: Result, sphere: Sphere) -> Plot:
+    size = sphere.sizes[0]
+    deviations = deviations_um(sphere)
+    residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
+    name = say("certified radius") if size.certified else say("mean radius")
+    return length_plot(
+        sphere.points.point,
+        deviations,
+        residuals,
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=name,
+        reference_expanded_um=size.sd / MICROMETRE if size.certified else 0.0,
+        flagged=result.flagged,
+        position_label=say("Point on the sphere"),
+        caption=say(
+            "Distance from the centre minus {name}, as recorded and after the fitted model, with U (k = {k}).",
+            name=name,
+            k=number(result.noise.coverage_factor, ".2f"),
+        ),
+        alternative=deviating(
+            say("{count} points: as recorded they deviate", count=len(deviations)),
+            say("from the {name}", name=name), deviations, residuals,
+        ),
+    )  # fmt: skip
+
+
+def _over(result: Result, sphere: Sphere) -> Plot:
+    residuals = result.residuals / MICROMETRE
+    low, high = alike(residuals.min(), residuals.max())
+    return volume_plot(
+        about_centre(sphere),
+        residuals,
+        caption=say("Residuals after the fitted model over the sphere (all spheres, about their centres)."),
+        alternative=say(
+            "Three projections of the sphere; residuals of {low} to {high} µm.",
+            low=low,
+            high=high,
+        ),
+    )
+
+
+PAGE = Page(sections, results)

@@ -1,0 +1,34 @@
+"""Placings of a step gauge: the seven lines of the standard, and anywhere in the volume."""
+
+from __future__ import annotations
+
+from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
+from cmm_uq.analysis.planning.placing import Pattern, Placing
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.artefacts.gauge_lines.patterns import faces_of, five_of, gauge, seven_lines
+from cmm_uq.base.points import Floats
+
+
+def iso_lines(setting: Setting) -> tuple[Placing, ...]:
+    """Seven lines through the middle of the volume (ISO 10360-2:2009, 6.3), bidirectional unless the job says otherwise."""
+    both = setting.plan.model_copy(update={"both_ways": setting.plan.both_ways is not False})
+
+    def shapes(fitting: Floats) -> list[Pattern]:
+        return [gauge(fitting, both)]
+
+    return seven_lines(setting, faces_of(setting.artefact, setting.plan), shapes)
+
+
+def _shape(setting: Setting) -> Shape:
+    lengths = faces_of(setting.artefact, setting.plan)
+
+    def fitting_pattern(attitude: Floats) -> Pattern | None:
+        fitting = five_of(lengths, setting.volume.chord(attitude[:, 0]))
+        return gauge(fitting, setting.plan) if len(fitting) else None
+
+    return fitting_pattern
+
+
+_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
+
+PLANNING = Planning({"ISO 10360-2": iso_lines}, _PLACES.candidates, _PLACES.elsewhere)

@@ -1,0 +1,1 @@
+"""What every room stands on: errors, units, text, points, files and what is written of them."""

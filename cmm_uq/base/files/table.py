@@ -1,0 +1,87 @@
+"""What the tables of job.toml, its plan and truth.toml are made of: keys that are known, and numbers within their range.
+
+A range holds everything that a machine, an artefact or a laboratory can have, and keeps squares, sums and quotients of what
+it holds within a double's range.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+
+from cmm_uq.base.files.cells import column_problem
+from cmm_uq.base.files.limits import EFFECTS, LISTED
+
+
+class Table(BaseModel):
+    """A table: no key beyond the known ones, no text where a number belongs, no NaN."""
+
+    # most tables are never read: what checks them is made when it is first needed
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+
+LONGEST_MM = 1e7
+"""Largest coordinate or length, mm: ten metres written in micrometres, so that a mistaken unit is still told as one."""
+
+SMALLEST_UM = 1e-6
+"""Least standard uncertainty or limit other than 0, µm: a picometre, a hundredth of an atom."""
+
+LARGEST_UM = 1e6
+"""Largest standard uncertainty, limit or error, µm: a metre."""
+
+
+def at_least(least: float) -> AfterValidator:
+    """Refuses a positive number that is none in its unit."""
+
+    def checked(value: float) -> float:
+        if value < least:
+            raise ValueError(f"must be at least {least:g}")
+        return value
+
+    return AfterValidator(checked)
+
+
+def _zero_or_more_than_nothing(value: float) -> float:
+    if 0 < abs(value) < SMALLEST_UM:
+        raise ValueError(f"must be 0, or at least {SMALLEST_UM:g}")
+    return value
+
+
+def _plain_column(name: str) -> str:
+    if problem := column_problem(name):
+        raise ValueError(problem)
+    return name
+
+
+Position = Annotated[float, Field(ge=-LONGEST_MM, le=LONGEST_MM)]
+"""A coordinate, or a shift, mm."""
+
+Length = Annotated[float, Field(gt=0, le=LONGEST_MM), at_least(1e-6)]
+"""A length, mm."""
+
+Limit = Annotated[float, Field(gt=0, le=LARGEST_UM), at_least(SMALLEST_UM)]
+"""A limit, or a standard uncertainty that cannot be 0, µm."""
+
+Uncertainty = Annotated[float, Field(ge=0, le=LARGEST_UM), AfterValidator(_zero_or_more_than_nothing)]
+"""A standard uncertainty, µm, or 0 where it does not count."""
+
+Temperature = Annotated[float, Field(ge=-273.15, le=1000)]
+"""°C."""
+
+Duration = Annotated[float, Field(ge=0, le=1e6)]
+"""Minutes or seconds."""
+
+Number = Annotated[int, Field(ge=-1_000_000_000, le=1_000_000_000)]
+"""Of a measurement or point."""
+
+AnyFloat = Annotated[float, Field(ge=-1e15, le=1e15)]
+"""A number in a unit that only its name knows: as large as in a recording."""
+
+Column = Annotated[str, AfterValidator(_plain_column)]
+"""Name of a recorded column."""
+
+Range = Annotated[list[Position], Field(min_length=2, max_length=2)]
+Triple = Annotated[list[Position], Field(min_length=3, max_length=3)]
+Names = Annotated[list[str], Field(max_length=EFFECTS.most)]
+Numbers = Annotated[list[Number], Field(max_length=LISTED.most)]

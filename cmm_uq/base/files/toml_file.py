@@ -1,0 +1,227 @@
+"""TOML files as checked objects, with errors that name line and key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, cast, get_origin
+
+import numpy as np
+import tomlkit
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+from tomlkit.exceptions import TOMLKitError
+
+from cmm_uq.base.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
+from cmm_uq.base.files.content import text_of
+from cmm_uq.base.files.limits import WORD
+from cmm_uq.base.files.other_units import conversion
+from cmm_uq.base.files.toml import toml_of
+
+Facts = TypeVar("Facts", bound=BaseModel)
+
+_CHOICE = re.compile("GuardBand|FalseAccept|UncertaintyRatio|PosteriorProbability|UnconditionalRisk|literal")
+"""Of the names that stand in a location for one of several tables that a key may have, none of which the user wrote."""
+
+_ONE_MEANT = re.compile(r"Did you mean '([^']*)'\?")
+
+_SHOWN = 60
+"""Characters of a key or a value in a message."""
+
+
+def checked(
+    content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None,
+    *, most_word: int = WORD.most, beside: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
+) -> Facts:  # fmt: skip
+    """The contents of a TOML file as a checked object.
+
+    Parameters
+    ----------
+    content : the file's bytes, UTF-8.
+    path : of the file, for messages.
+    model : what it must say, or what that is for a file that says this.
+    context : what its checks go by beside the file.
+    most_word : characters without a blank between them.
+    beside : the same with what other files say beside.
+
+    Raises
+    ------
+    CmmUqError : it is no TOML, says something unknown, missing or contradictory, or goes beyond a limit; with line and key.
+    """
+    text = text_of(content, str(path))
+    try:
+        data = toml_of(text, str(path), most_word=most_word)
+    except tomllib.TOMLDecodeError as error:
+        raise CmmUqError(f"is not valid TOML: {error}", where=str(path),
+                         fix="Text stands in quotes, dates as 2026-01-31, decimals with a point") from None  # fmt: skip
+    data = data if beside is None else beside(data)
+    wanted = cast("type[Facts]", model if isinstance(model, type) else model(data))
+    try:
+        return wanted.model_validate(data, context=context)
+    except ValidationError as error:
+        first, *others = _all_located(error, text, path, wanted)
+        first.also = tuple(others)
+        raise first from None
+
+
+def as_toml(data: Mapping[str, Any], where: str) -> bytes:
+    """What a TOML file says, as its bytes.
+
+    Parameters
+    ----------
+    data : tables, lists, texts, numbers, dates, truth values; ``None`` leaves its key out.
+    where : for messages.
+
+    Raises
+    ------
+    CmmUqError : something in it is none of these.
+    """
+    try:
+        return tomlkit.dumps(_plain(data)).encode()
+    except (TOMLKitError, TypeError, ValueError) as error:
+        raise CmmUqError(f"holds what TOML cannot say: {error}", where=where,
+                         fix="Give texts, numbers, dates, lists and tables") from None  # fmt: skip
+
+
+def _plain(value: Any) -> Any:
+    """Without keys that say nothing, and with Python's numbers instead of NumPy's."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def _all_located(error: ValidationError, text: str, path: Path, model: type[BaseModel]) -> list[CmmUqError]:
+    """Every validation error, with line and key; of a key that may be several things, what is wrong as the first of them."""
+    found: dict[tuple[str, ...], CmmUqError] = {}
+    for one in error.errors(include_url=False):
+        named = _named(one)
+        if tuple(named) not in found:
+            found[tuple(named)] = _located(one, named, text, path, model)
+    return list(found.values())[:MOST_GATHERED]
+
+
+def _named(error: ErrorDetails) -> list[str]:
+    """Keys that the user wrote, of the location of an error."""
+    keys = [str(part) for part in error["loc"] if not (isinstance(part, str) and ("[" in part or "(" in part))]
+    return [key for key in keys if not _CHOICE.match(key)] or [str(error["loc"][0])]
+
+
+def _located(error: ErrorDetails, named: list[str], text: str, path: Path, model: type[BaseModel]) -> CmmUqError:
+    """A validation error, with line and key."""
+    line = line_of(named, text)
+    table, word = _table_of(named[:-1], model), named[-1]
+    named = [shortened(key, _SHOWN) for key in named]
+    where = f"{path}{f' line {line}' if line else ''}: {_place(named)}"
+    if error["type"] == "missing":
+        return CmmUqError("is missing", where=where, fix=f"Add it to {path.name}.{_explained(word, table)}".rstrip("."))
+    if error["type"] == "extra_forbidden":
+        return CmmUqError("unknown key", where=where, fix=_meant(shortened(word, _SHOWN), table))
+    message = error["msg"].removeprefix("Value error, ")
+    if error["type"] == "model_type":
+        message = "must be a table of keys"
+    tables = isinstance(error["input"], dict) or (
+        isinstance(error["input"], list) and any(isinstance(item, dict) for item in error["input"])
+    )
+    given = "" if tables else f" (it says {shortened(repr(error['input']), _SHOWN)})"
+    return CmmUqError(f"{message[0].lower()}{message[1:]}{given}", where=where, fix=_near(error))
+
+
+def _place(named: Sequence[str]) -> str:
+    """A key as its table is headed: ``[artefact] u_um``, or ``[[conformity]] 1 rule`` of the first of several."""
+    top, *keys = named
+    if keys and keys[0].isdigit():
+        return " ".join(filter(None, (f"[[{top}]] {int(keys[0]) + 1}", ".".join(keys[1:]))))
+    return " ".join(filter(None, (f"[{top}]", ".".join(keys))))
+
+
+_WRITTEN: Mapping[str, str] = {
+    "float_type": "Write a number without quotes, with a decimal point",
+    "int_type": "Write a whole number without quotes",
+    "int_from_float": "Write a whole number",
+    "bool_type": "Write true or false, without quotes",
+    "string_type": "Put it in quotes",
+    "date_type": "Write it as 2026-01-31, without quotes",
+    "date_from_datetime_parsing": "Write it as 2026-01-31, without quotes",
+    "list_type": "Put it in brackets: [ … ]",
+    "tuple_type": "Put it in brackets: [ … ]",
+}
+"""How a value of each type is written in TOML, by the reader's name of the mistake."""
+
+
+def _meant(word: str, table: type[BaseModel] | None) -> str:
+    """The key that an unknown one may stand for, with its sentence."""
+    known = _known_keys(table)
+    if converted := conversion(word, known):
+        return converted
+    meant = suggestion(word, known)
+    found = _ONE_MEANT.fullmatch(meant)
+    return f"{meant}{_explained(found[1], table)}" if found else meant
+
+
+def _explained(key: str, table: type[BaseModel] | None) -> str:
+    """The sentence of a key, to follow another; nothing where there is none."""
+    from cmm_uq.base.files.sentences import sentences  # reads source code, which only a mistake is worth
+
+    told = sentences(table).get(key, "") if table is not None else ""
+    return f" {told.rstrip('.')}" if told else ""
+
+
+def _near(error: ErrorDetails) -> str | None:
+    """Of the words that a key may have, the one that a wrong word is near to; of other values, how they are written."""
+    given = error["input"]
+    if error["type"] == "list_type" and isinstance(given, dict):
+        return f"Head it [[{'.'.join(_named(error))}]], in double brackets"
+    if error["type"] != "literal_error" or not isinstance(given, str):
+        return _WRITTEN.get(error["type"])
+    words = re.findall(r"'([^']*)'", str(error.get("ctx", {}).get("expected", "")))
+    meant = suggestion(given, words)
+    return meant if _ONE_MEANT.fullmatch(meant) else None
+
+
+def _table_of(parents: list[str], top: type[BaseModel]) -> type[BaseModel] | None:
+    """The class of the table that these keys lead to."""
+    model: object = top
+    by_name = False
+    for parent in parents:
+        if parent.isdigit() or by_name:
+            by_name = False
+            continue
+        fields = getattr(model, "model_fields", {})
+        if parent not in fields:
+            return None
+        model, by_name = _model_inside(fields[parent].annotation), get_origin(fields[parent].annotation) is dict
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+
+
+def _known_keys(table: type[BaseModel] | None) -> list[str]:
+    return [] if table is None else [field.alias or name for name, field in table.model_fields.items()]
+
+
+def _model_inside(annotation: object) -> object:
+    """The table class in ``Table``, ``Table | None`` or ``list[Table]``."""
+    for candidate in (annotation, *getattr(annotation, "__args__", ())):
+        if hasattr(candidate, "model_fields"):
+            return candidate
+    return annotation
+
+
+def line_of(keys: list[str], text: str) -> int | None:
+    """Line of the deepest of ``keys`` that stands in its table; the table's own line when none does."""
+    table, found, count = "", None, -1
+    wanted = int(keys[1]) if len(keys) > 1 and keys[1].isdigit() else None
+    for number, line in enumerate(text.splitlines(), 1):
+        header = re.match(r"\s*\[{1,2}([^\[\]]+)\]", line)
+        if header:
+            table = header[1].strip()
+            count += table == keys[0]
+            here = table == keys[0] and wanted in (None, count)
+            found = number if here and found is None else found
+        elif table.split(".")[0] == keys[0] and wanted in (None, count):
+            key = re.match(r"\s*[\"']?([A-Za-z0-9_-]+)[\"']?\s*[.=]", line)
+            if key and key[1] in keys[1:]:
+                return number
+    return found

@@ -1,0 +1,261 @@
+"""Text that a document may show: every sentence a message with its arguments, so that it can be said in other languages.
+
+A :class:`Message` is a ``str``, its English text, and keeps the pattern and the arguments that it was made of. What is no
+sentence is a :class:`Number`, a :class:`Day`, a unit (:mod:`cmm_uq.base.units`) or :class:`Verbatim`: a name, a serial
+number, words of the user. All are :class:`Text`, which is what the blocks of a document are made of. Patterns are
+literals where they stand, so that a program can list them; texts are joined by the functions here, never by ``str.join``.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import string
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Self
+
+
+class Text(str):
+    """A text of a known sort; the empty one is :data:`NOTHING`."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        """Itself, of its sort: what asks for a ``str``, as a plot's lettering does, keeps the message."""
+        return self
+
+    def __deepcopy__(self, memo: Mapping[int, Any]) -> Self:
+        """Itself: nothing of it changes."""
+        return self
+
+
+class Number(Text):
+    """A number as printed: rounded, with a decimal point; a locale prints it again from this text."""
+
+    __slots__ = ()
+
+
+class Day(Text):
+    """A date as printed, by ISO 8601."""
+
+    __slots__ = ()
+
+
+class Verbatim(Text):
+    """A text that is the same in every language: a name, a file, an identifier, words of the user or of another package."""
+
+    __slots__ = ()
+
+
+Argument = Text | float
+"""What stands in a message: another text, or a number that the pattern says how to round."""
+
+
+class Key(Verbatim):
+    """Where a job states what a sentence speaks of, for the laboratory; a page for customers is without it."""
+
+    __slots__ = ()
+
+
+NOTHING = Text("")
+DASH = Number("–")
+"""Where a figure does not exist."""
+
+
+class Message(Text):
+    """A sentence, or words: the English text, with its pattern and arguments.
+
+    Parameters
+    ----------
+    pattern : with placeholders as for ``str.format``; ``{why:capital}`` begins with a capital letter, ``{what:small}`` with a
+        small one.
+    arguments : by name.
+    """
+
+    __slots__ = ("arguments", "pattern")
+
+    pattern: str
+    arguments: Mapping[str, Argument]
+
+    def __new__(cls, pattern: str, arguments: Mapping[str, Argument]) -> Self:
+        """The pattern, filled in."""
+        message = super().__new__(cls, _ENGLISH.vformat(pattern, (), arguments))
+        kept = {name: value if isinstance(value, Text) else _plain(value) for name, value in arguments.items()}
+        message.pattern, message.arguments = pattern, MappingProxyType(kept)
+        return message
+
+    def __reduce__(self) -> tuple[type[Message], tuple[str, dict[str, Argument]]]:
+        """For pickling."""
+        return Message, (self.pattern, dict(self.arguments))
+
+
+class Plural(Message):
+    """A message in two forms, for one and for many; a language with other forms chooses by the count.
+
+    Parameters
+    ----------
+    number : of what is spoken of.
+    one, many : the forms of English.
+    """
+
+    __slots__ = ("many", "number", "one")
+
+    number: int
+    one: Message
+    many: Message
+
+    def __new__(cls, number: int, one: Message, many: Message) -> Self:
+        """The form of the count."""
+        chosen = one if number == 1 else many
+        message = super().__new__(cls, chosen.pattern, chosen.arguments)
+        message.number, message.one, message.many = number, one, many
+        return message
+
+    def __reduce__(self) -> tuple[type[Plural], tuple[int, Message, Message]]:  # type: ignore[override]
+        """For pickling."""
+        return Plural, (self.number, self.one, self.many)
+
+
+def _plain(value: float) -> float:
+    """A number without the sort that an array gave it."""
+    item: Callable[[], float] | None = getattr(value, "item", None)
+    return value if item is None else item()
+
+
+class Filled(string.Formatter):
+    """``str.format`` with names only, and capitals."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """One argument; ``capital`` and ``small`` change the first letter of a text."""
+        if format_spec == "capital":
+            return str.__getitem__(value, slice(0, 1)).upper() + str.__getitem__(value, slice(1, None))
+        if format_spec == "small":
+            return str.__getitem__(value, slice(0, 1)).lower() + str.__getitem__(value, slice(1, None))
+        return format(value, format_spec)
+
+
+_ENGLISH = Filled()
+
+
+def fields_of(pattern: str) -> frozenset[str]:
+    """Names of a pattern's placeholders."""
+    return frozenset(name for _, name, _, _ in _ENGLISH.parse(pattern) if name)
+
+
+def say(pattern: str, /, **arguments: Argument) -> Message:
+    """A message; the pattern is a literal and its placeholders are the names of the arguments.
+
+    Examples
+    --------
+    >>> say("{count} of {total} lengths conform", count=19, total=20)
+    '19 of 20 lengths conform'
+    """
+    return Message(pattern, arguments)
+
+
+def plural(count: int, *, one: Message, many: Message) -> Plural:
+    """A message in the form of a count."""
+    return Plural(count, one, many)
+
+
+def number(value: float, spec: str = "") -> Number:
+    """A number rounded as a format specification says: ``number(x, ".2f")``."""
+    return Number(format(value, spec))
+
+
+def signed(value: float, spec: str) -> Number:
+    """The same with the minus sign of print."""
+    return Number(format(value, spec).replace("-", "−"))
+
+
+def day(date: dt.date) -> Day:
+    """A date."""
+    return Day(date.isoformat())
+
+
+def names(words: Iterable[str]) -> list[Text]:
+    """Names, files, identifiers: each as it stands."""
+    return [Verbatim(word) for word in words]
+
+
+def listed(words: Sequence[Text]) -> Text:
+    """Words with commas and an "and"."""
+    if len(words) < 2:
+        return words[0] if words else NOTHING
+    return say("{words} and {last}", words=commas(words[:-1]), last=words[-1])
+
+
+def alternatives(words: Iterable[Text]) -> Text:
+    """Words with "or"."""
+    return _folded(list(words), lambda before, after: say("{before} or {after}", before=before, after=after))
+
+
+def comma_or(words: Iterable[Text]) -> Text:
+    """Longer alternatives, with a comma before each "or"."""
+    return _folded(list(words), lambda before, after: say("{before}, or {after}", before=before, after=after))
+
+
+def together(words: Iterable[Text]) -> Text:
+    """Words with "and" between all."""
+    return _folded(list(words), lambda before, after: say("{before} and {after}", before=before, after=after))
+
+
+def commas(words: Iterable[Text]) -> Text:
+    """Words with commas."""
+    return _folded(list(words), lambda before, after: say("{before}, {after}", before=before, after=after))
+
+
+def in_a_row(figures: Iterable[Text]) -> Text:
+    """Figures in a row: coordinates, the ends of an interval, values of a list."""
+    return _folded(list(figures), lambda left, right: say("{left}, {right}", left=left, right=right))
+
+
+def semicolons(words: Iterable[Text]) -> Text:
+    """Words with semicolons."""
+    return _folded(list(words), lambda before, after: say("{before}; {after}", before=before, after=after))
+
+
+def sentences(texts: Iterable[Text]) -> Text:
+    """Sentences one after the other."""
+    return _folded(list(texts), lambda before, after: say("{before} {after}", before=before, after=after))
+
+
+def after(text: Text, further: Text) -> Text:
+    """A text and what follows it, where anything does."""
+    return sentences(part for part in (text, further) if part)
+
+
+def lines(texts: Iterable[Text]) -> Text:
+    """Texts, each on a line of its own."""
+    return _folded(list(texts), lambda before, after: say("{before}\n{after}", before=before, after=after))
+
+
+def _folded(texts: Sequence[Text], join: Callable[[Text, Text], Message]) -> Text:
+    """Two by two, so that long lists do not nest deeply."""
+    if len(texts) < 2:
+        return texts[0] if texts else NOTHING
+    half = len(texts) // 2
+    return join(_folded(texts[:half], join), _folded(texts[half:], join))
+
+
+def at_key(name: str) -> Key:
+    """A key behind what it states, in brackets."""
+    return Key(f" ({name})")
+
+
+def without_keys(text: Text) -> Text:
+    """A text for customers: the same words without the keys of a job."""
+    if isinstance(text, Key):
+        return NOTHING
+    if isinstance(text, Plural):
+        one, many = without_keys(text.one), without_keys(text.many)
+        return Plural(text.number, one, many) if isinstance(one, Message) and isinstance(many, Message) else text
+    if isinstance(text, Message):
+        found = {name: without_keys(each) if isinstance(each, Text) else each for name, each in text.arguments.items()}
+        return Message(text.pattern, found)
+    return text
+
+
+def foreign(text: str) -> Text:
+    """Words of another package: a message where it says one, else as they stand."""
+    return text if isinstance(text, Text) else Verbatim(text)

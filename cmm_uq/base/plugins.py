@@ -1,0 +1,186 @@
+"""What other packages offer by entry points: effects, kinds of measurement, standards, formats of files.
+
+Which there are is read from the packages' metadata; a package is imported when something of it is first needed. What its code
+does wrong is said with its name: the user cannot mend the package, but can tell its author, or uninstall it.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from traceback import walk_tb
+from types import MappingProxyType
+from typing import Any, TypeVar, cast
+
+from cmm_uq.base.errors import CmmUqError
+
+EFFECTS, KINDS, STANDARDS, IMPORTS = "cmm_uq.effects", "cmm_uq.kinds", "cmm_uq.standards", "cmm_uq.imports"
+WHAT: Mapping[str, str] = MappingProxyType({
+    EFFECTS: "effect", KINDS: "kind", STANDARDS: "standard", IMPORTS: "format",
+})  # fmt: skip
+"""What is offered in each group of entry points."""
+
+Offered = TypeVar("Offered")
+_FIX = "Mend the package, or uninstall it"
+
+
+class BrokenPluginError(CmmUqError):
+    """Something of another package that does not do what it must."""
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """Something that another package offers.
+
+    Parameters
+    ----------
+    package, version : of the package.
+    entry : its entry point, of the name of what it offers.
+    """
+
+    package: str
+    version: str
+    entry: EntryPoint
+
+    @property
+    def name(self) -> str:
+        """Of what it offers."""
+        return self.entry.name
+
+    @property
+    def what(self) -> str:
+        """It is, and its name."""
+        return f"the {WHAT[self.entry.group]} {self.name!r}"
+
+    def loaded(self, of: type[Offered]) -> Offered:
+        """What it offers; the package is imported now.
+
+        Raises
+        ------
+        BrokenPluginError : it cannot be imported, or is nothing of this class.
+        """
+
+        def made() -> object:
+            found = self.entry.load()
+            return found() if isinstance(found, type) else found
+
+        found = self.attempt(made)
+        if not isinstance(found, of):
+            raise self.broken(f"is no {of.__name__} but {type(found).__name__}")
+        if (name := getattr(found, "name", None)) != self.name:
+            raise self.broken(f"calls itself {name!r}")
+        return found
+
+    def attempt(self, what: Callable[[], Any]) -> Any:
+        """What the package's code returns; errors of its own are said to be its own.
+
+        Raises
+        ------
+        BrokenPluginError : the code fails. An error that is meant for the user, such as a missing column, is passed on.
+        """
+        try:
+            return what()
+        except CmmUqError:
+            raise
+        except Exception as error:
+            raise self.broken(f"fails with {type(error).__name__}: {error}") from error
+
+    def broken(self, why: str) -> BrokenPluginError:
+        """An error that names the package and what it offers."""
+        return _broken((self,), why)
+
+
+Of = TypeVar("Of", bound=Plugin)
+
+
+def offered(group: str, of: type[Of]) -> tuple[Of, ...]:
+    """What the installed packages offer in a group, by name; nothing is imported.
+
+    Parameters
+    ----------
+    group : one of :data:`WHAT`.
+    of : what makes each of package, version and entry point.
+    """
+    found = sorted(_entries(group, tuple(sys.path)), key=lambda entry: (entry.name, entry.value))
+    return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in found)
+
+
+def _entries(group: str, path: tuple[str, ...]) -> EntryPoints:
+    return cast("EntryPoints", _installed(path).select(group=group))
+
+
+# What is installed follows from where packages are looked for, so that is the key; looking takes a hundredth of a second.
+@lru_cache(maxsize=3)
+def _installed(path: tuple[str, ...]) -> Any:
+    return entry_points()
+
+
+def named(plugins: Iterable[Of], name: str) -> Of | None:
+    """The one of this name; ``None`` where there is none.
+
+    Raises
+    ------
+    CmmUqError : two packages offer it.
+    """
+    found = [plugin for plugin in plugins if plugin.name == name]
+    if len(found) > 1:
+        given = " and ".join(f"{plugin.package} {plugin.version}" for plugin in found)
+        raise CmmUqError(f"{found[0].what} comes from {given}", fix="Uninstall one of them")
+    return found[0] if found else None
+
+
+def versions(names: Mapping[str, Iterable[str]]) -> dict[str, str]:
+    """Version of every package that offers one of these names, by group, and was imported for it, by its name."""
+    return {
+        plugin.package: plugin.version
+        for group, wanted in names.items()
+        for plugin in offered(group, Plugin)
+        if plugin.name in set(wanted) and plugin.entry.module in sys.modules
+    }
+
+
+@contextmanager
+def naming_package() -> Iterator[None]:
+    """A computation in which other packages take part: where the code of one fails, the error says so.
+
+    Raises
+    ------
+    BrokenPluginError : an error that came through the code of another package, which stays its cause.
+    """
+    try:
+        yield
+    except CmmUqError:
+        raise
+    except Exception as error:
+        if (told := told_with_package(error)) is not None:
+            raise told from error
+        raise
+
+
+def told_with_package(error: Exception) -> BrokenPluginError | None:
+    """An error with the name of the package whose code it came through; ``None`` where it came through none."""
+    at_fault = _at_fault(error)
+    return _broken(at_fault, f"fails with {type(error).__name__}: {error}") if at_fault else None
+
+
+def _at_fault(error: Exception) -> tuple[Plugin, ...]:
+    """All that is offered by the innermost module among those that the error came through, of other packages."""
+    plugins = [plugin for group in WHAT for plugin in offered(group, Plugin)]
+    for frame, _ in reversed(list(walk_tb(error.__traceback__))):
+        module = str(frame.f_globals.get("__name__", ""))
+        package = module.partition(".")[0]
+        inside = [plugin for plugin in plugins if plugin.entry.module.partition(".")[0] == package]
+        if inside:
+            return tuple(plugin for plugin in inside if plugin.entry.module == module) or tuple(inside)
+    return ()
+
+
+def _broken(plugins: tuple[Plugin, ...], why: str) -> BrokenPluginError:
+    package = " ".join(filter(None, (plugins[0].package, plugins[0].version)))
+    return BrokenPluginError(
+        f"{' or '.join(plugin.what for plugin in plugins)} {why}", where=f"package {package}", fix=_FIX
+    )

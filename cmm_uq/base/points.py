@@ -1,0 +1,250 @@
+"""The ground floor: a measurement is points, read on a machine.
+
+Every room of the package speaks of these two objects. ``jobs`` makes them from files, ``physics`` moves them,
+artefacts turn them into observations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.units import HOUR
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+AXES = "xyz"
+"""Of coordinates, and of the carriages of a Cartesian machine."""
+
+_NO_START = 1e6
+"""s: a first reading this long after time 0, twelve days, is of a clock that did not start with the job, as a computer's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """What the physics must know of the machine, whose readings are coordinates but for an origin: a Cartesian one.
+
+    A machine with further axes, or with others, is a class of its own, whose :meth:`coordinates` and :meth:`readings` say how
+    they belong together; everything else is said by axis.
+
+    Parameters
+    ----------
+    name : as on the certificate.
+    chain : carriages from the table to the ram, a permutation of ``XYZ``.
+    travel_mm : (axes, 2) lowest and highest scale reading of each axis, mm; ``nan`` where the job does not say.
+    origin_mm : (3,) scale reading = recorded coordinate + origin, mm.
+    tip_on_every_carriage : whether rotations of all carriages act on the stylus tip offset, as they do in truth, or those
+        of the ram alone, as job files have it, where the other levers are so much longer.
+    axes : names of the axes that are read.
+    """
+
+    name: str = ""
+    chain: str = "XYZ"
+    travel_mm: Floats = field(default_factory=lambda: np.full((3, 2), np.nan))
+    origin_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    tip_on_every_carriage: bool = False
+    axes: tuple[str, ...] = tuple(AXES)
+
+    def coordinates(self, readings: Floats) -> Floats:
+        """Recorded coordinates (n, 3), mm, of scale readings (n, axes)."""
+        return np.asarray(readings - self.origin_mm, dtype=np.float64)
+
+    def readings(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
+        """Scale readings (n, axes) of recorded coordinates (n, 3), mm.
+
+        Parameters
+        ----------
+        xyz : recorded coordinates.
+        columns : what was recorded beside them, each (n,): readings that do not follow from coordinates are among it.
+        """
+        return np.asarray(xyz + self.origin_mm, dtype=np.float64)
+
+    def travel(self, axis: str) -> tuple[float, float]:
+        """Lowest and highest scale reading of an axis, mm.
+
+        Raises
+        ------
+        CmmUqError : the job does not give the travel of this axis.
+        """
+        low, high = self.travel_mm[self.axes.index(axis)]
+        if np.isnan(low) or np.isnan(high):
+            raise CmmUqError(
+                f"the travel of axis {axis} is needed",
+                where="job.toml [machine] travel_mm",
+                fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }} in mm",
+            )
+        return float(low), float(high)
+
+
+def beyond_travel(readings: Floats, travel_mm: Floats) -> list[tuple[int, int]]:
+    """(axis, row) of the reading that lies farthest beyond the travel of each axis, where one does.
+
+    Parameters
+    ----------
+    readings : (n, axes) of the scales, mm.
+    travel_mm : (axes, 2) lowest and highest; ``nan`` bounds nothing.
+    """
+    if not len(readings):
+        return []
+    beyond = np.maximum(travel_mm[:, 0] - readings, readings - travel_mm[:, 1])
+    rows = np.argmax(np.where(np.isnan(beyond), -np.inf, beyond), axis=0)
+    return [(axis, int(row)) for axis, row in enumerate(rows) if beyond[row, axis] > 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Indicated coordinates of one recording, and all that was recorded beside them.
+
+    Parameters
+    ----------
+    xyz : (n, 3) indicated coordinates, mm, in the recorded frame.
+    measurement, point, repeat : (n,) what belongs together; see the recording's columns of the same names.
+    machine : the machine that read them.
+    columns : further recorded columns by their name in the recording, each (n,).
+    lines : (n,) line of each point in its file, for messages; 0 where there is no file.
+    directions : (3, 3) or (n, 3, 3) unit vectors of the motions of carriages x, y, z, a row each; ``None`` where they are
+        taken as the axes of the coordinates.
+    start_s : what ``time_s`` was at the start; by default 0 or, by a clock that began long before, at the first reading.
+    """
+
+    xyz: Floats
+    measurement: Ints
+    point: Ints
+    repeat: Ints
+    machine: Machine = field(default_factory=Machine)
+    columns: Mapping[str, Floats] = field(default_factory=dict)
+    lines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    directions: Floats | None = None
+    start_s: float | None = None
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @cached_property
+    def readings(self) -> Mapping[str, Floats]:
+        """What each axis of the machine read, (n,), by its name: mm for a carriage."""
+        read = self.machine.readings(self.xyz, self.columns)
+        return MappingProxyType(dict(zip(self.machine.axes, read.T, strict=True)))
+
+    @cached_property
+    def carriages(self) -> Floats:
+        """(n, 3) scale readings of the carriages x, y, z, mm: what the errors of three carriages go by."""
+        return np.column_stack([self.readings[axis] for axis in AXES])
+
+    @cached_property
+    def machine_xyz(self) -> Floats:
+        """(n, 3) the place in the frame of the machine's scales, mm: recorded coordinates plus the machine's origin."""
+        return self.xyz + self.machine.origin_mm
+
+    @cached_property
+    def group(self) -> Ints:
+        """(n,) index of the (measurement, repeat) that each point belongs to, in order of first appearance."""
+        _, first, inverse = np.unique(
+            np.column_stack([self.measurement, self.repeat]), axis=0, return_index=True, return_inverse=True
+        )
+        rank = np.empty(len(first), dtype=np.int64)
+        rank[np.argsort(first)] = np.arange(len(first))
+        return rank[inverse.ravel()]
+
+    @cached_property
+    def rows_of_groups(self) -> list[Ints]:
+        """Rows of each group (see :attr:`group`), ascending."""
+        order = np.argsort(self.group, kind="stable")
+        return np.split(order, np.cumsum(np.bincount(self.group))[:-1]) if len(self) else []
+
+    @cached_property
+    def copies(self) -> Mapping[int, int]:
+        """Groups (see :attr:`group`) that repeat another to the last digit, with that other: the first by measurement, repeat.
+
+        The order of their points is no matter.
+        """
+        same: dict[bytes, list[int]] = {}
+        for group in np.unique(self.group[self._somewhere_again]).tolist():
+            rows = self.rows_of_groups[group]
+            figures = self.xyz[rows] + 0.0  # −0 is 0
+            same.setdefault(figures[np.lexsort(figures.T)].tobytes(), []).append(group)
+        found: dict[int, int] = {}
+        for groups in same.values():
+            original, *later = sorted(groups, key=self.run_of)
+            found |= dict.fromkeys(later, original)
+        return found
+
+    @property
+    def _somewhere_again(self) -> NDArray[np.bool_]:
+        """(n,) whether another point has the same coordinates to the last digit."""
+        order = np.lexsort(self.xyz.T)
+        alike = np.all(self.xyz[order[1:]] == self.xyz[order[:-1]], axis=1)
+        found = np.zeros(len(self), dtype=bool)
+        found[order[1:]] |= alike
+        found[order[:-1]] |= alike
+        return found
+
+    def run_of(self, group: int) -> tuple[int, int]:
+        """Measurement and repeat of a group."""
+        row = self.rows_of_groups[group][0]
+        return int(self.measurement[row]), int(self.repeat[row])
+
+    def column(self, name: str) -> Floats:
+        """A recorded column, (n,).
+
+        Raises
+        ------
+        CmmUqError : the recording has no such column.
+        """
+        if name not in self.columns:
+            raise CmmUqError(
+                f"the recording has no column {name!r}, which the model needs",
+                where="job.toml [model] effects",
+                fix=f"Record {name}, or leave out the effect",
+            )
+        return self.columns[name]
+
+    @cached_property
+    def start(self) -> float:
+        """What ``time_s`` was at the start, s."""
+        if self.start_s is not None:
+            return self.start_s
+        first = float(self.columns["time_s"].min(initial=np.inf)) if "time_s" in self.columns else 0.0
+        return first if _NO_START < abs(first) < np.inf else 0.0
+
+    @cached_property
+    def hours(self) -> Floats:
+        """Time since the start (n,), h.
+
+        Raises
+        ------
+        CmmUqError : the recording has no time.
+        """
+        return np.asarray((self.column("time_s") - self.start) / HOUR)
+
+    def at(self, xyz: Floats) -> Points:
+        """The same points at other coordinates (n, 3), mm."""
+        return replace(self, xyz=xyz)
+
+    def select(self, rows: NDArray[np.bool_] | Ints) -> Points:
+        """Some of the points, by mask or index."""
+        return Points(
+            self.xyz[rows],
+            self.measurement[rows],
+            self.point[rows],
+            self.repeat[rows],
+            self.machine,
+            {name: values[rows] for name, values in self.columns.items()},
+            self.lines[rows] if len(self.lines) else self.lines,
+            self.directions if self.directions is None or self.directions.ndim == 2 else self.directions[rows],
+            self.start,
+        )
+
+    def group_means(self, values: Floats) -> Floats:
+        """Mean of ``values`` (n,) or (n, k) over each point's (measurement, repeat), given back to every point."""
+        sums = np.zeros((self.group.max() + 1, *values.shape[1:])) if len(self) else np.zeros((0, *values.shape[1:]))
+        np.add.at(sums, self.group, values)
+        counts = np.bincount(self.group).reshape((-1,) + (1,) * (values.ndim - 1))
+        return np.asarray((sums / counts)[self.group], dtype=np.float64)

@@ -1,0 +1,251 @@
+"""ISO/IEC 17025:2017, 7.8, clause by clause: what each asks of a calibration certificate, and what of it the job states.
+
+One table for the warning of a certificate, the mark of a draft, ``results.json`` and ``cmm-uq check``. A certificate is a
+draft until nothing that the standard asks of every certificate is missing; what it asks for where there is any makes none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from cmm_uq.analysis.conformity.decision import rule_name
+from cmm_uq.base.messages import Text, Verbatim, day, say
+from cmm_uq.certificate.origin import CERTIFICATE
+from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.jobs.identification import Identification
+from cmm_uq.jobs.job import Job, JobFile
+from cmm_uq.jobs.laboratory import Laboratory
+from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.jobs.verdicts import TOLERANCE_RULE
+
+Status = Literal["stated", "missing", "not applicable", "laboratory"]
+"""The last of what the laboratory does, and no certificate shows."""
+
+STATEMENTS = (
+    say("The results relate only to the item named above, in its condition and place at the time of the measurement."),
+    say(
+        "This certificate shall not be reproduced except in full without the written approval of the "
+        "issuing laboratory."
+    ),
+)
+"""ISO/IEC 17025:2017, 7.8.2.1 l) and the note to 7.8.2.1."""
+
+NOT_OURS = say(
+    "The data named as the customer's were not measured by the laboratory, which does not answer for them; results that "
+    "rest on them are valid as far as they are."
+)
+"""7.8.2.2, where there are such data."""
+
+DRAFT = say("DRAFT, not complete by ISO/IEC 17025:2017, 7.8")
+"""On every page of a certificate that lacks what each must state."""
+
+
+@dataclass(frozen=True)
+class Clause:
+    """One thing that a clause asks for.
+
+    Parameters
+    ----------
+    clause : its number, with the letter where it has one.
+    asks : what for; a text that can be said in other languages where a certificate may have to name it.
+    status : whether the certificate has it.
+    stated : what satisfies it; empty where nothing does.
+    key : of job.toml, that states it or would; empty where the form of the certificate does.
+    """
+
+    clause: str
+    asks: str
+    status: Status
+    stated: str
+    key: str
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """For ``results.json``."""
+        return {
+            "clause": self.clause, "asks": str.__str__(self.asks), "status": self.status,
+            "stated": self.stated or None, "key": self.key or None,
+        }  # fmt: skip
+
+
+def clauses(job: Job) -> tuple[Clause, ...]:
+    """Every clause of 7.8 that speaks of calibration certificates, in the standard's order."""
+    facts = job.facts
+    return (
+        *_reporting(facts),
+        *_of_every_report(facts),
+        *_of_a_calibration(job),
+        *_statements(facts),
+        *_replacing(facts),
+    )
+
+
+def missing(job: Job) -> tuple[Clause, ...]:
+    """What every certificate must state and this one does not."""
+    return tuple(one for one in clauses(job) if one.status == "missing")
+
+
+def certifies(job: Job) -> bool:
+    """Whether what is made of a job is a calibration certificate: somebody measured, and between no two calibrations."""
+    return job.origin == MEASURED and not job.facts.job.interim
+
+
+def clauses_data(job: Job) -> dict[str, Any]:
+    """For results.json, of what is to be a certificate."""
+    if not certifies(job):
+        return {}
+    chain = claimed(job)
+    said = {"claim": chain.claim, "statement": str.__str__(chain.statement)}
+    return {"iso17025": [one.data for one in clauses(job)], "traceability": said}
+
+
+def draft(job: Job) -> bool:
+    """Whether a certificate of the job is a draft only."""
+    return certifies(job) and bool(missing(job))
+
+
+def replaced_certificate(replaced: Replaced) -> Text:
+    """Number and date of a certificate that is replaced."""
+    return say("{number} of {date}", number=Verbatim(replaced.number), date=day(replaced.date))
+
+
+def asked(clause: str, asks: str, stated: object, key: str = "") -> Clause:
+    """Of every certificate."""
+    return Clause(clause, asks, "stated" if stated else "missing", _plain(stated), key)
+
+
+def _where(clause: str, asks: str, stated: object, key: str = "") -> Clause:
+    """Where there is any."""
+    return Clause(clause, asks, "stated" if stated else "not applicable", _plain(stated), key)
+
+
+def _done(clause: str, asks: str, key: str = "") -> Clause:
+    return Clause(clause, asks, "laboratory", "", key)
+
+
+def _plain(stated: object) -> str:
+    return str.__str__(stated) if isinstance(stated, str) else "" if stated is None else str(stated)
+
+
+def _lines(parts: Iterable[str]) -> str:
+    return ", ".join(line for part in parts for line in part.splitlines() if line)
+
+
+def _reporting(facts: JobFile) -> tuple[Clause, ...]:
+    return (
+        _done("7.8.1.1", "results reviewed and authorised before release", "[laboratory] four_eyes"),
+        asked("7.8.1.2", "results and all that their interpretation needs, in a report", _number(facts)),
+        _done("7.8.1.3", "a simplified report only as agreed with the customer"),
+    )
+
+
+def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
+    machine = facts.machine
+    named = (machine.manufacturer, machine.model, machine.name)
+    item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
+    serial = asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial")
+    return of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial)
+
+
+def of_every_report(job: Identification, laboratory: Laboratory, title: str, item: Clause) -> tuple[Clause, ...]:
+    """7.8.2.1 of any report.
+
+    Parameters
+    ----------
+    title : of the document.
+    item : what names the item (7.8.2.1 g).
+    """
+    return (
+        asked("7.8.2.1 a", "title", title),
+        asked("7.8.2.1 b", say("name of the laboratory"), laboratory.name, "[laboratory] name"),
+        asked("7.8.2.1 b", say("address of the laboratory"), _lines([laboratory.address]), "[laboratory] address"),
+        asked("7.8.2.1 c", say("place of the measurement"), job.place, "[job] place"),
+        asked("7.8.2.1 d", "every part known as part of one report, and its end",
+               f"number {job.number or job.id} and page of pages on every page; mark of the end", "[job] number"),
+        asked("7.8.2.1 e", say("customer"), job.customer, "[job] customer"),
+        asked("7.8.2.1 e", say("how to reach the customer"), _lines([job.address]), "[job] address"),
+        asked("7.8.2.1 f", say("method"), job.procedure, "[job] procedure"),
+        item,
+        _where("7.8.2.1 h", "date of receipt, where it matters", job.received, "[job] received"),
+        asked("7.8.2.1 i", "date of the measurement", job.date, "[job] date"),
+        asked("7.8.2.1 j", say("date of issue"), job.issued, "[job] issued"),
+        _where("7.8.2.1 k", "sampling plan, where anything is sampled", ""),
+        asked("7.8.2.1 l", "that the results relate to the item alone", STATEMENTS[0]),
+        asked("7.8.2.1 m", "results with their units", "the unit with every figure"),
+        _where("7.8.2.1 n", "additions to, deviations from and exclusions from the method", job.deviations,
+               "[job] deviations"),
+        asked("7.8.2.1 o", say("who authorises it"), _lines([laboratory.signatory, laboratory.signatory_role])
+               if laboratory.signatory else "", "[laboratory] signatory"),
+        _where("7.8.2.1 p", "results from external providers", job.external, "[job] external"),
+        _where("7.8.2.2", "data from the customer, and that the laboratory does not answer for them", job.from_customer,
+               "[job] from_customer"),
+    )  # fmt: skip
+
+
+def _of_a_calibration(of: Job) -> tuple[Clause, ...]:
+    facts, job = of.facts, of.facts.job
+    return (
+        asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
+               "U, k and 95 % with every result", "[laboratory] cmc"),
+        asked("7.8.4.1 b", say("conditions"), job.conditions, "[job] conditions"),
+        *_traceable(of),
+        _where("7.8.4.1 d", "results before and after an adjustment", job.as_found, "[job] as_found"),
+        _where("7.8.4.1 e", "statement of conformity", _standards(facts), "[[conformity]]"),
+        _where("7.8.4.1 f", "opinions and interpretations", "annex of opinions and interpretations",
+               "[job] diagnosis_on_certificate"),
+        _where("7.8.4.2", "sampling by the laboratory", ""),
+        asked("7.8.4.3", "no calibration interval that was not agreed with the customer",
+               f"next calibration as agreed: {job.recalibration_agreed}" if job.recalibration_agreed else "none is printed",
+               "[job] recalibration_agreed"),
+    )  # fmt: skip
+
+
+def _traceable(job: Job) -> tuple[Clause, ...]:
+    """How the results are traceable; where that is not shown, all that each certificate which they rest on lacks."""
+    chain = claimed(job)
+    if chain.claim != "not shown":
+        return (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
+    return tuple(Clause("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
+
+
+def _statements(facts: JobFile) -> tuple[Clause, ...]:
+    decided = bool(facts.conformity or facts.model.tolerances)
+    named = (
+        *(rule_name(wish.rule) for wish in facts.conformity),
+        *((TOLERANCE_RULE,) if facts.model.tolerances else ()),
+    )
+    rules = "; ".join(dict.fromkeys(named))
+    stated = "value, measurement and length named with each statement" if decided else ""
+    return (
+        _where("7.8.6.1", "a decision rule, with the risk that it takes",
+               f"{rules}: guard band and probability with each statement" if decided else "", "[[conformity]] rule"),
+        _where("7.8.6.2 a", "to which results a statement of conformity applies", stated, "[[conformity]]"),
+        _where("7.8.6.2 b", "which specifications are met or not met", _standards(facts), "[[conformity]] standard"),
+        _where("7.8.6.2 c", "the decision rule applied", rules, "[[conformity]] rule"),
+        _done("7.8.7.1", "opinions by authorised people, on a documented basis"),
+        _where("7.8.7.2", "opinions rest on the results and are marked as such", "in the annex, under its own heading"),
+        _done("7.8.7.3", "what was said of them to the customer is recorded"),
+    )  # fmt: skip
+
+
+def _replacing(facts: JobFile) -> tuple[Clause, ...]:
+    replaced = facts.job.replaces
+    return (
+        _where("7.8.8.1", "what was changed, and why", replaced and f"{replaced.changed} ({replaced.reason})",
+               "[job.replaces] changed"),
+        _where("7.8.8.2", "amendments as a further document that says so", ""),
+        _where("7.8.8.3", "a number of its own, and which certificate it replaces",
+               replaced and replaced_certificate(replaced), "[job.replaces] number"),
+    )  # fmt: skip
+
+
+def _standards(facts: JobFile) -> str:
+    held = ("tolerances of the job",) if facts.model.tolerances else ()
+    return "; ".join(dict.fromkeys((*(wish.standard for wish in facts.conformity), *held)))
+
+
+def _number(facts: JobFile) -> str:
+    return facts.job.number or facts.job.id

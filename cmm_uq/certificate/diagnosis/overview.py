@@ -1,0 +1,183 @@
+"""A diagnosis in four lines: what was found, where, how sure that is, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from cmm_uq.analysis.diagnosis.comparison.search import ASSERTED
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.analysis.diagnosis.held_out import Improvement
+from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.base.messages import NOTHING, Text, after, alternatives, lines, say, semicolons
+from cmm_uq.certificate.against import contained
+from cmm_uq.certificate.diagnosis.costs import explanation
+from cmm_uq.certificate.diagnosis.unseen import without_power
+from cmm_uq.certificate.document import Overview, Standing
+from cmm_uq.certificate.effect_words import effect_of, size_of, titles
+from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.where_section import by_columns, place_words
+from cmm_uq.certificate.withheld import sentences as withheld_sentences
+from cmm_uq.certificate.wording import probability
+from cmm_uq.maths.uncertainty.rounding import alike
+
+STANDING: Mapping[str, Standing] = {
+    "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
+}  # fmt: skip
+"""What a verdict means for who is to act."""
+
+VERDICT_TITLES: Mapping[str, Text] = {
+    "consistent": say("Consistent: nothing is found to be missing"),
+    "explained": say("Explained: the cause is found"),
+    "partial": say("Partly explained: a cause is found, and there is more"),
+    "unexplained": say("Unexplained: something is wrong that no known effect accounts for"),
+}
+"""A verdict as the title of its overview."""
+
+_RAREST = 1e-4
+"""Probability below which only this is told."""
+
+_TOLD = 0.05
+"""Probability from which another explanation is told beside what is asserted."""
+
+
+def overview_of(found: Diagnosed) -> Overview:
+    """The overview of a recording's diagnosis."""
+    d = found.diagnosis
+    rows = (
+        (say("Found"), _found(found)), (say("Where"), _where(d)), (say("How sure"), _sure(found)),
+        (say("What to do"), _to_do(found)),
+    )  # fmt: skip
+    title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
+    if without_power(found):
+        title, standing = say("Consistent, as far as this recording can show"), "open"
+    if d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
+        title = say("Explained: more than one cause is possible")
+    return Overview(title, standing, tuple(row for row in rows if row[1]))
+
+
+def _found(found: Diagnosed) -> Text:
+    d = found.diagnosis
+    if d.verdict == "consistent":
+        if found.simulated is None:
+            return say("Nothing beyond the effects that the job names: what they leave is noise.")
+        return say("Nothing beyond the simulation: what it leaves is noise.")
+    if not d.effects:
+        return lines((say("A misfit that no known effect accounts for."), *withheld_sentences(d.withheld)))
+    told = [_one(found, item) for item in d.effects]
+    if d.verdict == "partial":
+        told.append(say("And more that no known effect accounts for."))
+    return lines(told)
+
+
+def _one(found: Diagnosed, item: LeftOut) -> Text:
+    d = found.diagnosis
+    effect = effect_of(item.effect, d.after.effects)
+    told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
+    if others := _instead(d, item):
+        small = alternatives(say("{title:small}", title=title) for title in titles(others, d.after.effects))
+        told = say("{told} It could as well be: {others}.", told=told, others=small)
+    return after(told, contained(found.simulated, item.effect))
+
+
+def _instead(d: Diagnosis, item: LeftOut) -> list[str]:
+    """What this recording cannot tell from an effect; of an improbable one the whole group, as one of which it is asserted."""
+    group = item.group if item.probability < ASSERTED else ()
+    twins = (name for twins in d.indistinguishable if twins[0] == item.effect for name in twins[1:])
+    return [name for name in dict.fromkeys((*group, *twins)) if name != item.effect]
+
+
+def _where(d: Diagnosis) -> Text:
+    if d.verdict == "consistent":
+        return say("No place, direction or time stands out.")
+    if not d.where and (told := by_columns(d)):
+        return told
+    if not d.where:
+        return say("Spread over the recording: no reading or direction by itself stands out.")
+    return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
+
+
+def _sure(found: Diagnosed) -> Text:
+    d = found.diagnosis
+    if d.verdict == "consistent":
+        told = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
+        return lines(text for text in (told, without_power(found)) if text)
+    by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
+    if not d.effects:
+        return by_chance
+    probable = semicolons([_probable(item) for item in d.effects])
+    each = (by_chance, say("Probability: {each}.", each=probable), _otherwise(d), gained(d.improvement))
+    return lines(text for text in each if text)
+
+
+def _otherwise(d: Diagnosis) -> Text:
+    """What remains as probable that leaves out an effect that is asserted."""
+    asserted = {item.effect for item in d.effects}
+    others = [one for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)]
+    each = [
+        say("{title} {probability}", title=explanation(one), probability=probability(one.probability)) for one in others
+    ]
+    return say("Otherwise: {each}.", each=semicolons(each)) if each else NOTHING
+
+
+def _probable(item: LeftOut) -> Text:
+    if item.probability < ASSERTED:
+        return say(
+            "{title} {probability}, it or one that it could as well be {together}",
+            title=item.title, probability=probability(item.probability), together=probability(item.together),
+        )  # fmt: skip
+    return say("{title} {probability}", title=item.title, probability=probability(item.probability))
+
+
+def gained(gain: Improvement) -> Text:
+    """What the cause gains where the fit had not seen the recording, in a sentence."""
+    before, after = alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um)
+    return say(
+        "{unseen:capital} that the fit had not seen are predicted to {after}\u00a0µm with it, to {before}\u00a0µm "
+        "without it.",
+        unseen=gain.unseen, before=before, after=after,
+    )  # fmt: skip
+
+
+def share_of(p_value: float) -> Text:
+    """A probability as a share of recordings: ``17 of 100``."""
+    if p_value < _RAREST:
+        return say("fewer than 1 of 10\u00a0000")
+    if p_value < 0.05:
+        return say("1 of {many:.0f}", many=1 / p_value)
+    return say("{many:.0f} of 100", many=100 * p_value)
+
+
+def _to_do(found: Diagnosed) -> Text:
+    d = found.diagnosis
+    told: list[Text] = []
+    if found.next_plan is not None and d.verdict != "consistent":
+        told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
+    told += [_look_at(d, item) for item in d.effects]
+    if d.verdict in ("partial", "unexplained"):
+        told.append(
+            say("Look at the pictures below and measure again: do not compensate by a model that does not fit.")
+        )
+    if d.verdict == "explained":
+        told.append(say("Then measure again."))
+    if d.verdict == "consistent":
+        told.append(_nothing_to_do(found.findings))
+        if found.next_plan is not None:
+            told.append(say("To see what it could not have shown, measure the set-ups that are told below."))
+    return lines(dict.fromkeys(told))
+
+
+def _look_at(d: Diagnosis, item: LeftOut) -> Text:
+    """The cause to look at; of effects that cannot be told apart, that of each on a line."""
+    own = d.after.effects
+    others = [effect_of(name, own) for name in _instead(d, item)]
+    named = [effect for effect in others if effect is not None]
+    if not named:
+        return say("{what:capital}.", what=item.points_to)
+    causes = [(item.title, item.points_to), *((effect.title, effect.points_to) for effect in named)]
+    return lines(say("If it is {title:small}: {what}.", title=title, what=what) for title, what in causes)
+
+
+def _nothing_to_do(findings: Sequence[Finding]) -> Text:
+    if findings:
+        return say("Nothing on account of the machine; see the warnings on the recording.")
+    return say("Nothing on account of this recording.")

@@ -1,0 +1,325 @@
+"""A diagnosis as a document, and its results.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.base.messages import Text, Verbatim, commas, day, names, number, say, sentences
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.against import contained, corrections, simulation_section
+from cmm_uq.certificate.diagnosis.costs import costs_section
+from cmm_uq.certificate.diagnosis.next import next_section
+from cmm_uq.certificate.diagnosis.overview import overview_of
+from cmm_uq.certificate.diagnosis.unseen import unseen_section
+from cmm_uq.certificate.diagnosis.words import (
+    ambiguous,
+    held_out,
+    lines,
+    noise_words,
+    stated_um,
+    summary_of,
+    sure,
+    verdict_of,
+)
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.effect_words import effect_of, parameter_title, size_of, title_of, titles
+from cmm_uq.certificate.improvement_table import improvement_table
+from cmm_uq.certificate.lettering import lettered_in
+from cmm_uq.certificate.origin import came_about
+from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.plots import length_plot, residual_plot
+from cmm_uq.certificate.program import program
+from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.results_file import diagnosis_data, head
+from cmm_uq.certificate.where_section import where_section
+from cmm_uq.certificate.withheld import other_periods
+from cmm_uq.certificate.withheld import sentences as withheld_sentences
+from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
+from cmm_uq.certificate.working_page import working_page
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
+from cmm_uq.maths.uncertainty.rounding import alike, figure
+
+
+def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
+    """results.json of a diagnosis."""
+    posterior = found.diagnosis.posterior
+    return {
+        **head(found.job),
+        "sampling": {
+            "sampler": posterior.sampler, "seed": posterior.seed, "ess_min": posterior.ess_min,
+            "rhat_max": posterior.rhat_max, "converged": posterior.converged,
+        },
+        "diagnosis": diagnosis_data(found),
+    }  # fmt: skip
+
+
+def diagnosis_document(found: Diagnosed) -> Document:
+    """The page of a diagnosis."""
+    facts, d = found.job.facts, found.diagnosis
+    return working_page(
+        facts,
+        say("Diagnosis"),
+        say("{came_about} {date}", came_about=came_about(found.job), date=day(facts.job.date)),
+        overview=overview_of(found),
+        particulars=(
+            Facts(
+                (
+                    (say("Machine"), Verbatim(facts.machine.name)),
+                    (say("Artefact"), d.before.artefact.title),
+                    (say("p-value of “nothing is missing”"), number(d.p_value, ".2g")),
+                    (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
+                )
+            ),
+            Facts((_explained_by(found),)),
+        ),
+        warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
+        sections=_sections(found),
+        produced_by=say(
+            "{program}, {sampler}, seed {seed}",
+            program=program(found.job),
+            sampler=Verbatim(d.posterior.sampler),
+            seed=d.posterior.seed,
+        ),
+        attachments=(*names(found.job.inputs), Verbatim("results.json")),
+    )
+
+
+def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
+    """What a diagnosis says, as sections of any document, the overview first."""
+    return (Section(say("Diagnosis"), (overview_of(found),)), *_sections(found))
+
+
+def _sections(found: Diagnosed) -> tuple[Section, ...]:
+    """What is to be done first, what it rests on behind it, long tables last."""
+    noise = noise_words(found.diagnosis, stated_um(found))
+    sections = (
+        Section(say("What was left out"), _left_out(found)),
+        where_section(found.diagnosis),
+        Section(say("What remains"), _consistent(found)),
+        next_section(found),
+        Section(say("Before and after"), _before_after(found)),
+        Section(say("What a correction would change"), _consequences(found)),
+        costs_section(found),
+        unseen_section(found),
+        *_simulation(found),
+        Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
+        Section(say("Candidate explanations"), (_rivals(found),)),
+    )
+    return tuple(section for section in sections if section.blocks)
+
+
+def _explained_by(found: Diagnosed) -> tuple[Text, Text]:
+    """What the recording is compared with, in short."""
+    if found.simulated is None:
+        return say("Effects that the job names"), commas(titles(found.job.facts.model.effects)) or say("none")
+    return say("Compared with the simulation"), commas(names(found.simulated.files))
+
+
+def _simulation(found: Diagnosed) -> tuple[Section, ...]:
+    if found.simulated is None:
+        return ()
+    d = found.diagnosis
+    return (simulation_section(found.simulated, corrections(found.simulated, d.after, d.posterior)),)
+
+
+def _left_out(found: Diagnosed) -> tuple[Block, ...]:
+    d = found.diagnosis
+    if d.verdict == "consistent":
+        return ()
+    blocks: list[Block] = [Paragraph(verdict_of(found))]
+    blocks += [_effect(found, item) for item in d.effects]
+    blocks += [Paragraph(text) for text in withheld_sentences(d.withheld)]
+    blocks += [Paragraph(ambiguous(titles(group, d.after.effects)), tone="warning") for group in d.indistinguishable]
+    return tuple(blocks)
+
+
+def _effect(found: Diagnosed, item: LeftOut) -> Facts:
+    """One effect: what it is, how large, what to look at, how sure."""
+    d = found.diagnosis
+    size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
+    told = (say("{size:capital}.", size=size), other_periods(item), contained(found.simulated, item.effect))
+    return Facts((
+        (say("Effect"), item.title),
+        (say("Size"), sentences(filter(None, told))),
+        (say("Look at"), say("{what:capital}.", what=item.points_to)),
+        (say("How sure"), say("{sure:capital}.", sure=sure(item))),
+        (say("Gain"), say("{gain:capital}.", gain=held_out(d.improvement))),
+    ))  # fmt: skip
+
+
+def _consistent(found: Diagnosed) -> tuple[Block, ...]:
+    """The residuals of a recording that agrees with its model: within their uncertainty, and no other picture."""
+    d = found.diagnosis
+    if d.verdict != "consistent":
+        return ()
+    left, expanded, odd = _residuals(d.before), _expanded(d), _odd(found)
+    plot = residual_plot(
+        d.before.artefact.measurement.astype(np.float64), left,
+        expanded_um=expanded, reference=say("no residual"), flagged=odd, position_label=d.before.artefact.set_up,
+        label=_label_before(found),
+        caption=say(
+            "Residual of each observation, with U (k = {k}) from the noise.",
+            k=number(factor_of_noise(d.noise.coordinate), ".2f"),
+        ),
+        alternative=say("Residuals of {rms} µm rms.", rms=alike(d.improvement.rms_before_um)[0]),
+    )  # fmt: skip
+    return Paragraph(verdict_of(found)), plot
+
+
+def _before_after(found: Diagnosed) -> tuple[Block, ...]:
+    """Where something was found: each observation before and after, and what is gained."""
+    d = found.diagnosis
+    if not d.effects:
+        return ()
+    expanded, gain = _expanded(d), d.improvement
+    left = alike(gain.rms_before_um, gain.rms_after_um)
+    plot = length_plot(
+        d.before.artefact.measurement.astype(np.float64),
+        _residuals(d.before),
+        _residuals(d.after),
+        expanded_before_um=expanded,
+        expanded_after_um=expanded,
+        reference=say("no residual"),
+        flagged=_odd(found),
+        position_label=d.before.artefact.set_up,
+        before_label=_label_before(found),
+        after_label=say("With what was left out"),
+        caption=say(
+            "Residual of each observation before and after, with U (k = {k}) from the noise.",
+            k=number(factor_of_noise(d.noise.coordinate), ".2f"),
+        ),
+        alternative=say(
+            "Residual rms {before} µm before and {after} µm after.",
+            before=left[0],
+            after=left[1],
+        ),
+    )
+    table = improvement_table(
+        gain, say("Residual rms"), say("Rms on held-out {unseen}", unseen=gain.unseen),
+        say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),
+    )  # fmt: skip
+    changes = _changes(found)
+    return (plot, table, changes) if changes else (plot, table)
+
+
+def _residuals(model: MeasurementModel) -> Floats:
+    """(m,) µm."""
+    return model.residuals(model.estimate().least_squares.value) / MICROMETRE
+
+
+def _expanded(d: Diagnosis) -> Floats:
+    """(m,) expanded uncertainty of each observation, µm."""
+    return factor_of_noise(d.noise.coordinate) * d.noise.coordinate.value * d.before.artefact.noise_scale
+
+
+def _odd(found: Diagnosed) -> NDArray[np.bool_]:
+    """(m,) whether the screening found the measurement odd."""
+    return np.isin(found.diagnosis.before.artefact.measurement, [m for f in found.findings for m in f.measurements])
+
+
+def _label_before(found: Diagnosed) -> Text:
+    return say("Residuals of the job's model") if found.simulated is None else say("Recorded minus predicted")
+
+
+def _changes(found: Diagnosed) -> Table | None:
+    """Estimates of the effects that the job names, before and after: how biased they were."""
+    d = found.diagnosis
+    if not d.effects:
+        return None
+    before, after = (model.estimate().least_squares for model in (d.before, d.after))
+    late = {u.key: value for u, value in zip(after.unknowns, after.value, strict=True)}
+    rows = tuple(
+        (
+            _title_of(u.key, d.before),
+            figure(value, 10 if u.key[0] == ARTEFACT else 4),
+            figure(late[u.key], 10 if u.key[0] == ARTEFACT else 4),
+            u.unit,
+        )
+        for u, value, known in zip(before.unknowns, before.value, before.determined, strict=True)
+        if known and not u.known
+    )
+    heads = (
+        Column(say("Parameter"), numeric=False),
+        Column(say("Before")),
+        Column(say("After")),
+        Column(say("Unit"), numeric=False),
+    )
+    return Table(say("What it changes in the estimates (least squares)"), heads, rows) if rows else None
+
+
+def _title_of(key: tuple[str, str], model: MeasurementModel) -> Text:
+    """A parameter of an effect, or a size of the artefact, in words."""
+    owner, name = key
+    if owner == ARTEFACT:
+        return next(size.title for size in model.artefact.sizes if size.name == name)
+    return parameter_title(owner, name, model.effects)
+
+
+def _consequences(found: Diagnosed) -> tuple[Block, ...]:
+    """Figures and decisions of the recording, and of the same recording corrected for what was left out."""
+    if found.consequences is None:
+        return ()
+    blocks: list[Block] = []
+    rows = []
+    for name, (before, after) in found.consequences.figures.items():
+        rows.append((TITLES[name], with_uncertainty(before), with_uncertainty(after), UNITS[name]))
+    heads = (
+        Column(say("Figure"), numeric=False),
+        Column(say("As recorded")),
+        Column(say("Corrected")),
+        Column(say("Unit"), numeric=False),
+    )
+    if rows:
+        note = say(
+            "± is the expanded uncertainty for 95 %, for repetitions of the recording with the correction as it stands."
+        )
+        known = say(
+            "What was found repeats as it is and is no noise here, neither as recorded nor corrected. A certificate is of the "
+            "job's own model: what that leaves out counts as noise in its uncertainties of the same figures."
+        )
+        blocks.append(Table(say("Figures of performance"), heads, tuple(rows), (note, known)))
+    decisions = tuple(
+        (
+            say("{standard}, {quantity}", standard=Verbatim(before.facts.standard), quantity=before.quantity),
+            OUTCOME_WORDS[before.outcome],
+            OUTCOME_WORDS[after.outcome],
+        )
+        for before, after in found.consequences.statements
+    )
+    if decisions:
+        columns = tuple(
+            Column(title, numeric=False) for title in (say("Statement"), say("As recorded"), say("Corrected"))
+        )
+        blocks.append(Table(say("Statements of conformity"), columns, decisions))
+    return tuple(blocks)
+
+
+def _rivals(found: Diagnosed) -> Table:
+    rows = tuple((title_of(name), probability(p)) for name, p in found.diagnosis.rivals)
+    heads = (Column(say("Explanation"), numeric=False), Column(say("Probability")))
+    notes: list[Text] = [say("Nothing missing has the rest.")]
+    some, every = found.diagnosis.compared, int(found.diagnosis.before.used.sum())
+    if some < every:
+        notes.append(say(
+            "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then "
+            "estimated from all. An error much smaller than the noise, which only all together would show, can go unnoticed.",
+            some=some, every=every,
+        ))  # fmt: skip
+    return Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
+
+
+def diagnosed_outcome(found: Diagnosed) -> Outcome:
+    """What there is to write of a diagnosis."""
+    short = summary_of(found.job.facts, found.diagnosis.verdict, lines(found), found.findings)
+    with lettered_in(found.job.facts.job.language):
+        document = diagnosis_document(found)
+    consistent = found.diagnosis.verdict == "consistent"
+    return Outcome(found, lambda: document, diagnosis_results(found), short, document.warnings, in_order=consistent)

@@ -1,0 +1,241 @@
+"""Administrative data of a digital certificate: from the job; what it does not state says so.
+
+A recording that nobody measured, a draft and an interim check are no certificates: their identifier begins with that, in
+capitals, their laboratory is named as nobody, and no word of conformity is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.units import UNITS
+from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
+from cmm_uq.certificate.digital_certificate.words import NOT_STATED, SayIn, one_line, rich_of, words_of
+from cmm_uq.certificate.origin import BANNERS
+from cmm_uq.certificate.reissue import Comparison
+from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.jobs.dcc.administrative import (
+    Contact,
+    CoreData,
+    Identification,
+    Item,
+    Items,
+    Laboratory,
+    Location,
+    PerformanceLocation,
+    Person,
+    PrimitiveQuantity,
+    RefTypeDefinition,
+    Replaced,
+    Somebody,
+)
+from cmm_uq.jobs.dcc.quantities import RealList
+from cmm_uq.jobs.dcc.results import Statement
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import MEASURED
+
+UNKNOWN_COUNTRY = "ZZ"
+"""Of no country: ISO 3166-1 leaves this code to users, and CLDR takes it for an unknown one."""
+
+_INTERIM = say("INTERIM CHECK, not a calibration certificate")
+_NOBODY = say("nobody: nothing is certified")
+
+
+@dataclass(frozen=True)
+class Mark:
+    """Why this is no certificate.
+
+    Parameters
+    ----------
+    word : that its identifier begins with.
+    banner : what is said of it.
+    """
+
+    word: str
+    banner: Text
+
+
+def mark_of(job: Job) -> Mark | None:
+    """Why what is made of a job is no certificate; None where it is one."""
+    if job.origin != MEASURED:
+        return Mark(f"{job.origin.upper()}-NOT-A-CERTIFICATE", BANNERS[job.origin])
+    if not certifies(job):
+        return Mark("INTERIM-NOT-A-CERTIFICATE", _INTERIM)
+    return Mark("DRAFT", DRAFT) if draft(job) else None
+
+
+def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
+    """Identifier, languages and dates."""
+    facts = job.facts.job
+    number, mark = one_line(facts.number or facts.id), mark_of(job)
+    known = [
+        ("calibrationLaboratory", facts.id, say("Job"), "cmm_job"),
+        ("customer", facts.order, say("Order"), "basic_orderNumber"),
+    ]
+    return CoreData(
+        country=job.facts.laboratory.country or UNKNOWN_COUNTRY,
+        languages=tuple(languages),
+        mandatory_languages=tuple(languages)[:1],
+        identifier=number if mark is None else f"{mark.word}-{number}",
+        identifications=tuple(
+            Identification(issuer=issuer, value=one_line(value), name=words_of(name, say_in), ref_type=(ref_type,))
+            for issuer, value, name, ref_type in known if value
+        ),
+        received=facts.received,
+        begin=facts.date,
+        end=facts.date,
+        location=PerformanceLocation(place="other"),
+        issued=facts.issued if certifies(job) else None,
+        replaced=None if facts.replaces is None
+        else Replaced(change="substituted", identifier=one_line(facts.replaces.number)),
+    )  # fmt: skip
+
+
+def items(job: Job, say_in: SayIn) -> Items:
+    """The machine."""
+    machine = job.facts.machine
+    serial = Identification(
+        issuer="manufacturer",
+        value=one_line(machine.serial) or str.__str__(NOT_STATED),
+        name=words_of(say("Serial number"), say_in),
+        ref_type=("basic_serialNumber",),
+    )
+    item = Item(
+        id="machine",
+        name=words_of(Verbatim(machine.name), say_in),
+        description=None if (mark := mark_of(job)) is None else rich_of((mark.banner,), say_in),
+        manufacturer=Somebody(name=words_of(Verbatim(machine.manufacturer), say_in)) if machine.manufacturer else None,
+        model=one_line(machine.model) or None,
+        identifications=(serial,),
+        quantities=tuple(_travel(job, say_in)),
+    )
+    owner = _contact(machine.owner, "", say_in) if machine.owner else None
+    return Items(owner=owner, items=(item,))
+
+
+def _travel(job: Job, say_in: SayIn) -> list[PrimitiveQuantity]:
+    """Lowest and highest scale reading of each axis."""
+    found = []
+    for axis in "xyz":
+        travel = getattr(job.facts.machine.travel_mm, axis)
+        if travel:
+            name = words_of(say("Measuring range of {axis}", axis=Verbatim(axis.upper())), say_in)
+            ends = RealList(
+                labels=("lowest", "highest"),
+                values=tuple(Decimal(repr(float(end))) for end in travel),
+                units=(UNITS["mm"].dsi,),
+            )
+            found.append(
+                PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=("cmm_measuringRange",))
+            )
+    return found
+
+
+def laboratory(job: Job, say_in: SayIn) -> Laboratory:
+    """Who answers for the certificate; nobody where nothing is certified."""
+    facts = job.facts.laboratory
+    if not certifies(job):
+        return Laboratory(contact=Contact(name=words_of(_NOBODY, say_in), location=_location("", say_in)))
+    code = one_line(facts.accreditation) or None
+    return Laboratory(code=code, contact=_contact(facts.name, facts.address, say_in))
+
+
+def persons(job: Job, say_in: SayIn) -> tuple[Person, ...]:
+    """Who authorises the certificate, and who measured."""
+    facts, found = job.facts.laboratory, []
+    if not certifies(job):
+        return (Person(person=Somebody(name=words_of(_NOBODY, say_in))),)
+    if facts.signatory:
+        found.append(
+            Person(person=Somebody(name=words_of(Verbatim(facts.signatory), say_in)),
+                   role=one_line(facts.signatory_role) or None, main_signer=True)
+        )  # fmt: skip
+    if job.facts.job.operator:
+        who = Somebody(name=words_of(Verbatim(job.facts.job.operator), say_in))
+        found.append(Person(person=who, role="operator", main_signer=False))
+    return tuple(found) or (Person(person=Somebody(name=words_of(NOT_STATED, say_in))),)
+
+
+def customer(job: Job, say_in: SayIn) -> Contact:
+    """For whom it was measured."""
+    return _contact(job.facts.job.customer, job.facts.job.address, say_in)
+
+
+def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]:
+    """What it is not, what the results relate to, how they are traceable, what it replaces, when the next is agreed."""
+    facts, mark, found = job.facts.job, mark_of(job), []
+    if mark is not None:
+        found.append(
+            Statement(name=words_of(mark.banner, say_in), declaration=rich_of((mark.banner,), say_in), valid=False,
+                      ref_type=("cmm_notACertificate",))
+        )  # fmt: skip
+    if certifies(job):
+        chain = claimed(job)
+        found += [Statement(declaration=rich_of((text,), say_in), ref_type=("cmm_general",)) for text in STATEMENTS]
+        found.append(
+            Statement(
+                name=words_of(say("Traceability"), say_in), traceable=chain.claim == "traceable",
+                declaration=rich_of((chain.statement,), say_in),
+                ref_type=("basic_metrologicallyTraceableToSI",),
+            )
+        )  # fmt: skip
+    if facts.replaces is not None:
+        told: list[Text] = [
+            replaced_certificate(facts.replaces),
+            Verbatim(facts.replaces.reason),
+            Verbatim(facts.replaces.changed),
+        ]
+        if (comparison := Comparison.of_results(results)) is not None:
+            told += [comparison.sentence, *(one.sentence for one in comparison.differences)]
+        found.append(
+            Statement(
+                name=words_of(say("Replaces certificate"), say_in),
+                declaration=rich_of(told, say_in),
+                ref_type=("basic_revision",),
+            )
+        )
+    if facts.recalibration_agreed:
+        name = words_of(say("Next calibration, as agreed with the customer"), say_in)
+        found.append(Statement(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
+    further = [
+        (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
+        (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),
+        (say("Remarks"), facts.remarks),
+    ]  # fmt: skip
+    for what, text in further:
+        if text:
+            paragraphs = (Verbatim(text), *((NOT_OURS,) if text is facts.from_customer else ()))
+            found.append(Statement(name=words_of(what, say_in), declaration=rich_of(paragraphs, say_in)))
+    return tuple(found)
+
+
+def ref_types(say_in: SayIn) -> tuple[RefTypeDefinition, ...]:
+    """Whose names the refTypes are."""
+    return (
+        RefTypeDefinition(
+            name=words_of(say("Good practice of the DCC: names that all fields of calibration share"), say_in),
+            namespace="basic", link="https://digilab.ptb.de/dkd/refType/vocab/index.php",
+        ),
+        RefTypeDefinition(
+            name=words_of(say("Names of this program for coordinate measuring machines"), say_in),
+            description=rich_of(
+                (say("What stands under a key of results.json has its path as id and its first key as refType."),), say_in
+            ),
+            namespace="cmm", link="docs/dcc.md",
+        ),
+    )  # fmt: skip
+
+
+def _contact(name: str, address: str, say_in: SayIn) -> Contact:
+    named = Verbatim(name) if name else NOT_STATED
+    return Contact(name=words_of(named, say_in), location=_location(address, say_in))
+
+
+def _location(address: str, say_in: SayIn) -> Location:
+    """As it is written: a job does not part street and city."""
+    lines = [Verbatim(line.strip()) for line in address.splitlines() if line.strip()]
+    return Location(further=(rich_of(lines or (NOT_STATED,), say_in),))

@@ -1,0 +1,283 @@
+"""A document as data: what a certificate says, before anyone decides what it looks like.
+
+HTML and PDF are two views of one :class:`Document`; every figure stands in it once, already as text, so that the views
+cannot differ. A section is a list of blocks, and a block is one of the small classes below: whoever adds an artefact, a
+budget or a diagnosis composes blocks and touches neither view. Text is plain Unicode without markup; a line feed is a new
+line; both views escape the rest.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from collections import Counter
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from typing import Any, ClassVar, Literal
+
+from cmm_uq.base.languages.language import ENGLISH, code_of
+from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.certificate.view_words import label
+from cmm_uq.jobs.logo import Logo
+
+Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Running text; a note is set smaller, a warning stands out."""
+
+    text: Text
+    tone: Literal["plain", "note", "warning"] = "plain"
+    kind: ClassVar[str] = "paragraph"
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Label and value pairs, such as the customer's address or the conditions. Values may have several lines."""
+
+    rows: tuple[tuple[Text, Text], ...]
+    kind: ClassVar[str] = "facts"
+
+
+@dataclass(frozen=True)
+class Column:
+    """Heading of a table column; numeric columns are aligned to the right with tabular figures."""
+
+    heading: Text
+    unit: Text = NOTHING
+    numeric: bool = True
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text under headings; every row has as many cells as there are columns."""
+
+    caption: Text
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Text, ...], ...]
+    notes: tuple[Text, ...] = ()
+    kind: ClassVar[str] = "table"
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"table {self.caption!r}: {len(row)} cells under {len(self.columns)} headings: {row}")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A picture as SVG, with the sentence that replaces it for whoever cannot see it, and the texts lettered in it."""
+
+    caption: Text
+    alternative: Text
+    svg: str
+    lettering: tuple[Text, ...] = ()
+    kind: ClassVar[str] = "plot"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A statement of conformity: what was compared with what, by which rule, what follows, and what of the test is missing."""
+
+    standard: Text
+    quantity: Text
+    measured: Text
+    limit: Text
+    rule: Text
+    outcome: Outcome
+    explanation: Text
+    missing: tuple[Text, ...] = ()
+    kind: ClassVar[str] = "decision"
+
+
+Standing = Literal["good", "open", "bad", "unknown"]
+"""Whether nothing is left to do, something is, the machine is not what it should be, or nothing can be said of it."""
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What a reader with ten seconds must know: a verdict, in colour, by a sign and in words, and labelled lines on it."""
+
+    verdict: Text
+    standing: Standing
+    rows: tuple[tuple[Text, Text], ...]
+    kind: ClassVar[str] = "overview"
+
+
+Block = Paragraph | Facts | Table | Plot | Decision | Overview
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part of the document.
+
+    ``opinion`` marks what interprets the results and belongs in the annex, ``first`` what stands on the first page of a
+    document that decides there.
+    """
+
+    title: Text
+    blocks: tuple[Block, ...]
+    opinion: bool = False
+    first: bool = False
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A line to sign on: who authorises the document."""
+
+    name: Text
+    role: Text = NOTHING
+
+
+@dataclass(frozen=True)
+class Document:
+    """A certificate or report.
+
+    Parameters
+    ----------
+    title : what it is, such as "Calibration certificate".
+    number : unique identification, shown on every page.
+    subject : one line under the title: the machine and the date.
+    issuer : the laboratory that answers for it; lines of name and address. Empty when the job does not say.
+    particulars : facts that identify customer, item, dates, method; the first thing after the title.
+    warnings : what the reader must know before using a figure; shown on the first page.
+    sections : the results; those of opinion last, which make up the annex.
+    statements : sentences on scope, reproduction and the like, before the signatures.
+    signatures : who authorises.
+    attachments : names of the files that travel with the document.
+    produced_by : program and version, seed and whatever else is needed to run it again.
+    date : date of issue, which is also the PDF's date; the clock is never read.
+    language : of the text, as BCP 47 tag, for screen readers and hyphenation.
+    end : the mark after the last line.
+    banner : what every page must say at its head, such as that nothing was measured.
+    overview : what comes before everything else.
+    draft : whether the banner says only that something is still to be stated.
+    logo : of the issuer.
+    decides : whether all that is decided, stated and signed stands on the first page, and the figures behind it.
+    """
+
+    title: Text
+    number: Text
+    subject: Text
+    issuer: tuple[Text, ...]
+    particulars: tuple[Facts, ...]
+    warnings: tuple[Text, ...]
+    sections: tuple[Section, ...]
+    statements: tuple[Text, ...]
+    signatures: tuple[Signature, ...]
+    attachments: tuple[Text, ...]
+    produced_by: Text
+    date: dt.date | None = None
+    language: str = "en"
+    end: Text = say("End of certificate")
+    banner: Text = NOTHING
+    overview: Overview | None = None
+    draft: bool = False
+    logo: Logo | None = None
+    decides: bool = False
+
+    def as_data(self) -> dict[str, Any]:
+        """The document as plain dicts and lists of printable text, ready for JSON.
+
+        Every block carries its ``kind``; tables and plots also their ``label``, counted through the document
+        ("Table 2", "Figure 1"), so that the views number them alike; tables also what their layout goes by.
+        """
+        data: dict[str, Any] = _printable(asdict(replace(self, logo=None)))
+        data["logo"] = self.logo and {"uri": self.logo.uri, "alternative": data["issuer"][0] if self.issuer else "–"}
+        data["date"] = self.date.isoformat() if self.date else None
+        counted: Counter[str] = Counter()
+        language = code_of(self.language)
+        for section, plain in zip(self.sections, data["sections"], strict=True):
+            for block, plain_block in zip(section.blocks, plain["blocks"], strict=True):
+                plain_block["kind"] = block.kind
+                plain_block.pop("lettering", None)
+                if block.kind in _NUMBERED:
+                    counted[block.kind] += 1
+                    plain_block["label"] = str.__str__(said_in(label(block.kind, counted[block.kind]), language))
+                if block.kind == "table":
+                    _measure(plain_block, english=language == ENGLISH)
+        return data
+
+
+_NUMBERED = ("table", "plot")
+
+
+def _measure(table: dict[str, Any], *, english: bool) -> None:
+    """What the views must know to lay a table out.
+
+    Every column is given its longest line in characters (``need``), and the texts that are likely to be its widest: a line
+    (``longest``), a word of its cells (``word``) and one of its heading (``heading_word``). What is longer than any figure is
+    set as text; figures stay figures below the longer headings of languages other than English. The table is given the
+    characters of its narrowest line (``least``): figures whole, texts broken at words.
+    """
+    for index, column in enumerate(table["columns"]):
+        cells = [line for row in table["rows"] for line in row[index].split("\n")]
+        head = [column["heading"], column["unit"]]
+        column["need"] = max(4, *map(letters, head), *map(letters, cells), 0)
+        longest = column["need"] if english else max(map(letters, cells), default=0)
+        column["numeric"] = column["numeric"] and longest <= _LONGEST_FIGURE
+        column["longest"] = max(cells, key=_width, default="")
+        column["word"] = max((part for line in cells for part in _parts(line, " ")), key=_width, default="")
+        column["heading_word"] = max((part for line in head for part in _parts(line, None)), key=_width, default="")
+    kept = [
+        max(letters(c["longest"] if c["numeric"] else c["word"]), letters(c["heading_word"])) for c in table["columns"]
+    ]
+    table["least"] = sum(kept) + 2 * len(kept)
+
+
+def letters(line: str) -> int:
+    """Of a line, in letters; a Chinese or Japanese character has the room of two."""
+    return len(line) + _wide(line)
+
+
+def _parts(line: str, separator: str | None) -> list[str]:
+    """What a line is not broken within: words; Japanese, which is written without spaces, a few characters at a time."""
+    words = line.split(separator)
+    return [part for word in words for part in (_patterns()[1].findall(word) if _wide(word) else [word])]
+
+
+def _width(line: str) -> float:
+    """Of a line, roughly, in widths of a small letter."""
+    return _wide(line) + sum(
+        1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
+    )
+
+
+def _wide(line: str) -> int:
+    """How many characters of a line are Chinese, Japanese or Korean."""
+    return len(_patterns()[0].findall(line)) if max(line, default="") >= _CHARACTERS[0] else 0
+
+
+@cache
+def _patterns() -> tuple[re.Pattern[str], re.Pattern[str]]:
+    """One such character, and a few or what is between: compiled where there is any, as long as a command's tables take."""
+    return re.compile(f"[{_CHARACTERS}]"), re.compile(f"[{_CHARACTERS}]{{1,6}}|[^{_CHARACTERS}]+")
+
+
+_LONGEST_FIGURE = 28
+_CHARACTERS = "\u2e80-\ua4cf\uac00-\ud7a3\uf900-\ufaff\uff00-\uff60"
+"""Of Chinese, Japanese and Korean."""
+
+_LEFT_OUT = re.compile("[\u202a-\u202e\u2066-\u2069\ufeff]")
+_UNPRINTABLE = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ue000-\uf8ff\ufdd0-\ufdef\ufffe\uffff\U000f0000-\U0010ffff]"
+)
+
+
+def _printable(value: Any) -> Any:
+    """The same data with every text made safe to show.
+
+    What no view may carry (control characters, lone surrogates, private and non-characters, which PDF/A forbids) becomes
+    the replacement character; byte order marks, and marks that reorder the text around them (they could turn a figure
+    round), are left out.
+    """
+    if isinstance(value, dict):
+        return {key: _printable(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_printable(item) for item in value]
+    if isinstance(value, str):
+        plain = value.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
+        return _UNPRINTABLE.sub("\ufffd", _LEFT_OUT.sub("", plain))
+    return value

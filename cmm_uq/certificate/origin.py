@@ -1,0 +1,104 @@
+"""What a document says of a recording that nobody measured: on every page, in its title, in its file's name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import PurePosixPath
+
+from cmm_uq.base.messages import Text, Verbatim, after, commas, names, say
+from cmm_uq.certificate.document import Document
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED, Origin
+
+BANNERS = {
+    SIMULATED: say("SIMULATED RECORDING, not a calibration certificate"),
+    COMPENSATED: say("COMPENSATED RECORDING, not a calibration certificate"),
+}
+TITLES = {
+    SIMULATED: say("Evaluation of a simulated recording"),
+    COMPENSATED: say("Evaluation of a compensated recording"),
+}
+_WHAT = {
+    SIMULATED: say("The recording was simulated: no machine was measured, and nothing here certifies one."),
+    COMPENSATED: say(
+        "The coordinates were corrected by computation: nothing here certifies what the machine indicates."
+    ),
+}
+
+
+def file_name(name: str, origin: str) -> str:
+    """Name of a document, with the origin of a recording that was not measured: ``certificate-simulated.pdf``."""
+    path = PurePosixPath(name)
+    return name if origin == MEASURED else f"{path.stem}-{origin}{path.suffix}"
+
+
+def marked(document: Document, job: Job) -> Document:
+    """The document with its origin on every page; as it is where the recording was measured.
+
+    Nobody signs for such a recording, it has no certificate's number, and its first warning says what it is.
+    """
+    return marked_as(document, job.origin, job.facts.job.id, origin_warnings(job))
+
+
+def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text]) -> Document:  # noqa: A002
+    """The same of any document.
+
+    Parameters
+    ----------
+    origin : of what was measured.
+    id : of the job.
+    told : warnings of where it comes from.
+    """
+    warnings = (*told, *document.warnings)
+    if origin == MEASURED:
+        return replace(document, warnings=warnings)
+    is_certificate = document.title == CERTIFICATE
+    return replace(
+        document,
+        title=TITLES[origin] if is_certificate else _of_such(document.title, origin),
+        number=Verbatim(id),
+        banner=BANNERS[origin],
+        draft=False,
+        warnings=warnings,
+        statements=(),
+        signatures=(),
+        end=say("End of evaluation") if is_certificate else document.end,
+    )
+
+
+DIGITAL = "certificate.xml"
+"""The digital certificate."""
+
+CERTIFICATE = say("Calibration certificate")
+"""Title of a document that certifies."""
+
+
+def _of_such(title: Text, origin: str) -> Text:
+    if origin == SIMULATED:
+        return say("{title} of a simulated recording", title=title)
+    return say("{title} of a compensated recording", title=title)
+
+
+def came_about(job: Job) -> Text:
+    """The word before the date of a recording."""
+    return say("simulated, dated") if job.origin == SIMULATED else say("measured on")
+
+
+def origin_warnings(job: Job) -> list[Text]:
+    """What the reader must know of where the recording comes from."""
+    taken = [] if job.acquired is None else job.acquired.warnings
+    if job.origin == MEASURED:
+        return taken
+    source = job.facts.job.derived_from
+    what = _WHAT[job.origin]
+    texts: list[Text] = [what]
+    if source:
+        told = say(
+            "It was derived from job {job} by {program} ({by}).",
+            job=Verbatim(source.job), program=Verbatim(source.program), by=Verbatim(source.by),
+        )  # fmt: skip
+        texts = [after(what, told)]
+    if job.altered:
+        texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
+    return [*texts, *taken]

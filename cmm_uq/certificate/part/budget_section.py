@@ -1,0 +1,259 @@
+"""What the uncertainty of a part's characteristics is made of, what the calibration did not see, and what would reduce it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.in_words import FAMILIES, family_of, line_in_words
+from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, after, commas, number, plural, say, signed
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.effect_words import title_of
+from cmm_uq.certificate.part.budget_plot import shares_plots
+from cmm_uq.certificate.part.figures import Figures, by_margin, critical, figures_of
+from cmm_uq.certificate.part.found import PartFound, Unseen
+
+DETAILED = 10
+"""Characteristics whose budgets are listed line by line: those of least margin."""
+
+_LINES, _LEAST, _FACTOR = 6, 0.01, 0.05
+"""Lines of a budget that are listed at most, the share from which on, and that from which on a factor of one is."""
+
+_WAYS = 6
+"""Characteristics for which every way is shown."""
+
+_GAIN = 0.02
+"""Of u, below which a way is no gain."""
+
+
+def line_words(line: str) -> Text:
+    """A line of the budget in words, errors of the machine by their titles."""
+    _, _, factor = line.partition(": ")
+    return line_in_words(line, {factor: title_of(factor)} if factor else {})
+
+
+def budget_section(found: PartFound) -> Section:
+    """Shares of the variance: a picture of all characteristics, and lines of those of least margin."""
+    budget, every = found.budget, figures_of(found)
+    if not budget.causes:
+        return Section(say("What the uncertainty is made of"), ())
+    families, shares = by_family(found)
+    causes = [FAMILIES.get(family, Verbatim(family)) for family in families]
+    blocks: list[Block] = [Paragraph(say("{sentence}", sentence=largest_words(critical(found))))]
+    blocks += shares_plots([one.titled for one in every], causes, shares)
+    detailed = sorted(by_margin(found)[:DETAILED], key=lambda one: one.place)
+    blocks.append(_lines(detailed, len(every)))
+    within = _factors(detailed)
+    if within.rows:
+        blocks.append(within)
+    return Section(say("What the uncertainty is made of"), tuple(blocks))
+
+
+def by_family(found: PartFound) -> tuple[list[str], Floats]:
+    """Names of the causes, largest over all first, and their total shares (g, c) over the sum of these."""
+    budget = found.budget
+    names = list(dict.fromkeys(family_of(line) for line in budget.causes))
+    of = np.array([names.index(family_of(line)) for line in budget.causes])
+    total = budget.total.clip(0)
+    sums = np.array([total[of == g].sum(axis=0) for g in range(len(names))])
+    whole = sums.sum(axis=0)
+    shares = sums / np.where(whole > 0, whole, 1.0)
+    order = sorted(range(len(names)), key=lambda g: -float(shares[g].sum()))
+    return [names[g] for g in order], shares[order]
+
+
+def largest_words(one: Figures) -> Text:
+    """The largest line of a budget, in a sentence."""
+    budget = one.found.budget
+    line = budget.worst(one.stated.name)
+    return say("The largest part of the uncertainty of {name} comes from {cause:small} ({share} % of the variance).",
+               name=one.called, cause=line_words(line), share=_percent(share_of(one, line)))  # fmt: skip
+
+
+def share_of(one: Figures, line: str) -> float:
+    """Share of a line, or of a factor of the machine, in the variance of a characteristic."""
+    return one.found.budget.share(line, one.place)
+
+
+def _percent(share: float) -> Number:
+    share = min(share, 1.0)  # as far as draws know it
+    return signed(100 * share, ".0f") if abs(share) >= 0.1 else signed(100 * share, ".2g")
+
+
+def _lines(detailed: list[Figures], count: int) -> Table:
+    rows = [row for one in detailed for row in _budget(one)]
+    columns = (
+        Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Cause"), numeric=False),
+        Column(say("First order"), unit("%")), Column(say("Total"), unit("%")),
+    )  # fmt: skip
+    notes: list[Text] = [
+        say(
+            "Shares of the variance (Sobol): first order is what knowing this cause alone would take away, total what would "
+            "remain if all else were known. They differ where causes do not simply add up, as in a position or a form; they "
+            "are known to about 1 %."
+        )
+    ]
+    if len(detailed) < count:
+        notes.append(after(_chosen(detailed), say("results.json has all.")))
+    return Table(say("Budget by cause"), columns, tuple(rows), tuple(notes))
+
+
+def _chosen(shown: list[Figures]) -> Text:
+    """Which characteristics are shown of more."""
+    if shown[0].found.nearest is None:
+        return say("Shown are the first {count} characteristics.", count=len(shown))
+    return say("Shown are the {count} characteristics with the least margin.", count=len(shown))
+
+
+def _budget(one: Figures) -> Iterable[tuple[Text, ...]]:
+    budget = one.found.budget
+    first, total = budget.first[:, one.place], budget.total[:, one.place]
+    order = np.argsort(-total, kind="stable").tolist()
+    kept = [g for g in order if total[g] >= _LEAST][:_LINES]
+    for g in kept:
+        name = one.beside if g == order[0] else NOTHING
+        yield one.number, name, line_words(budget.causes[g]), _percent(max(first[g], 0.0)), _percent(total[g])
+    rest = [g for g in order if g not in kept and total[g] > 0]
+    if rest:
+        others = plural(len(rest), one=say("another cause"), many=say("{count} other causes", count=len(rest)))
+        yield (
+            one.number,
+            NOTHING if kept else one.beside,
+            others,
+            DASH,
+            say("each below {share}", share=_percent(_above(total[rest]))),
+        )
+
+
+def _above(shares: Floats) -> float:
+    """A share of one digit that all are below."""
+    top = max(float(shares.max()), 1e-4)
+    place = 10.0 ** np.floor(np.log10(top))
+    return float((np.floor(top / place) + 1) * place)
+
+
+def _factors(detailed: list[Figures]) -> Table:
+    """Within the machine, what hangs together by its calibration."""
+    budget = detailed[0].found.budget
+    rows: list[tuple[Text, ...]] = []
+    for one in detailed:
+        within = budget.within[:, one.place]
+        order = np.argsort(-np.abs(within), kind="stable").tolist()
+        kept = [f for f in order[:_LINES] if abs(within[f]) >= _FACTOR]
+        rows += [
+            (one.number, NOTHING if i else one.beside, line_words(budget.factors[f]), _percent(within[f]))
+            for i, f in enumerate(kept)
+        ]
+    columns = (
+        Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Error"), numeric=False),
+        Column(say("Share"), unit("%")),
+    )  # fmt: skip
+    note = say(
+        "The calibration ties these errors together. Each share is what knowing this error alone would take away, with what "
+        "it tells of the others, so that together they may be more than 100 % or less."
+    )
+    return Table(say("Errors that are known together, by name"), columns, tuple(rows), (note,))
+
+
+def unseen_section(found: PartFound) -> Section:
+    """What the calibration left free or did not see, named, with its share and what to measure."""
+    if not found.unseen:
+        return Section(say("What the calibration did not see"), ())
+    told = _by_effect(found.unseen)
+    blocks: list[Block] = [Paragraph(unseen_words(found), "warning")]
+    columns = (
+        Column(say("Error"), numeric=False), Column(say("Largest share"), unit("%")), Column(say("Of"), numeric=False),
+        Column(say("Why"), numeric=False),
+    )  # fmt: skip
+    rows = tuple(
+        (own[0].title, _percent(max(one.share for one in own)), _whose(own), say("{why:capital}", why=own[0].why))
+        for own in told
+    )
+    blocks.append(Table(say("Errors that are drawn as large as they may be"), columns, rows))
+    if found.further is not None:
+        blocks.append(Paragraph(found.further.text))
+        if found.further.command:
+            blocks.append(
+                Paragraph(say("The set-ups are planned by: {command}", command=Verbatim(found.further.command)))
+            )
+    return Section(say("What the calibration did not see"), tuple(blocks))
+
+
+def _by_effect(unseen: Iterable[Unseen]) -> list[list[Unseen]]:
+    """What is told of one effect together, each largest share first."""
+    found: dict[str, list[Unseen]] = {}
+    for one in unseen:
+        found.setdefault(one.line, []).append(one)
+    each = [sorted(own, key=lambda one: -one.share) for own in found.values()]
+    return sorted(each, key=lambda own: -own[0].share)
+
+
+def _called(one: Unseen) -> Text:
+    return say("characteristic {name}", name=Verbatim(one.characteristic))
+
+
+def _whose(own: list[Unseen]) -> Text:
+    first = _called(own[0])
+    if len(own) == 1:
+        return first
+    return plural(len(own) - 1, one=say("{name}, and one more", name=first),
+                  many=say("{name}, and {count} more", name=first, count=len(own) - 1))  # fmt: skip
+
+
+def unseen_words(found: PartFound) -> Text:
+    """The gravest of it in a sentence."""
+    most = _by_effect(found.unseen)[0][0]
+    return say("{share} % of the variance of {name} comes from {error:small}: {why}.", share=_percent(most.share),
+               name=_called(most), error=most.title, why=most.why)  # fmt: skip
+
+
+def ways_section(found: PartFound) -> Section:
+    """What would make the uncertainties smaller, each way alone."""
+    if len(found.ways) < 2:
+        return Section(say("What would reduce it"), ())
+    shown = sorted(by_margin(found)[:_WAYS], key=lambda one: one.place)
+    columns = (
+        Column(say("Way"), numeric=False),
+        *(Column(say("u of No. {number}", number=one.number), one.scale.small) for one in shown),
+    )  # fmt: skip
+    rows = tuple((say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown))
+                 for way in found.ways)  # fmt: skip
+    known = number(100 * found.ways[-1].known(inferred=False), ".1g")
+    notes: list[Text] = [
+        say("Each way alone, by virtual measurements of its own; u is known to {known} %.", known=known)
+    ]
+    if found.measured is not None and np.any(never_negative(found.plan)[[one.place for one in shown]]):
+        zones = number(100 * found.ways[-1].known(inferred=True), ".1g")
+        notes.append(say("u of form, orientation, location and runout is known to {known} %.", known=zones))
+    if len(shown) < len(found.stated):
+        notes.append(_chosen(shown))
+    told = [Paragraph(words)] if (words := best_words(critical(found))) else []
+    return Section(
+        say("What would reduce it"), (*told, Table(say("Ways to measure"), columns, rows, tuple(notes)))
+    )  # fmt: skip
+
+
+def best_words(one: Figures) -> Text:
+    """The way that helps a characteristic most, in a sentence."""
+    planned, *others = one.found.ways
+    now = float(planned.u[one.place])
+    best = min(others, key=lambda way: float(way.u[one.place]), default=None)
+    if best is None or not now or 1 - best.u[one.place] / now < _GAIN:
+        return say(
+            "None of the ways that were tried makes the uncertainty of {name} smaller by more than 2 %.",
+            name=one.called,
+        )
+    told = say("{way:capital} would reduce the uncertainty of {name} most, by {gain} %.", way=best.name, name=one.called,
+               gain=number(100 * (1 - float(best.u[one.place]) / now), ".0f"))  # fmt: skip
+    helped = [other.name for other in figures_of(one.found)
+              if other.place != one.place and best.u[other.place] < (1 - _GAIN) * planned.u[other.place]]  # fmt: skip
+    return after(told, _too(helped) if 0 < len(helped) <= _WAYS else NOTHING)
+
+
+def _too(names: list[Text]) -> Text:
+    return plural(len(names), one=say("It helps characteristic {names} too.", names=commas(names)),
+                  many=say("It helps characteristics {names} too.", names=commas(names)))  # fmt: skip

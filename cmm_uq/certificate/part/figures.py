@@ -1,0 +1,239 @@
+"""The figures of a part's characteristics as a page states them: lengths in mm and µm, angles in degrees and seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.limits import Judged
+from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.in_words import CHARACTERISTICS
+from cmm_uq.analysis.parts.result import Stated
+from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, names, number, say, signed
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
+from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.maths.uncertainty.rounding import rounded, significant
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Units in which a value and its uncertainty are printed.
+
+    Parameters
+    ----------
+    value, small : units of values and limits, and of uncertainties.
+    per_value, per_small : one of each in the units inside, mm or rad.
+    """
+
+    value: Unit
+    small: Unit
+    per_value: float
+    per_small: float
+
+
+LENGTHS = Scale(unit("mm"), unit("µm"), 1.0, MICROMETRE)
+ANGLES = Scale(unit("°"), unit("″"), float(np.pi / 180), ARCSECOND)
+
+
+class Printed:
+    """How figures of one characteristic are printed: to the place of its U, in its units."""
+
+    @property
+    def scale(self) -> Scale:
+        """Its units."""
+        raise NotImplementedError
+
+    @property
+    def expanded(self) -> float:
+        """Half of the shortest 95 % interval of the errors, mm or rad."""
+        raise NotImplementedError
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether it is a measured width, which has no side below zero: it is stated by its interval."""
+        raise NotImplementedError
+
+    def with_factor(self, k: float) -> tuple[Text, Text]:
+        """U and k; dashes of what is stated by its interval."""
+        return (DASH, DASH) if self.one_sided else (self.small(self.expanded), self.factor_of(k))
+
+    def small(self, size: float) -> Number:
+        """An uncertainty, two digits of it, in µm or ″."""
+        return significant(size / self.scale.per_small)
+
+    def at(self, value: float) -> Number:
+        """A value to the place of its U, in mm or °."""
+        return rounded(value / self.scale.per_value, self.expanded / self.scale.per_value)[0]
+
+    def error(self, value: float) -> Number:
+        """A difference to the place of U, in µm or ″."""
+        return rounded(value / self.scale.per_small, self.expanded / self.scale.per_small)[0]
+
+    def limit(self, value: float | None) -> Text:
+        """A limit or a nominal value as it was given, in mm or °."""
+        if value is None:
+            return DASH
+        return signed(float(f"{value / self.scale.per_value:.10g}"), ".10g")
+
+    def factor_of(self, k: float) -> Text:
+        """U over u; a dash where there is no u."""
+        return number(k, ".2f") if np.isfinite(k) else DASH
+
+    def interval_of(self, interval: tuple[float, float], *, measured: bool) -> Text:
+        """Of the value, mm or °; where nothing was measured, of value less indication, µm or ″."""
+        show = self.at if measured else self.error
+        return say("{low} to {high}", low=show(interval[0]), high=show(interval[1]))
+
+    def accepted_of(self, accepted: tuple[float | None, float | None] | None) -> Text:
+        """Which values a rule accepts, mm or °."""
+        if accepted is None:
+            return say("none")
+        low, high = accepted
+        if low is not None and high is not None:
+            return say("{low} to {high}", low=self.at(low), high=self.at(high))
+        if high is not None:
+            return say("up to {limit}", limit=self.at(high))
+        return DASH if low is None else say("from {limit}", limit=self.at(low))
+
+
+@dataclass(frozen=True, eq=False)
+class Figures(Printed):
+    """One characteristic in figures.
+
+    Parameters
+    ----------
+    place : among those of the part, from 0.
+    found : of the part.
+    """
+
+    place: int
+    found: PartFound
+
+    @property
+    def stated(self) -> Stated:
+        """What is stated of it."""
+        return self.found.stated[self.place]
+
+    @property
+    def judged(self) -> Judged | None:
+        """What follows from its limits."""
+        return self.found.judged[self.place]
+
+    @cached_property
+    def scale(self) -> Scale:
+        """Its units."""
+        return ANGLES if self.angular else LENGTHS
+
+    @property
+    def angular(self) -> bool:
+        """Whether it is an angle."""
+        return self.found.characteristics[self.place].asks.limits == "angles"
+
+    @property
+    def zone(self) -> bool:
+        """Whether it is the width of a zone, which is never negative."""
+        return self.found.characteristics[self.place].asks.limits == "zone"
+
+    @property
+    def number(self) -> Number:
+        """Of it on this page, from 1."""
+        return number(self.place + 1)
+
+    @property
+    def name(self) -> Text:
+        """As the drawing has it."""
+        return Verbatim(self.stated.name)
+
+    @property
+    def what(self) -> Text:
+        """What it is of which features: ``position of bore | A, B``."""
+        facts = self.found.characteristics[self.place]
+        told = say("{what} of {features}", what=CHARACTERISTICS[facts.what], features=commas(names(facts.features)))
+        return say("{what} to {datums}", what=told, datums=commas(names(facts.datums))) if facts.datums else told
+
+    @property
+    def titled(self) -> Text:
+        """Name and what it is."""
+        return say("{name}: {what}", name=self.name, what=self.what)
+
+    @property
+    def beside(self) -> Text:
+        """The same beside its number, which it does not say again."""
+        return say("{what:capital}", what=self.what) if self.stated.name == self.number else self.titled
+
+    @property
+    def called(self) -> Text:
+        """In a sentence."""
+        return say("characteristic {name}", name=self.name)
+
+    @property
+    def expanded(self) -> float:
+        """Half of the shortest 95 % interval of the errors, mm or rad."""
+        return self.stated.U
+
+    @cached_property
+    def one_sided(self) -> bool:
+        """Whether it is a measured width, which is never negative."""
+        return self.stated.value is not None and bool(never_negative(self.found.plan)[self.place])
+
+    @property
+    def interval(self) -> Text:
+        """See :meth:`Printed.interval_of`."""
+        return self.interval_of(self.stated.interval, measured=self.stated.value is not None)
+
+    @property
+    def limits(self) -> tuple[float | None, float | None]:
+        """Lower and upper, mm or rad."""
+        one = self.found.plan.characteristics[self.place]
+        return one.lower, one.upper
+
+    @property
+    def width(self) -> float:
+        """Between the limits, mm or rad, of a zone its own; ``nan`` where a side is open."""
+        low, high = self.limits
+        low = 0.0 if self.zone else low
+        return float("nan") if low is None or high is None else high - low
+
+    @property
+    def allowed(self) -> Text:
+        """The limits in a phrase."""
+        (low, high), shown = self.limits, self.scale.value
+        if low is not None and high is not None:
+            return say("{low} to {high} {unit}", low=self.limit(low), high=self.limit(high), unit=shown)
+        if high is not None:
+            return say("at most {limit} {unit}", limit=self.limit(high), unit=shown)
+        return say("at least {limit} {unit}", limit=self.limit(low), unit=shown) if low is not None else NOTHING
+
+    @property
+    def result(self) -> Text:
+        """The value with U, or the interval of a width; U alone where nothing was measured."""
+        if self.one_sided:
+            return say("{value} {unit}, 95 % interval {interval} {unit}", value=self.at(self.stated.value or 0.0),
+                       interval=self.interval, unit=self.scale.value)  # fmt: skip
+        U = say("U = {U} {unit}", U=self.small(self.expanded), unit=self.scale.small)
+        if self.stated.value is None:
+            return U
+        return say("{value} {unit}, {U}", value=self.at(self.stated.value), unit=self.scale.value, U=U)
+
+
+def figures_of(found: PartFound) -> list[Figures]:
+    """Every characteristic, in the order of the job."""
+    return [Figures(place, found) for place in range(len(found.stated))]
+
+
+def critical(found: PartFound) -> Figures:
+    """What is told of first: the least margin; else what takes most of its tolerance; else the first."""
+    every = figures_of(found)
+    if found.nearest is not None:
+        return every[found.nearest]
+    taken = [one.expanded / one.width if one.width > 0 else -1.0 for one in every]
+    return every[int(np.argmax(taken))]
+
+
+def by_margin(found: PartFound) -> list[Figures]:
+    """Every characteristic, the least margin first; those without any margin last, in their order."""
+    margins = np.where(np.isnan(found.margins), np.inf, found.margins)
+    every = figures_of(found)
+    return [every[int(place)] for place in np.argsort(margins, kind="stable")]

@@ -1,0 +1,294 @@
+"""What an analysis finds: the object that certificates and results.json are written from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.conformity.consequences import Consequences, Costs
+from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.verdicts import by_standard, by_tolerance
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
+from cmm_uq.analysis.diagnosis.unseen import Smallest
+from cmm_uq.analysis.planning.advice import NextPlan, Suggestion
+from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.simulated import Simulated
+from cmm_uq.certificate.stating import Stating
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.machine.model import Estimate, MeasurementModel
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.doubt import growth
+from cmm_uq.maths.inference.doubt import Cause, Doubt
+from cmm_uq.maths.inference.draws import Draws
+from cmm_uq.maths.inference.least_squares import LeastSquares
+from cmm_uq.maths.inference.posterior import NoisyPosterior
+from cmm_uq.maths.uncertainty.covariance import Covariance
+from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+LACK_OF_FIT = 0.01
+"""Probability below which the residuals are held to contradict the stated noise."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """Standard deviation of a component of the noise, µm, and the probability that it is there at all."""
+
+    size: Quantity
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The noise of a recording, and what it does to the uncertainties.
+
+    Parameters
+    ----------
+    coordinate : standard deviation of one reading of one coordinate, root mean square of the axes, µm.
+    components : its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,
+        ``growth``, ``slow``.
+    axes_apart : probability that the axes differ.
+    wider : largest ratio of a parameter's standard uncertainty to what white noise would leave it.
+    stated_um : what the job states, if anything.
+    p_value : of the residuals' sum of squares under the stated noise (χ² test), if it is stated.
+    display_um : step in which coordinates are displayed, 0 where it is too fine to matter.
+    """
+
+    coordinate: Quantity
+    components: Mapping[str, Component]
+    axes_apart: float
+    wider: float
+    stated_um: float | None
+    p_value: float | None
+    display_um: float = 0.0
+
+    @property
+    def coverage_factor(self) -> float:
+        """K for 95 % of what is uncertain by this noise alone: Student's t, for its size is known so well and no better."""
+        return factor_of_noise(self.coordinate)
+
+    @property
+    def expanded(self) -> float:
+        """U of one reading of one coordinate, µm."""
+        return self.coverage_factor * self.coordinate.value
+
+    @property
+    def contradicts_stated(self) -> bool:
+        """Whether the residuals are larger than the stated noise allows; they were then used instead of it."""
+        return self.p_value is not None and self.p_value < LACK_OF_FIT
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A job with its diagnosis.
+
+    Parameters
+    ----------
+    job, findings : what was read, and what the screening found.
+    diagnosis : what is missing.
+    suggestions : what to measure next.
+    consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
+    simulated : the simulation that the recording was compared with, if it was with one.
+    unseen : the smallest amplitude of each effect that the recording would have shown.
+    next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
+    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
+    """
+
+    job: Job
+    findings: tuple[Finding, ...]
+    diagnosis: Diagnosis
+    suggestions: tuple[Suggestion, ...]
+    consequences: Consequences | None = None
+    simulated: Simulated | None = None
+    unseen: tuple[Smallest, ...] = ()
+    next_plan: NextPlan | None = None
+    costs: Costs | None = None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """``second`` minus ``first``, parameters by their keys, which is determined where neither of them is."""
+
+    second: tuple[str, str]
+    first: tuple[str, str]
+    quantity: Quantity
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A line along a machine axis that says something else of the axis than an average over explanations does.
+
+    Parameters
+    ----------
+    key : of the parameter, effect and name.
+    measurement : number of the line.
+    alone : the parameter by this line alone, all others as they are on average.
+    """
+
+    key: tuple[str, str]
+    measurement: int
+    alone: Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """All that is known of a job after its analysis.
+
+    Parameters
+    ----------
+    job, model : what was analysed.
+    findings : of the screening.
+    estimate : least squares.
+    posterior : of the model's own parameters and of its noise.
+    values : (N, k) draws of the model's unknowns that all estimates are taken from, and all that is computed from these: those
+        of the posterior; where several explanations remain, those of the mixture of all.
+    draws : of all that is reported, by name and chain.
+    parameters : reported parameters of each effect, by effect and name.
+    sizes : of the artefact, by name.
+    noise : of a coordinate, about the named model.
+    accuracy : figures of the lengths as recorded, by name; empty for artefacts without lengths.
+    statements : of conformity, in the job's order.
+    diagnosed : what the job's model leaves out, if anything.
+    stating : how a certificate states it; ``None`` of a result as evaluated.
+    causes : of what is stated to be in doubt about all observations together.
+    doubt : what they make of the model's unknowns; it is in ``values``.
+    contradictions : what denies averaged estimates, which are then not given.
+    """
+
+    job: Job
+    model: MeasurementModel
+    findings: tuple[Finding, ...]
+    estimate: Estimate
+    posterior: NoisyPosterior
+    values: Floats
+    draws: Draws
+    parameters: Mapping[str, Mapping[str, Quantity]]
+    sizes: Mapping[str, Quantity]
+    noise: Noise
+    accuracy: Mapping[str, Quantity]
+    statements: tuple[Statement, ...]
+    diagnosed: Diagnosed
+    stating: Stating | None = None
+    causes: tuple[Cause, ...] = ()
+    doubt: Doubt = field(default_factory=lambda: Doubt(()))
+    contradictions: tuple[Contradiction, ...] = ()
+
+    def at_least(
+        self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """U and k as a certificate states them; see :meth:`Stating.raised_to`."""
+        if self.stating is None:
+            return expanded, factor
+        return self.stating.raised_to(name, expanded, factor, unit, length_mm)
+
+    def quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Every quantity that is reported, with its name."""
+        for effect, values in self.parameters.items():
+            yield from ((f"{effect} {name}", quantity) for name, quantity in values.items())
+        yield from self.sizes.items()
+        yield "u_coordinate_um", self.noise.coordinate
+        yield from self.accuracy.items()
+
+    @property
+    def relative_doubt(self) -> float:
+        """Standard uncertainty of the size of the artefact as a whole, over its size, by what is stated beside its sizes."""
+        along = growth(self.artefact)
+        if along is None:
+            return 0.0
+        return float(np.sqrt(Doubt.of(self.causes, along[None] / (along @ along)).variance(np.ones(1))))
+
+    @property
+    def averaged(self) -> int:
+        """Over how many explanations that remain the estimates are averaged; 0 where they are those of the named model."""
+        return len(self.diagnosed.diagnosis.remaining.rivals)
+
+    @property
+    def artefact(self) -> Artefact:
+        """The artefact with its recording."""
+        return self.model.artefact
+
+    @property
+    def least_squares(self) -> LeastSquares:
+        """The least-squares estimate."""
+        return self.estimate.least_squares
+
+    @cached_property
+    def residuals(self) -> Floats:
+        """What the named model at its posterior mean leaves unexplained of every observation, used or not, (m,) mm."""
+        return self.model.residuals(self.posterior.draws.mean(axis=0))
+
+    @cached_property
+    def undetermined(self) -> tuple[tuple[tuple[str, str], ...], ...]:
+        """Keys of the parameters in each combination that the recording leaves free."""
+        ls = self.least_squares
+        return tuple(
+            tuple(u.key for u, part in zip(ls.unknowns, column, strict=True) if part) for column in ls.null_space.T
+        )
+
+    @cached_property
+    def free(self) -> frozenset[str]:
+        """Effects that the recording does not determine by themselves, or contradicts."""
+        return frozenset(effect for effect, _ in self.not_given)
+
+    @cached_property
+    def not_given(self) -> frozenset[tuple[str, str]]:
+        """Keys of parameters without a value: the recording leaves them free, or contradicts them."""
+        free = (key for combination in self.undetermined for key in combination)
+        return frozenset((*free, *(one.key for one in self.contradictions)))
+
+    def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[Difference, ...]:
+        """Differences, within a combination that the recording leaves free, of parameters in one unit.
+
+        None with an uncertainty below the laboratory's capability.
+        """
+        columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
+        units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
+        alike = [key for key in combination if units[key] == units[combination[0]]]
+        draws = self.values
+        stating, found = Stating.of(self.job), []
+        for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
+            quantity = Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
+            if self.causes:
+                each = np.eye(len(columns))
+                quantity = self.doubt.larger(quantity, each[columns[second]] - each[columns[first]])
+            found.append(Difference(second, first, stating.stated("differences", quantity)))
+        return tuple(found)
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Of all reported parameters and the artefact's sizes."""
+        reported = self.model.reported(self.values)
+        return Covariance.of_draws({".".join(key): values for key, values in reported.items()})
+
+    @cached_property
+    def verdicts(self) -> Verdicts:
+        """All statements of conformity, and the gravest: those of standards, then (first) parameters with a tolerance."""
+        tolerances = self.job.facts.model.tolerances
+        found = [by_standard(statement) for statement in self.statements]
+        for effect in self.model.effects:
+            if effect.name in tolerances:
+                name, quantity = next(iter(self.parameters[effect.name].items()))
+                found.append(by_tolerance(f"{effect.name}.{name}", effect.title, quantity, tolerances[effect.name],
+                                          determined=effect.name not in self.free))  # fmt: skip
+        return Verdicts(found)
+
+    @cached_property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Observations (m,) of measurements that the screening found odd; of one with outliers, those that are not used."""
+        found = np.zeros(len(self.artefact.measurement), dtype=bool)
+        for finding in self.findings:
+            own = np.isin(self.artefact.measurement, finding.measurements)
+            found |= own & ~self.model.used if finding.kind == "outlier" else own
+        return found
+
+    def prior_share(self, key: tuple[str, str]) -> float:
+        """How much of a parameter's variance under the named model is left of the prior's: 0 all recorded, 1 all assumed."""
+        i = [u.key for u in self.posterior.unknowns].index(key)
+        prior = self.posterior.unknowns[i].prior_sd
+        return float(min(1.0, self.posterior.covariance[i, i] / prior**2)) if prior > 0 else 1.0

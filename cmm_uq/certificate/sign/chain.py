@@ -1,0 +1,189 @@
+"""Whether a certificate leads to somebody trusted, was in date, for signing and not revoked; nothing is fetched for it."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from asn1crypto import crl, ocsp, x509
+from cryptography import x509 as certificates
+from cryptography.exceptions import InvalidSignature
+from pyhanko_certvalidator import CertificateValidator, ValidationContext
+from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError, RevokedError
+
+from cmm_uq.base.messages import Text, Verbatim, day, say
+from cmm_uq.certificate.sign.extra import ran
+from cmm_uq.certificate.sign.found import Revocation, Trust
+from cmm_uq.certificate.sign.signer import is_test, unfit
+
+NO_TIME = say("the signature says no time, so that nobody knows whether its certificate was in date")
+UNTRUSTED = say("no chain of certificates leads from the signer to anybody who is trusted")
+NOBODY = say("nobody is trusted: name the certificates that you trust")
+REVOKED = say("the certificate was revoked")
+UNREADABLE = say("the certificate cannot be read")
+SPOILT = say("a certificate that comes with the signature was changed")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a file brings along for its signatures.
+
+    Parameters
+    ----------
+    certificates : above the signers'.
+    revocations : lists.
+    answers : of OCSP responders.
+    """
+
+    certificates: tuple[x509.Certificate, ...] = ()
+    revocations: tuple[crl.CertificateList, ...] = ()
+    answers: tuple[ocsp.OCSPResponse, ...] = ()
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What holds of a signer.
+
+    Parameters
+    ----------
+    trusted : whether somebody trusted vouches for them.
+    revocation : of their certificate.
+    test_key : whether the key is one for trying.
+    problems : why it does not count.
+    """
+
+    trusted: bool
+    revocation: Revocation
+    test_key: bool
+    problems: tuple[Text, ...]
+
+
+def standing(
+    certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime | None, *, proven: bool
+) -> Standing:
+    """What holds of a signer.
+
+    Parameters
+    ----------
+    certificate : of the signer.
+    evidence : from the file.
+    trust : whom one trusts.
+    at : time of signing.
+    proven : whether a time stamp proves it: without one, a certificate that was revoked since does not count.
+    """
+    try:
+        signer = certificates.load_der_x509_certificate(certificate.dump())
+        reasons, test = unfit(signer), is_test(signer)
+    except ValueError:
+        return Standing(trusted=False, revocation="not known", test_key=False, problems=(UNREADABLE,))
+    found: list[Text] = [Verbatim(why) for why in reasons]
+    if _spoilt(evidence, trust):
+        found.append(SPOILT)
+    if at is None:
+        return Standing(trusted=False, revocation="not known", test_key=test, problems=(*found, NO_TIME))
+    if not signer.not_valid_before_utc <= at <= signer.not_valid_after_utc:
+        found.append(say("the certificate was not valid on {day}: it is from {first} to {last}", day=day(at.date()),
+                         first=day(signer.not_valid_before_utc.date()),
+                         last=day(signer.not_valid_after_utc.date())))  # fmt: skip
+    trusted, revocation, why = _path(certificate, evidence, trust, at)
+    if revocation != "revoked" and not proven and _listed(certificate, evidence, trust):
+        revocation = "revoked"
+    if not trusted:
+        found.append(why)
+    if revocation == "revoked" and REVOKED not in found:
+        found.append(REVOKED)
+    return Standing(trusted and revocation != "revoked", revocation, test, tuple(found))
+
+
+def _spoilt(evidence: Evidence, trust: Trust) -> bool:
+    """Whether a certificate of the file is not as its issuer, who is known here too, has signed it.
+
+    The signature does not cover them; one that no chain needs could be altered unseen.
+    """
+    brought = [one.dump() for one in evidence.certificates]
+    try:
+        all_known = [certificates.load_der_x509_certificate(data) for data in {*brought, *trust.anchors}]
+        return not all(map(partial(_as_issued, all_known), map(certificates.load_der_x509_certificate, brought)))
+    except ValueError:
+        return True
+
+
+def _as_issued(known: Sequence[certificates.Certificate], one: certificates.Certificate) -> bool:
+    """Whether one of the issuers of its name has signed it, as far as any is known."""
+    issuers = [other for other in known if other.subject == one.issuer]
+    return not issuers or any(map(partial(_signed, one), issuers))
+
+
+def _signed(one: certificates.Certificate, issuer: certificates.Certificate) -> bool:
+    try:
+        one.verify_directly_issued_by(issuer)
+    except (ValueError, TypeError, InvalidSignature):
+        return False
+    return True
+
+
+def _path(
+    certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime
+) -> tuple[bool, Revocation, Text]:  # fmt: skip
+    """Whether a chain holds at a time, what is known of revocation, and why it does not hold."""
+    if not trust.anchors:
+        return False, "not known", NOBODY
+    try:
+        _validate(certificate, evidence, trust, at, "require")
+    except RevokedError:
+        return False, "revoked", REVOKED
+    except (PathBuildingError, PathValidationError):
+        pass
+    else:  # a certificate that is trusted itself has nobody above it who could revoke it
+        return True, "not known" if certificate.dump() in trust.anchors else "good", UNTRUSTED
+    try:
+        _validate(certificate, evidence, trust, at, "soft-fail")
+    except RevokedError:
+        return False, "revoked", REVOKED
+    except PathBuildingError:
+        return False, "not known", UNTRUSTED
+    except PathValidationError as error:
+        return False, "not known", say("the chain of certificates does not hold: {why}",
+                                       why=Verbatim(str(error).rstrip(".")))  # fmt: skip
+    return True, "not known", UNTRUSTED
+
+
+def _validate(
+    certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime, mode: str
+) -> None:  # fmt: skip
+    found = context(evidence, trust, at, mode)
+    ran(CertificateValidator(certificate, validation_context=found).async_validate_path())
+
+
+def context(evidence: Evidence, trust: Trust, at: dt.datetime, mode: str = "soft-fail") -> ValidationContext:
+    """What certificates are judged by at a time; nothing is fetched.
+
+    Parameters
+    ----------
+    evidence : from the file.
+    trust : whom one trusts.
+    at : the time.
+    mode : ``require`` where every certificate must be known not to be revoked, else ``soft-fail``.
+    """
+    return ValidationContext(
+        trust_roots=[x509.Certificate.load(anchor) for anchor in trust.anchors],
+        other_certs=list(evidence.certificates), crls=[one.dump() for one in _lists(evidence, trust)],
+        ocsps=[one.dump() for one in evidence.answers], allow_fetching=False, moment=at, revocation_mode=mode,
+        retroactive_revinfo=True, weak_hash_algos={"md2", "md5", "sha1"},
+    )  # fmt: skip
+
+
+def _lists(evidence: Evidence, trust: Trust) -> Sequence[crl.CertificateList]:
+    return [*evidence.revocations, *(crl.CertificateList.load(data) for data in trust.revocations)]
+
+
+def _listed(certificate: x509.Certificate, evidence: Evidence, trust: Trust) -> bool:
+    """Whether a list of the issuer names the certificate, whenever that was."""
+    return any(
+        revoked["user_certificate"] == certificate.serial_number
+        for one in _lists(evidence, trust)
+        if one.issuer == certificate.issuer
+        for revoked in one["tbs_cert_list"]["revoked_certificates"].native or ()
+    )

@@ -1,0 +1,165 @@
+"""PDF signed by PAdES: a revision appended, that leaves every byte before it as it is, tagged and fit for the archive.
+
+The date of the metadata stays that of the document. The same document, key and time give the same bytes at level B-B.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.sign.appending import appending
+from cmm_uq.certificate.sign.extra import installed, ran
+from cmm_uq.certificate.sign.found import NOBODY, Trust
+from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
+
+if TYPE_CHECKING:
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+    from pyhanko.sign.signers import PdfSigner
+
+FIELD = "Signature"
+"""Names of the fields: Signature1, Signature2, …"""
+
+
+@dataclass(frozen=True)
+class Seal:
+    """What is seen of a signature on the first page.
+
+    Parameters
+    ----------
+    picture : a PDF of one page, shown in the seal's place.
+    places : left, bottom, right and top of the place of the first signature and of those after it, in points from the
+        page's lower left corner; a signature for which no place is left is not seen.
+    says : the picture in words, for those who cannot see it.
+    """
+
+    picture: bytes
+    places: tuple[tuple[float, float, float, float], ...]
+    says: str
+
+
+Level = Literal["B-B", "B-T", "B-LT", "B-LTA"]
+"""Of ETSI EN 319 142-1: signed; and stamped by a server; with what proves the certificates; and that stamped, too."""
+
+LEVELS: tuple[Level, ...] = get_args(Level)
+
+
+@dataclass(frozen=True)
+class Stamping:
+    """What a level above B-B needs.
+
+    Parameters
+    ----------
+    server : address of a time stamp server.
+    level : B-T, B-LT or B-LTA.
+    trust : whom the chains of signer and server must lead to, for B-LT and B-LTA.
+
+    Raises
+    ------
+    CmmUqError : the address is none of HTTP.
+    """
+
+    server: str
+    level: Level = "B-T"
+    trust: Trust = NOBODY
+
+    def __post_init__(self) -> None:
+        if not self.server.startswith(("http://", "https://")):
+            raise CmmUqError("is no address of a time stamp server", where=self.server,
+                             fix="Give one that begins with https://")  # fmt: skip
+
+
+def sign_pdf(
+    pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, stamping: Stamping | None = None, reason: str = ""
+) -> bytes:  # fmt: skip
+    """A PDF with a signature.
+
+    Parameters
+    ----------
+    pdf : the document; signatures that it has stay valid.
+    signer : who signs.
+    seal : what is seen of it; ``None`` for nothing.
+    at : time of signing, with its zone.
+    stamping : level above B-B; ``None`` for B-B.
+    reason : why it is signed.
+
+    Raises
+    ------
+    CmmUqError : it cannot be read as a PDF, the key must not sign at this time, or a server does not answer as it should.
+    """
+    signer.check(at)
+    with installed():
+        from pyhanko.sign import fields, signers
+        from pyhanko.stamp.noop import NoOpStampStyle
+
+        from cmm_uq.certificate.sign.adapter import Adapted
+        from cmm_uq.certificate.sign.tagging import show, tag
+    writer = appending(pdf)
+    name, count = _field(writer)
+    if seal is not None and count >= len(seal.places):
+        seal = None
+    said = seal.says if seal else signer.name
+    fields.append_signature_field(
+        writer,
+        fields.SigFieldSpec(name, box=seal.places[count] if seal else None, readable_field_name=said),
+    )
+    field = next(reference for _, _, reference in fields.enumerate_sig_fields(writer, with_name=name))
+    if seal is not None:
+        show(writer, field.get_object(), seal.picture)
+    tag(writer, field, said)
+    metadata = signers.PdfSignatureMetadata(
+        field_name=name, md_algorithm=ONE_DIGEST, subfilter=fields.SigSeedSubFilter.PADES, name=signer.name,
+        reason=reason or None,
+    )  # fmt: skip
+    adapted, style = Adapted(signer), NoOpStampStyle()
+    if stamping is None or stamping.level == "B-B":
+        return ran(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
+    from cmm_uq.certificate.sign.time_server import Server
+
+    server = Server(stamping.server)
+    pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=server, stamp_style=style)
+    return ran(_stamped(pdf_signer, writer, signer, stamping, at))
+
+
+def _field(writer: IncrementalPdfFileWriter) -> tuple[str, int]:
+    """A name that no field has, and how many there are."""
+    from pyhanko.sign.fields import enumerate_sig_fields
+
+    taken = {name for name, _, _ in enumerate_sig_fields(writer)}
+    return next(name for name in (f"{FIELD}{i}" for i in range(1, len(taken) + 2)) if name not in taken), len(taken)
+
+
+async def _signed(pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, at: dt.datetime) -> bytes:
+    """Signed at a time that is given."""
+    from pyhanko.sign.signers.pdf_cms import PdfCMSSignedAttributes
+
+    session = pdf_signer.init_signing_session(writer)
+    session.system_time = at
+    room = await session.estimate_signature_container_size(None)
+    document = session.prepare_tbs_document(None, room)
+    digest, output = document.digest_tbs_document()
+    await document.perform_signature(digest.document_digest, PdfCMSSignedAttributes(signing_time=at))
+    output.seek(0)
+    return bytes(output.read())
+
+
+async def _stamped(
+    pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, signer: Signer, stamping: Stamping, at: dt.datetime
+) -> bytes:  # fmt: skip
+    """Signed with a time stamp, and what else the level asks for."""
+    server = pdf_signer.default_timestamper
+    if stamping.level == "B-T":
+        return await _signed(pdf_signer, writer, at)
+    from cmm_uq.certificate.sign.long_term import Proof, stamped
+
+    proof = Proof(signer, server, stamping.trust, at)
+    await proof.gather()
+    kept = proof.kept(await _signed(pdf_signer, writer, at))
+    if stamping.level == "B-LTA":
+        return await stamped(kept, server)
+    output = io.BytesIO()
+    kept.write(output)
+    return output.getvalue()

@@ -1,0 +1,272 @@
+"""A certificate beside what its inputs give when they are computed again: every figure, every form.
+
+Equal to the byte by the same version on the same kernels of linear algebra. Other kernels change the last bits, and with them
+which draws a sampler takes: then nearly every sampled figure differs a little, all within Monte Carlo error and printed
+digits. A single figure that differs where its neighbours do not is no such thing.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from cmm_uq.certificate.verify.consistent import QUANTITY
+from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.given import RESULTS, Given
+from cmm_uq.certificate.verify.strict_json import strict_json
+from cmm_uq.certificate.verify.views_agree import squashed
+from cmm_uq.maths.uncertainty.rounding import rounded
+
+_NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
+_OTHER_KERNELS = 0.5
+"""Share of the sampled figures from which on their differences are taken for those of other kernels."""
+
+_OF_ONE = ("sampling", "diagnosis", "budget", "correlation", "unseen", "decision")
+"""Parts whose figures are compared with one and not with themselves: shares, probabilities, statistics of a sampler."""
+
+FEWEST_OF_A_PART = 4000
+"""Draws behind a share of a part's variance, or behind what another way of measuring would give."""
+
+_ERRORS = 6.0
+"""Standard errors of a Monte Carlo that two of it may differ by, beyond which one figure in 10⁸ lies."""
+
+
+@dataclass(frozen=True)
+class Again:
+    """What was computed again.
+
+    Parameters
+    ----------
+    files : whatever the command writes, by name, with ``results.json``; without the PDF.
+    pdf : the PDF, with the files attached that the given one has; ``None`` where it cannot be set by the same program.
+    why_no_pdf : that is so.
+    kept : files that say on what platform they were made, and are otherwise what the inputs give.
+    beside : names of files that lie beside the documents and are not inside the PDF.
+    """
+
+    files: Mapping[str, bytes]
+    pdf: bytes | None = None
+    why_no_pdf: str = ""
+    kept: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+
+
+Difference = tuple[str, Any, Any]
+"""JSON path, what stands there, and what it should be."""
+
+
+def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
+    """Keep every difference of a certificate by this version of the package; whether its documents are the same to the byte.
+
+    Parameters
+    ----------
+    given : to be verified.
+    again : made of its inputs.
+    """
+    if given.results is None:
+        return False
+    name, data, content = given.results
+    new = strict_json(again.files[RESULTS], RESULTS)
+    inquiry.looked("again", sum(1 for _ in leaves(data)))
+    same = content == again.files[RESULTS]
+    kernels = not same and by_other_kernels(data, new)
+    if kernels:
+        inquiry.notes.append(
+            "Figures differ in their last digits from those computed here, as by another processor or library: compared "
+            "within printed digits and Monte Carlo error."
+        )
+    found = differences(data, new)
+    for path, stands, should in found if not kernels else beyond_sampling(data, new, found):
+        inquiry.wrong("again", name, path, "is not what its inputs give", stands, should)
+    if not (same or kernels or found):
+        inquiry.wrong("again", name, "", "is written otherwise than its inputs give it, though its figures are equal")
+    for kept in again.kept:
+        inquiry.left(
+            f"platform and versions of packages in {kept}", "they are others than here, and nothing else tells them"
+        )
+    alike = _compare_html(inquiry, given, again, kernels=kernels)
+    _compare_attached(inquiry, given, again, kernels=kernels)
+    return same and _compare_pdf(inquiry, given, again) and alike
+
+
+def leaves(data: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every figure and word of plain data, with its path."""
+    if isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from leaves(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, list):
+        for i, value in enumerate(data):
+            yield from leaves(value, f"{path}[{i}]")
+    else:
+        yield path, data
+
+
+def differences(data: Any, new: Any) -> list[Difference]:
+    """Whatever differs, or stands in one alone."""
+    a, b = dict(leaves(data)), dict(leaves(new))
+    found = [(path, a.get(path, ""), b.get(path, "")) for path in dict.fromkeys((*a, *b))
+             if path not in a or path not in b or type(a[path]) is not type(b[path]) or a[path] != b[path]]  # fmt: skip
+    if not found and data != new:
+        found.append(("", "other parts", ""))
+    if not found and list(a) != list(b):
+        path = next(one for one, other in zip(a, b, strict=True) if one != other)
+        found.append((path, "another order", ""))
+    return found
+
+
+def by_other_kernels(data: Any, new: Any) -> bool:
+    """Whether so many figures differ that no single one was altered."""
+    a, b = dict(leaves(data)), dict(leaves(new))
+    figures = [path for path, value in a.items() if isinstance(value, float) and not value.is_integer() and path in b]
+    return bool(figures) and sum(a[path] != b[path] for path in figures) > _OTHER_KERNELS * len(figures)
+
+
+def beyond_sampling(data: Any, new: Any, found: list[Difference]) -> Iterator[Difference]:
+    """Of some differences those that neither printed digits nor Monte Carlo error explain."""
+    draws = min(filter(None, map(_draws, (data, new))), default=0.0)
+    part = _ERRORS * math.sqrt(2.0 / draws) if draws > 0 else 1e-6
+    quantities = dict(_quantities(new))
+    for path, stands, should in found:
+        if not (isinstance(stands, (int, float)) and isinstance(should, (int, float))):
+            if isinstance(stands, str) and isinstance(should, str) and _words_alike(stands, should, part):
+                continue
+            yield path, stands, should
+            continue
+        owner = path.rpartition(".")[0] if "interval95" not in path else path.rpartition(".interval95")[0]
+        scale = max(abs(stands), abs(should))
+        if owner in quantities:
+            one = quantities[owner]
+            place = _place(one)
+            room = part * (one["u"] if path.endswith((".value", "]", ".u", ".U")) else scale) + place
+        else:
+            room = part * max(scale, 1.0 if path.startswith(_OF_ONE) else 0.0)
+        if abs(stands - should) > room:
+            yield path, stands, should
+
+
+def _draws(data: Mapping[str, Any]) -> float:
+    """Independent draws behind the figures that have fewest of them."""
+    if "simulation" in data:
+        return float(min(data["simulation"]["virtual_measurements"], FEWEST_OF_A_PART))
+    return float((data.get("sampling") or {}).get("ess_min") or 0.0)
+
+
+def _quantities(data: Any, path: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
+    if isinstance(data, Mapping):
+        if data.keys() >= QUANTITY:
+            yield path, data
+        for key, value in data.items():
+            yield from _quantities(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(data, list):
+        for i, value in enumerate(data):
+            yield from _quantities(value, f"{path}[{i}]")
+
+
+def _place(one: Mapping[str, Any]) -> float:
+    """Half a unit of the last digit that is printed."""
+    if one["value"] is None or not one["U"]:
+        return 0.0
+    text = rounded(0.0, one["U"])[1]
+    decimals = len(text.partition(".")[2])
+    return 0.5 * 10.0**-decimals
+
+
+def _words_alike(stands: str, should: str, part: float) -> bool:
+    """Whether two sentences differ in the last digits of their numbers alone."""
+    if _NUMBER.sub("#", stands) != _NUMBER.sub("#", should):
+        return False
+    pairs = zip(_NUMBER.findall(stands), _NUMBER.findall(should), strict=True)
+    numbers = [
+        (float(a.replace("−", "-").replace(",", ".")), float(b.replace("−", "-").replace(",", "."))) for a, b in pairs
+    ]
+    return all(abs(a - b) <= 4 * part * max(abs(a), abs(b), 1.0) for a, b in numbers)
+
+
+def _compare_html(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> bool:
+    if given.html is None:
+        return True
+    name, page, content = given.html
+    should = next((data for file, data in again.files.items() if file.endswith(".html")), None)
+    if should is None:
+        inquiry.left(name, "none is written of these inputs")
+        return False
+    inquiry.looked("again")
+    if content == should:
+        return True
+    if kernels:
+        from cmm_uq.certificate.verify.html_page import read_html
+
+        if _masked(page.text) == _masked(read_html(should, name).text):
+            inquiry.left("pictures", "the figures differ in their last digits, and with them the pictures")
+            return False
+    line, stands, wanted = _first_line(content, should)
+    inquiry.wrong("again", name, f"line {line}", "is not what its inputs give", stands, wanted)
+    return False
+
+
+def _masked(text: str) -> str:
+    return _NUMBER.sub("#", squashed(text))
+
+
+def _first_line(stands: bytes, should: bytes) -> tuple[int, str, str]:
+    """Number of the first line that differs, and what differs in it."""
+    a, b = stands.decode("utf-8", "replace").split("\n"), should.decode("utf-8", "replace").split("\n")
+    at = next((i for i, (one, other) in enumerate(zip(a, b, strict=False)) if one != other), min(len(a), len(b)))
+    one, other = a[at] if at < len(a) else "", b[at] if at < len(b) else ""
+    begin = next((i for i, (x, y) in enumerate(zip(one, other, strict=False)) if x != y), min(len(one), len(other)))
+    begin = max(0, begin - 20)
+    return at + 1, one[begin : begin + 60], other[begin : begin + 60]
+
+
+def _compare_attached(inquiry: Inquiry, given: Given, again: Again, *, kernels: bool) -> None:
+    """Files inside the PDF, or beside it, that the command writes: none missing, none more, none other."""
+    written = {
+        name: data for name, data in again.files.items() if name != RESULTS and not name.endswith((".html", ".xml"))
+    }
+    inputs = given.results[1]["job"]["inputs_sha256"] if given.results else {}
+    for name, data in written.items():
+        stands = given.files.get(name)
+        inquiry.looked("again")
+        if stands is None and given.pdf is not None and name not in again.beside:
+            inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing, and the inputs give it")
+        elif stands is not None and stands != data and not kernels:
+            inquiry.wrong("again", name, "", "is not what the inputs give")
+    if given.pdf is None:
+        return
+    known = {*inputs, *again.files}
+    for name in again.files:
+        if name.endswith(".xml") and name not in given.pdf[1].files:
+            inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing, and the inputs give it")
+    for name in given.pdf[1].files.keys() - known:
+        inquiry.wrong("again", given.pdf[0], f"attachment {name}", "belongs to nothing that the inputs give")
+    for name in (*inputs, RESULTS):
+        if name not in given.pdf[1].files:
+            inquiry.wrong("again", given.pdf[0], f"attachment {name}", "is missing")
+
+
+def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
+    """The first revision of the PDF to the byte; signatures come behind it."""
+    if given.pdf is None:
+        return True
+    name, pdf = given.pdf
+    if again.pdf is None:
+        inquiry.left("drawings and letters of the PDF's pages", again.why_no_pdf)
+        return False
+    inquiry.looked("again")
+    if pdf.content[: pdf.ends[0]] == again.pdf:
+        return True
+    from cmm_uq.certificate.verify.pdf_parts import differing_parts
+
+    stands, should = pdf.content[: pdf.ends[0]], again.pdf
+    parts = differing_parts(stands, should)
+    for where, here, there in parts:
+        inquiry.wrong("again", name, where, "is not what its inputs give", here, there)
+    if not parts:
+        pairs = enumerate(zip(stands, should, strict=False))
+        at = next((i for i, (a, b) in pairs if a != b), min(len(stands), len(should)))
+        problem = "was written anew, or changed where nothing is stated: it is not the file that was made"
+        inquiry.wrong("again", name, f"byte {at}", problem)
+    return False

@@ -1,0 +1,350 @@
+"""A certificate's PDF opened within limits: text of its pages, attached files, revisions, and what does not belong there.
+
+Nothing of the file is run or followed. Every object that can be reached is looked at: streams are unpacked whole, with their
+checksum and up to a limit, before anything reads them; what acts, hides, encrypts or comes from outside is named.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import logging
+import re
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import PDF_BYTES, PDF_DRAWN, PDF_OBJECTS, PDF_PAGES, PDF_UNPACKED
+
+if TYPE_CHECKING:
+    from pypdf import PdfReader
+
+_FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
+SECONDS = 60.0
+"""Longest time that reading the text of a PDF may take."""
+
+ACTIVE = frozenset({
+    "/JavaScript", "/JS", "/Launch", "/OpenAction", "/AA", "/RichMedia", "/RichMediaContent", "/SubmitForm", "/ImportData",
+    "/GoToR", "/GoToE", "/XFA", "/Sound", "/Movie", "/Rendition", "/Trans", "/URI",
+})  # fmt: skip
+"""Names, as keys or as values of a dictionary, of what acts or leads outside."""
+
+HIDING = frozenset({"/OCProperties", "/OCG", "/OCMD", "/OC"})
+"""The same of what may be shown or not."""
+
+_END = re.compile(rb"startxref\s+(\d{1,12})\s+%%EOF(?:\r\n|\n|\r)?")
+_TRAILER = re.compile(rb"trailer\s*<<(?P<told>(?s:.{0,2000}?))>>\s*(?P<end>startxref)")
+_BEFORE = re.compile(rb"/Prev\s+(\d{1,12})")
+_DO = re.compile(rb"/([^\s/<>\[\](){}%]+)\s+Do\b")
+_INVISIBLE = re.compile(rb"(?<![\d.])[1-7]\s+Tr\b")
+_UNTOLD = frozenset({"/Type", "/Length", "/Filter"})
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file inside a PDF.
+
+    Parameters
+    ----------
+    name : of it.
+    content : its bytes.
+    relationship : to the document (ISO 19005-3): ``Source`` or ``Data``.
+    """
+
+    name: str
+    content: bytes
+    relationship: str
+
+
+@dataclass
+class PdfFile:
+    """What a PDF holds.
+
+    Attributes
+    ----------
+    content : the file's bytes.
+    attachments : in the order of their names in the file.
+    information : title, dates and the like, as the file says.
+    xmp : the same as its metadata stream says.
+    language : of the text.
+    ends : bytes up to the end of each revision.
+    signatures : signature fields.
+    problems : what does not belong there, each with its place.
+    reader : of its pages.
+    """
+
+    content: bytes
+    attachments: list[Attachment] = field(default_factory=list)
+    information: dict[str, str] = field(default_factory=dict)
+    xmp: str = ""
+    language: str = ""
+    ends: list[int] = field(default_factory=list)
+    signatures: int = 0
+    problems: list[tuple[str, str]] = field(default_factory=list)
+    reader: PdfReader | None = None
+    where: str = ""
+
+    @cached_property
+    def pages(self) -> list[str]:
+        """Text of each page, as a reader copies it; looked for when it is first asked for.
+
+        Raises
+        ------
+        CmmUqError : they are damaged, or beyond the limits.
+        """
+        with reading(self.where):
+            return list(_texts(self))
+
+    @property
+    def files(self) -> Mapping[str, bytes]:
+        """Contents of the attached files by name, the first of each."""
+        found: dict[str, bytes] = {}
+        for one in self.attachments:
+            found.setdefault(one.name, one.content)
+        return found
+
+
+def read_pdf(content: bytes, where: str) -> PdfFile:
+    """A certificate's PDF.
+
+    Raises
+    ------
+    CmmUqError : it is damaged, encrypted, or beyond the limits.
+    """
+    if len(content) > PDF_BYTES.most:
+        raise CmmUqError(f"is larger than {PDF_BYTES.most} bytes", where=where, fix=_FIX)
+    found = PdfFile(content, where=where)
+    marks = list(_END.finditer(content))
+    if not content.startswith(b"%PDF-") or not marks:
+        raise CmmUqError("is no whole PDF: its beginning or its end is missing", where=where, fix=_FIX)
+    found.ends = _revisions(content, marks, where)
+    if rest := len(content) - found.ends[-1]:
+        found.problems.append((f"byte {found.ends[-1]}", f"has {rest} bytes after its end"))
+    with reading(where):
+        _read(found, where)
+    _check_ends(found, marks)
+    return found
+
+
+def _revisions(content: bytes, marks: list[re.Match[bytes]], where: str) -> list[int]:
+    """Bytes up to the end of each revision, the first one first: from the last, each leads to the one before it.
+
+    A PDF that is attached as it is has ends of its own, which are none of the file.
+    """
+    of, ends, at = {mark.start(): mark for mark in marks}, list[int](), int(marks[-1][1])
+    place = marks[-1].start()
+    while True:
+        trailer = _TRAILER.search(content, at) if content.startswith(b"xref", at) else None
+        own = None if trailer is None else of.get(trailer.start("end"))
+        if trailer is None or own is None or int(own[1]) != at:
+            raise CmmUqError("has no table of its objects where it says: it is damaged, or no PDF of cmm-uq",
+                             where=f"{where}: byte {place}", fix=_FIX)  # fmt: skip
+        ends.append(own.end())
+        before = _BEFORE.search(trailer["told"])
+        if before is None:
+            return ends[::-1]
+        place = own.start()
+        if int(before[1]) >= at:
+            raise CmmUqError("goes round in its revisions: it is damaged", where=f"{where}: byte {place}", fix=_FIX)
+        at = int(before[1])
+
+
+def _check_ends(found: PdfFile, marks: list[re.Match[bytes]]) -> None:
+    """Ends that no revision has, and no attached file either."""
+    inside = [(at, at + len(one.content)) for one in found.attachments if (at := found.content.find(one.content)) >= 0]
+    for mark in marks:
+        if mark.end() not in found.ends and not any(begin <= mark.start() < end for begin, end in inside):
+            found.problems.append((f"byte {mark.start()}", "has an end of a revision that nothing leads to"))
+
+
+@contextmanager
+def reading(where: str) -> Iterator[None]:
+    """Whatever a damaged file makes of the library that reads it, said in one sentence."""
+    from pypdf.errors import PyPdfError
+
+    quiet, level = logging.getLogger("pypdf"), logging.getLogger("pypdf").level
+    quiet.setLevel(logging.CRITICAL)
+    try:
+        yield
+    except CmmUqError:
+        raise
+    except (PyPdfError, ValueError, KeyError, TypeError, AttributeError, IndexError, AssertionError, ArithmeticError,
+            NotImplementedError, RecursionError, MemoryError, OSError) as error:  # fmt: skip
+        what = f"{type(error).__name__}: {error}"
+        raise CmmUqError(f"is a damaged PDF ({what})", where=where, fix=_FIX) from error
+    finally:
+        quiet.setLevel(level)
+
+
+def _read(found: PdfFile, where: str) -> None:
+    from pypdf import PdfReader
+
+    reader = PdfReader(io.BytesIO(found.content), strict=True)
+    if reader.is_encrypted or "/Encrypt" in reader.trailer:
+        raise CmmUqError("is encrypted, which no PDF of cmm-uq is", where=where, fix=_FIX)
+    _Walk(found, where).all(reader.trailer)
+    root: Any = reader.trailer["/Root"]
+    found.language = str(root.get("/Lang", ""))
+    found.information = {str(key): str(value) for key, value in (reader.metadata or {}).items()}
+    if "/Metadata" in root:
+        found.xmp = root["/Metadata"].get_object().get_data().decode("utf-8", "replace")
+    found.attachments = list(_attachments(found, root))
+    if len(reader.pages) > PDF_PAGES.most:
+        raise CmmUqError(f"has more than {PDF_PAGES.most} pages", where=where, fix=_FIX)
+    found.reader = reader
+
+
+class _Walk:
+    """Every object that can be reached, once."""
+
+    def __init__(self, found: PdfFile, where: str) -> None:
+        self._found, self._where, self._unpacked, self._seen = found, where, 0, set[tuple[int, int]]()
+
+    def all(self, trailer: Any) -> None:
+        """Follow references without recursing."""
+        from pypdf.generic import ArrayObject, DictionaryObject, IndirectObject, NameObject, StreamObject
+
+        waiting: list[tuple[str, Any]] = [("trailer", trailer)]
+        while waiting:
+            place, one = waiting.pop()
+            if isinstance(one, IndirectObject):
+                key = (one.idnum, one.generation)
+                if key in self._seen:
+                    continue
+                self._seen.add(key)
+                if len(self._seen) > PDF_OBJECTS.most:
+                    raise CmmUqError(f"has more than {PDF_OBJECTS.most} objects", where=self._where, fix=_FIX)
+                place, one = f"object {one.idnum}", one.get_object()
+            if isinstance(one, DictionaryObject):
+                if isinstance(one, StreamObject):
+                    self._unpack(place, one)
+                self._name(place, one)
+                waiting += [(place, value) for value in dict.values(one) if not isinstance(value, NameObject)]
+            elif isinstance(one, ArrayObject):
+                waiting += [(place, value) for value in list.__iter__(one)]
+
+    def _name(self, place: str, one: Any) -> None:
+        """What acts, hides, or is a note over the page."""
+        names = {*dict.keys(one), *(str(value) for value in dict.values(one) if isinstance(value, str))}
+        for name in sorted(names & ACTIVE):
+            self._problem(place, f"has {name}, which acts or leads out of the file")
+        for name in sorted(names & HIDING):
+            self._problem(place, f"has {name}, which shows something or not")
+        kind, subtype = one.get("/Type"), one.get("/Subtype")
+        if kind == "/Annot" and not (subtype == "/Widget" and one.get("/FT") == "/Sig") and subtype != "/Link":
+            self._problem(place, f"has a note of the kind {subtype} over the page")
+        if kind == "/Sig" or one.get("/FT") == "/Sig":
+            self._found.signatures += kind == "/Sig"
+        if "/F" in one and "/Filter" in one and kind != "/Filespec":
+            self._problem(place, "has a stream that lies in another file")
+
+    def _unpack(self, place: str, one: Any) -> None:
+        """A stream whole, up to the limit, with its checksum."""
+        packing = one.get("/Filter")
+        packing = (
+            [str(name) for name in packing] if isinstance(packing, list) else [] if packing is None else [str(packing)]
+        )
+        raw = one._data if isinstance(one._data, bytes) else bytes(one._data)
+        if packing not in ([], ["/FlateDecode"]) or one.get("/DecodeParms") is not None:
+            raise CmmUqError(f"packs a stream by {' '.join(packing)}, which no PDF of cmm-uq does",
+                             where=f"{self._where}: {place}", fix=_FIX)  # fmt: skip
+        if packing:
+            room = PDF_UNPACKED.most - self._unpacked
+            unpacking = zlib.decompressobj()
+            try:
+                data = unpacking.decompress(raw, room + 1)
+            except zlib.error as error:
+                raise CmmUqError(f"has a damaged stream ({error})", where=f"{self._where}: {place}", fix=_FIX) from None
+            self._unpacked += len(data)
+            if self._unpacked > PDF_UNPACKED.most:
+                raise CmmUqError(f"unpacks to more than {PDF_UNPACKED.most} bytes", where=self._where, fix=_FIX)
+            if not unpacking.eof or unpacking.unused_data.strip():
+                raise CmmUqError("has a damaged stream: it does not end where it must",
+                                 where=f"{self._where}: {place}", fix=_FIX)  # fmt: skip
+
+    def _problem(self, place: str, what: str) -> None:
+        if (place, what) not in self._found.problems:
+            self._found.problems.append((place, what))
+
+
+def _attachments(found: PdfFile, root: Any) -> Iterator[Attachment]:
+    """Embedded files; the list of the pages' files and that of names must be one."""
+    named: list[tuple[str, Any]] = []
+    names = root.get("/Names")
+    waiting = [names.get_object()["/EmbeddedFiles"]] if names and "/EmbeddedFiles" in names.get_object() else []
+    nodes = 0
+    while waiting:
+        node, nodes = waiting.pop().get_object(), nodes + 1
+        if nodes > 1000:
+            raise ValueError("the tree of names does not end")
+        pairs = node.get("/Names", [])
+        named += [(str(pairs[i]), pairs[i + 1].get_object()) for i in range(0, len(pairs) - 1, 2)]
+        waiting += list(reversed(node.get("/Kids", [])))
+    beside = [one.get_object() for one in root.get("/AF", [])]
+    if len(beside) != len(named) or any(all(one is not spec for one in beside) for _, spec in named):
+        found.problems.append(("catalogue", "lists other files in /AF than in /EmbeddedFiles"))
+    for key, spec in named:
+        name = str(spec.get("/UF", spec.get("/F", key)))
+        if not name == key == str(spec.get("/F", name)):
+            found.problems.append((f"attachment {key}", f"is called {name!r} as well"))
+        files = spec["/EF"].get_object()
+        stream = files.get("/F", files.get("/UF")).get_object()
+        if "/UF" in files and files["/UF"].get_object() is not stream:
+            found.problems.append((f"attachment {name}", "has two contents, one for each form of its name"))
+        content = stream.get_data()
+        told = _inner(stream, "/Params")
+        if "/Size" in told and int(told["/Size"]) != len(content):
+            found.problems.append((f"attachment {name}", f"has {len(content)} bytes, and {told['/Size']} are told"))
+        if (
+            "/CheckSum" in told
+            and bytes(told["/CheckSum"].original_bytes) != hashlib.md5(content, usedforsecurity=False).digest()
+        ):
+            found.problems.append((f"attachment {name}", "has another checksum than the PDF tells"))
+        yield Attachment(name, content, str(spec.get("/AFRelationship", "")).lstrip("/"))
+
+
+def _texts(found: PdfFile) -> Iterator[str]:
+    """Text of each page, as a reader copies it."""
+    until, where = monotonic() + SECONDS, found.where
+    for number, page in enumerate(found.reader.pages if found.reader else (), 1):
+        if _drawn(page, {}, ()) > PDF_DRAWN.most:
+            raise CmmUqError(
+                f"draws more than {PDF_DRAWN.most} bytes on a page", where=f"{where}: page {number}", fix=_FIX
+            )
+        contents = page.get_contents()
+        if contents is not None and _INVISIBLE.search(contents.get_data()):
+            found.problems.append((f"page {number}", "has text that is not painted as text"))
+        yield page.extract_text()
+        if monotonic() > until:
+            raise CmmUqError(f"takes longer than {SECONDS:.0f} s to read", where=f"{where}: page {number}", fix=_FIX)
+
+
+def _inner(one: Any, key: str) -> Any:
+    """A part of a dictionary, whatever refers to it; an empty one where there is none."""
+    return one[key] if key in one else {}  # noqa: SIM401 - get() of pypdf does not follow references
+
+
+def _drawn(page: Any, known: dict[int, int], above: tuple[int, ...]) -> int:
+    """Bytes of instructions that drawing takes, with forms within forms as often as they are drawn."""
+    forms = _inner(_inner(page, "/Resources"), "/XObject")
+    content = page.get_data() if hasattr(page, "get_data") else b""
+    if not content and "/Contents" in page:
+        content = page.get_contents().get_data()
+    total = len(content)
+    for match in _DO.finditer(content):
+        name = "/" + match[1].decode("latin-1")
+        if name not in forms or forms[name].get("/Subtype") != "/Form":
+            continue
+        form = forms[name]
+        key = id(form)
+        if key in above or len(above) > 40:
+            raise ValueError("a form is drawn within itself")
+        if key not in known:
+            known[key] = _drawn(form, known, (*above, key))
+        total = min(total + known[key], PDF_DRAWN.most + 1)
+    return total

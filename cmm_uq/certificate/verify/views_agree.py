@@ -1,0 +1,156 @@
+"""Whether PDF and HTML show the same text, in the same order, to the character.
+
+Both are views of one document. What a PDF has more is taken off first: the foot of every page, the banner at its head, the
+head of a table that goes on over pages, signs of lists. White space tells nothing: lines break elsewhere.
+"""
+
+from __future__ import annotations
+
+import html
+import re
+import unicodedata
+from collections.abc import Sequence
+
+from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.html_page import HtmlPage
+from cmm_uq.certificate.verify.pdf_file import PdfFile
+
+_NO_TEXT = re.compile(r"[\s\u00ad\u200b-\u200d\u2060\ufeff•—]+")
+"""What a view may have and the other not: white space, marks where words break, signs of lists and about the end."""
+
+MISSING = "□"
+"""In place of a character that a PDF's fonts lack."""
+
+_ANCHOR = 24
+"""Characters by which the views are brought together again behind a difference."""
+
+_MOST_SHOWN = 20
+_CONTEXT = 24
+
+
+def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tuple[str, str]) -> None:
+    """Keep every difference between the text of a PDF and that of a page.
+
+    Parameters
+    ----------
+    files : names of the PDF and of the HTML.
+    """
+    name, beside = files
+    banner = squashed(page.banner)
+    whole, count = squashed(page.text).removeprefix(banner), 0
+    replaced = any(MISSING in text for text in pdf.pages) and MISSING not in page.text
+    heads = sorted({squashed("".join(table.headings)) for table in page.tables} - {""}, key=len, reverse=True)
+    at = 0
+    for number, text in enumerate(pdf.pages, 1):
+        shown, foot = without_foot(squashed(text), squashed(page.title), number, len(pdf.pages))
+        if not foot:
+            inquiry.wrong("forms", name, f"page {number}", "has no foot with title, number and count of pages",
+                          text[-60:].strip(), page.title)  # fmt: skip
+        if not shown.startswith(banner):
+            inquiry.wrong("forms", name, f"page {number}", "does not begin with the banner", shown[:60], page.banner)
+        shown = shown.removeprefix(banner)
+        found, at = _differences(shown, whole, at, heads, replaced=replaced)
+        for stands, should in found:
+            count += 1
+            if count <= _MOST_SHOWN:
+                inquiry.wrong("forms", name, f"page {number}", f"says something else than {beside}", stands, should)
+    if at < len(whole):
+        inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
+    inquiry.looked("forms", len(pdf.pages))
+    _compare_information(inquiry, pdf, page, name)
+
+
+def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
+    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else.
+
+    Parameters
+    ----------
+    page : of this version of the package.
+    name : of its file.
+    """
+    from cmm_uq.certificate.html import style_sheet
+
+    inquiry.looked("files")
+    should = style_sheet(page.title, page.banner, page.language)
+    if page.style.strip() != should.strip():
+        inquiry.wrong("files", name, "style sheet", "is not that of the template")
+
+
+def squashed(text: str) -> str:
+    """Text without what tells nothing; letters composed of two are one."""
+    return _NO_TEXT.sub("", unicodedata.normalize("NFC", text))
+
+
+def without_foot(text: str, title: str, number: int, pages: int) -> tuple[str, bool]:
+    """Text of a page without its foot: title and number of the document, number of the page and count of pages."""
+    at = text.rfind(title)
+    rest = text[at + len(title) :] if at >= 0 else ""
+    if at < 0 or sorted(re.findall(r"\d+", rest)) != sorted((str(number), str(pages))) or len(rest) > 40:
+        return text, False
+    return text[:at], True
+
+
+def _differences(
+    text: str, whole: str, at: int, heads: Sequence[str], *, replaced: bool
+) -> tuple[list[tuple[str, str]], int]:  # fmt: skip
+    """What stands on a page and what should, and the place in the whole up to which they were compared."""
+    here, found = 0, list[tuple[str, str]]()
+    while here < len(text):
+        length = _alike(text, here, whole, at, replaced=replaced)
+        here, at = here + length, at + length
+        if here == len(text):
+            break
+        if head := next((one for one in heads if text.startswith(one, here) and here == 0), ""):
+            here += len(head)
+            continue
+        skipped, on = _together(text, here, whole, at)
+        before = text[max(0, here - _CONTEXT) : here]
+        found.append((before + text[here : here + skipped], before + whole[at:on]))
+        here, at = here + skipped, on
+    return found, at
+
+
+def _alike(text: str, here: int, whole: str, at: int, *, replaced: bool) -> int:
+    """Characters that are the same from two places on."""
+    length, most = 0, min(len(text) - here, len(whole) - at)
+    step = most
+    while step:
+        if (
+            length + step <= most
+            and text[here + length : here + length + step] == whole[at + length : at + length + step]
+        ):
+            length += step
+        elif replaced and length < most and text[here + length] == MISSING:
+            length += 1
+        else:
+            step //= 2
+    return length
+
+
+def _together(text: str, here: int, whole: str, at: int) -> tuple[int, int]:
+    """How much of the page is passed over, and the place in the whole where both go on alike."""
+    for skipped in range(min(2000, len(text) - here)):
+        piece = text[here + skipped : here + skipped + _ANCHOR]
+        found = whole.find(piece, at, at + 4000) if len(piece) >= min(_ANCHOR, len(text) - here) else -1
+        if found >= 0:
+            return skipped, found
+    return len(text) - here, at
+
+
+def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: str) -> None:
+    """Title, language, subject and author in the file's own information, which a reader's window shows."""
+    told = pdf.information
+    asked = [("/Title", page.title), ("/Author", page.metas.get("author", ""))]
+    subject = page.metas.get("description", "")
+    asked.append(("/Subject", f"{page.banner}. {subject}" if page.banner else subject))
+    for key, should in asked:
+        stands = told.get(key, "")
+        if " ".join(stands.split()) != " ".join(should.split()):
+            inquiry.wrong("forms", name, f"information {key}", "is not that of the document", stands, should)
+    for key, value in told.items():
+        words = "".join(value.split())
+        if not key.endswith("Date") and words not in "".join(html.unescape(pdf.xmp).split()):
+            inquiry.wrong("forms", name, f"information {key}", "does not stand in the metadata", "", value)
+    if pdf.language.lower() != page.language.lower():
+        inquiry.wrong("forms", name, "language", "is not that of the document", pdf.language, page.language)
+    inquiry.looked("forms", 4)

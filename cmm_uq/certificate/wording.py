@@ -1,0 +1,150 @@
+"""Figures as a certificate states them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded
+
+if TYPE_CHECKING:
+    from cmm_uq.analysis.conformity.statement import Statement
+    from cmm_uq.certificate.result import Result
+    from cmm_uq.machine.physics.effect import Effect
+
+OUTCOME_WORDS: Mapping[str, Text] = {
+    "pass": say("pass"), "fail": say("fail"), "undecided": say("undecided"), "incomplete": say("incomplete"),
+    "conditional pass": say("conditional pass"), "conditional fail": say("conditional fail"), "remeasure": say("remeasure"),
+}  # fmt: skip
+"""What a statement of conformity comes to, in a table."""
+
+
+NO_FACTOR = say("–")
+"""In place of a coverage factor that would mean nothing."""
+
+_ONE_HILL = 1.6
+"""Least U/u of a distribution with one hill: a rectangle has 1.645. A smaller one has several, between which nothing lies."""
+
+
+def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
+    """Value, expanded uncertainty and coverage factor, as text.
+
+    The expanded uncertainty is given to two significant digits; the factor where U/u is one. What has one side, as a range
+    near zero, is its interval, without the other two.
+    """
+    if quantity.one_sided:
+        return (interval_of(quantity), NO_FACTOR, NO_FACTOR)
+    value, uncertainty = rounded(quantity.value, quantity.expanded)
+    k = quantity.coverage_factor
+    return (value, uncertainty, (NO_FACTOR if k is None or k < _ONE_HILL else number(k, ".2f")))
+
+
+def interval_of(quantity: Quantity) -> Text:
+    """Its 95 % interval, to the digits of U."""
+    low, high = (rounded(end, quantity.expanded)[0] for end in quantity.interval95)
+    return say("{low} to {high}", low=low, high=high)
+
+
+def with_uncertainty(quantity: Quantity) -> Text:
+    """Value ± U, or the interval of what has one side; its unit follows."""
+    value, U, _ = expanded(quantity)
+    return value if quantity.one_sided else say("{value} ± {U}", value=value, U=U)
+
+
+CERTAIN = 1e-4
+"""A probability nearer to 0 or 1 than this is printed as less or more than it."""
+
+
+def probability(p: float) -> Text:
+    """A probability in per cent that never claims certainty."""
+    if p < CERTAIN:
+        return say("<\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
+    if p > 1 - CERTAIN:
+        return say(">\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
+    digits = 2 if p < 0.5 else 3 if p < 0.999 else 4
+    return say("{p}\u00a0%", p=number(100 * p, f".{digits}g"))
+
+
+def measured(statement: Statement) -> tuple[Text, Text]:
+    """Value that a statement names and its expanded uncertainty (k = 2), as text; the latter empty where none is known."""
+    if statement.u_um > 0:
+        return rounded(statement.value_um, 2 * statement.u_um)
+    return (number(statement.value_um, ".4g"), NOTHING)
+
+
+def stated_value(value: float, U: float | None, *, signed: bool) -> Text:
+    """Value ± U; of a size that is never negative (``signed`` false) and may be zero, its interval."""
+    if not U:
+        return number(value, ".4g")
+    shown, expanded_ = rounded(value, U)
+    if not signed and value < U:
+        return say("{low} to {high}", low=rounded(0.0, U)[0], high=rounded(value + U, U)[0])
+    return say("{value} ± {U}", value=shown, U=expanded_)
+
+
+def stated_row(outcome: str, value: Text, unit: Text, limit: float | None = None) -> Text:
+    """A statement of conformity in a line: outcome, value with what it is known to, limit."""
+    word = OUTCOME_WORDS.get(outcome, say("undecided"))
+    if limit is None:
+        return say("{outcome}: {value} {unit}", outcome=word, value=value, unit=unit)
+    return say("{outcome}: {value} {unit}, limit {limit} {unit}", outcome=word, value=value, unit=unit,
+               limit=limit_in_full(limit))  # fmt: skip
+
+
+def title_of(key: tuple[str, str], result: Result) -> Text:
+    """A parameter in words: ``Squareness X–Y``."""
+    owner, name = key
+    if owner == ARTEFACT:
+        return next(size.title for size in result.artefact.sizes if size.name == name)
+    return title_of_parameter(next(effect for effect in result.model.effects if effect.name == owner), name)
+
+
+def title_of_parameter(effect: Effect, name: str) -> Text:
+    """A parameter of an effect in words: the effect alone where it has no other."""
+    return (
+        effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
+    )
+
+
+def refusal(error: CmmUqError) -> Text:
+    """Why something has no solution, as the error says it."""
+    parts = (Verbatim(error.where or ""), foreign(error.problem), foreign(error.fix or ""))
+    where, problem, fix = parts
+    told = say("{where}: {problem}. {fix}", where=where, problem=problem, fix=fix)
+    return told if told == str(error) else Verbatim(str(error))
+
+
+def numbered(measurement: int, repeat: int | None) -> Text:
+    """A measurement by its number, with that of its repeat where there are several: ``12 (2)``."""
+    if repeat is None:
+        return number(measurement)
+    return say("{measurement} ({repeat})", measurement=measurement, repeat=repeat)
+
+
+def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, spec: str = ".1f") -> Text:
+    """The sentence in place of a picture of deviations: their range as recorded, and after the fitted model.
+
+    Parameters
+    ----------
+    what : deviates, with a verb: ``12 lengths: as recorded they deviate``.
+    reference : from what; or nothing.
+    before_um, after_um : deviations, µm.
+    spec : of the figures.
+    """
+    low, high, low_after, high_after = (
+        number(float(end), spec) for end in (before_um.min(), before_um.max(), after_um.min(), after_um.max())
+    )
+    if reference:
+        return say(
+            "{what} by {low} to {high} µm {reference}; after the fitted model {low_after} to {high_after} µm remain.",
+            what=what, reference=reference, low=low, high=high, low_after=low_after, high_after=high_after,
+        )  # fmt: skip
+    return say(
+        "{what} by {low} to {high} µm; after the fitted model {low_after} to {high_after} µm remain.",
+        what=what, low=low, high=high, low_after=low_after, high_after=high_after,
+    )  # fmt: skip

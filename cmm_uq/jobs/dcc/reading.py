@@ -1,0 +1,201 @@
+"""A DCC read: every element is of the schema, in its order and of its type; whatever is not is told with line and XPath.
+
+Of schema 3.2.1 everything is read. Of other versions 3, what they have beyond it is left out; :func:`unread` lists it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, cast
+
+from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
+from cmm_uq.jobs.dcc.certificate import VERSION, Certificate, Comment
+from cmm_uq.jobs.dcc.checks import ids_and_references, problems_of
+from cmm_uq.jobs.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, Part, by_tag, fields_of
+from cmm_uq.jobs.dcc.simple import Simple
+from cmm_uq.jobs.dcc.texts import Markup
+from cmm_uq.jobs.dcc.tree import Node, parsed
+
+ROOT = "dcc:digitalCalibrationCertificate"
+_ANYTHING = (Markup, Comment)
+"""Classes whose children may be of any name."""
+
+_IGNORED = ("xsi:schemaLocation", "xsi:noNamespaceSchemaLocation", "xsi:type")
+
+
+def read(data: bytes, where: str) -> Certificate:
+    """The certificate of a file.
+
+    Parameters
+    ----------
+    data : of the file.
+    where : its name, for messages.
+
+    Raises
+    ------
+    CmmUqError : it is no XML, no DCC, or breaks the schema; ``also`` says what else.
+    """
+    root = _root(data, where)
+    reader = _Reader(where, strict=root.attributes.get("schemaVersion") == VERSION)
+    found = reader.read(root, Certificate)
+    reader.connected(root)
+    reader.gathered.refuse()
+    return cast("Certificate", found)
+
+
+def unread(data: bytes, where: str) -> tuple[str, ...]:
+    """XPaths of what a certificate of another version of the schema has, and is left out by :func:`read`.
+
+    Raises
+    ------
+    CmmUqError : as of :func:`read`.
+    """
+    reader = _Reader(where, strict=False)
+    reader.read(_root(data, where), Certificate)
+    reader.gathered.refuse()
+    return tuple(reader.unread)
+
+
+def _root(data: bytes, where: str) -> Node:
+    root = parsed(data, where)
+    if root.tag != ROOT:
+        raise CmmUqError(
+            f"is no DCC: its root is {root.tag}", where=f"{where}, line {root.line}", fix=f"A DCC is a {ROOT}"
+        )
+    return root
+
+
+class _Reader:
+    """Reads classes from elements; what is wrong is gathered."""
+
+    def __init__(self, where: str, *, strict: bool) -> None:
+        self.where, self.strict = where, strict
+        self.gathered, self.wrong = Gathered(), 0
+        self.unread: list[str] = []
+
+    def read(self, node: Node, cls: type[Part]) -> Any:
+        """An element as a class; None where something of it is wrong."""
+        fields, before = fields_of(cls), self.wrong
+        children = self._sorted(node, cls)
+        self._attributes(node, fields)
+        values = {field.name: self._value(node, field, children[i]) for i, field in enumerate(fields)}
+        if self.wrong > before:
+            return None
+        part = cls(**{name: value for name, value in values.items() if value is not None})
+        for problem, fix in problems_of(part):
+            self._wrong(node, problem, fix)
+        return part
+
+    def connected(self, root: Node) -> None:
+        """Look at what refers to what."""
+        for node, (problem, fix) in ids_and_references(root):
+            self._wrong(node, problem, fix)
+
+    def _sorted(self, node: Node, cls: type[Part]) -> list[list[Node]]:
+        """Children by the field that they belong to, in the order of the schema."""
+        fields, places = fields_of(cls), by_tag(cls)
+        rest = next((i for i, field in enumerate(fields) if isinstance(field.place, Foreign)), None)
+        found: list[list[Node]] = [[] for _ in fields]
+        last, ordered = -1, not cls.UNORDERED
+        for child in node.children:
+            index = places.get(child.tag)
+            if index is None and rest is not None and (cls in _ANYTHING or child.tag == "ds:Signature"):
+                index = rest
+            if index is None:
+                self._unknown(child, list(places))
+                continue
+            if ordered and index < last:
+                self._wrong(
+                    child, f"{child.tag} stands behind what has to follow it", "The order is that of the schema"
+                )
+            last = max(last, index)
+            found[index].append(child)
+        if node.children and node.text.strip():
+            self._wrong(node, f"{node.tag} has text between its elements", "Elements only")
+        return found
+
+    def _value(self, node: Node, field: Field, children: Sequence[Node]) -> Any:
+        """Of one field; None for the default."""
+        place = field.place
+        if isinstance(place, Attribute):
+            text = node.attributes.get(place.tag)
+            return None if text is None else self._simple(node, place.simple, text, f"@{place.tag}")
+        if isinstance(place, Content):
+            return self._simple(node, place.simple, node.text)
+        if isinstance(place, Foreign):
+            return tuple(children)
+        return self._elements(node, field, list(self._inner(field, children)))
+
+    def _inner(self, field: Field, children: Sequence[Node]) -> Iterator[Node]:
+        """The elements of a field, out of the element that they stand in together."""
+        if not (isinstance(field.place, Many) and field.place.within):
+            yield from children
+            return
+        self._once(children)
+        for outer in children:
+            for child in outer.children:
+                if child.tag in field.tags:
+                    yield child
+                else:
+                    self._unknown(child, list(field.tags))
+            if not any(child.tag in field.tags for child in outer.children):
+                self._wrong(outer, f"{outer.tag} is empty", f"It holds {', '.join(field.tags)}")
+
+    def _elements(self, node: Node, field: Field, children: list[Node]) -> Any:
+        if field.required and not children and self._held(node, field):
+            self._wrong(node, f"{node.tag} has no {' or '.join(field.outer)}", "The schema asks for it")
+        if field.repeated:
+            return tuple(self._one(child, field) for child in children)
+        self._once(children)
+        return self._one(children[0], field) if children else None
+
+    def _held(self, node: Node, field: Field) -> bool:
+        """Whether an empty outer element was not told of already."""
+        return not any(child.tag in field.outer for child in node.children)
+
+    def _once(self, children: Sequence[Node]) -> None:
+        if len(children) > 1:
+            self._wrong(children[1], f"{children[1].tag} is there {len(children)} times", "Once, or not at all")
+
+    def _one(self, child: Node, field: Field) -> Any:
+        cls = field.tags[child.tag]
+        if cls is not None:
+            return self.read(child, cls)
+        for inner in child.children:
+            self._unknown(inner, [])
+        place = field.place
+        simple = None if isinstance(place, Foreign | Choice | Content) else place.simple
+        return None if simple is None else self._simple(child, simple, child.text)
+
+    def _simple(self, node: Node, simple: Simple, text: str, which: str = "") -> Any:
+        try:
+            return simple.read(text)
+        except (ValueError, KeyError, OverflowError):
+            self._wrong(node, f"{which or node.tag} {text[:60]!r} is not {simple.what}", "As the schema has it")
+            return None
+
+    def _attributes(self, node: Node, fields: Sequence[Field]) -> None:
+        known = [field.place.tag for field in fields if isinstance(field.place, Attribute)]
+        for name in node.attributes:
+            if name in known or name in _IGNORED:
+                continue
+            if self.strict:
+                self._wrong(
+                    node, f"{node.tag} has no attribute {name}", suggestion(name, known) if known else "Take it out"
+                )
+            else:
+                self.unread.append(f"{node.xpath}/@{name}")
+        for field in fields:
+            place = field.place
+            if isinstance(place, Attribute) and place.tag == "schemaVersion" and place.tag not in node.attributes:
+                self._wrong(node, f"{node.tag} has no attribute {place.tag}", "The schema asks for it")
+
+    def _unknown(self, node: Node, known: list[str]) -> None:
+        if self.strict or not known:
+            self._wrong(node, f"{node.tag} has no place here", suggestion(node.tag, known) if known else "Text only")
+        else:
+            self.unread.append(node.xpath)
+
+    def _wrong(self, node: Node, problem: str, fix: str) -> None:
+        self.wrong += 1
+        self.gathered.add(CmmUqError(problem, where=f"{self.where}, line {node.line}, {node.xpath}", fix=fix))

@@ -1,0 +1,104 @@
+"""A certificate against the XML schema of PTB, by the xmlschema package: a second opinion, where the schema is at hand.
+
+The schema is not part of this package (LGPL). A folder has it as ``dcc-3.2.1.xsd`` and ``SI_Format-2.1.0.xsd``, and further
+versions beside them; what it imports is looked up there, and xmldsig-core in the xmlschema package: nothing is fetched.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.dcc.tree import parsed
+
+_MOST = 20
+"""Problems that are told."""
+
+_IMPORT = re.compile(r'namespace="([^"]+)"\s+schemaLocation="([^"]+)"')
+
+
+def checked_by_schema(data: bytes, folder: Path, where: str) -> None:
+    """Refuse a certificate that the schema of its version refuses.
+
+    Parameters
+    ----------
+    data : of the file.
+    folder : with the schemas.
+    where : name of the file, for messages.
+
+    Raises
+    ------
+    CmmUqError : it breaks the schema, the folder has none of its version, or xmlschema is not installed.
+    """
+    version = parsed(data, where).attributes.get("schemaVersion", "")
+    schema = _schema(folder, version, where)
+    import defusedxml.ElementTree
+
+    root = defusedxml.ElementTree.fromstring(data)
+    errors = [error for error, _ in zip(schema.iter_errors(root), range(_MOST), strict=False)]
+    if errors:
+        found = [
+            CmmUqError(
+                str(error.reason), where=f"{where}, {error.path}", fix=f"The schema of DCC {version} asks for it"
+            )
+            for error in errors
+        ]
+        found[0].also = tuple(found[1:])
+        raise found[0]
+
+
+@cache
+def _schema(folder: Path, version: str, where: str) -> Any:
+    try:
+        import xmlschema
+    except ImportError:
+        raise CmmUqError(
+            "the package xmlschema is not installed",
+            where="--schema",
+            fix="pip install xmlschema, or leave --schema out",
+        ) from None
+    file = folder / f"dcc-{version}.xsd"
+    if not re.fullmatch(r"3\.\d+\.\d+", version) or not file.is_file():
+        raise CmmUqError(
+            f"no schema of DCC {version}", where=str(file), fix=f"Put PTB's dcc.xsd there; {where} is of that version"
+        )
+    places = {**_beside(folder), "http://www.w3.org/2000/09/xmldsig#": _dsig(xmlschema)}
+    text = file.read_text(encoding="utf-8")
+    for space, location in _IMPORT.findall(text):
+        wanted = _of_version(folder, space, location) or places.get(space)
+        if wanted is None:
+            raise CmmUqError(
+                f"imports {location}, which is not beside it", where=str(file), fix="Put it into the same folder"
+            )
+        text = text.replace(f'"{location}"', f'"{Path(wanted).as_uri()}"')
+    beside = {"http://qudt.org/vocab/": str(folder / "qudt.xsd")} if (folder / "qudt.xsd").is_file() else None
+    try:
+        return xmlschema.XMLSchema(text, base_url=str(folder), locations=beside, allow="local", defuse="always")
+    except xmlschema.XMLSchemaException as error:
+        problem = str(error).strip().partition("\n")[0]
+        raise CmmUqError(
+            f"cannot be used: {problem}", where=str(file), fix="What it imports has to be in the same folder"
+        ) from None
+
+
+def _beside(folder: Path) -> dict[str, Path]:
+    """The newest schema of D-SI in the folder."""
+    found = sorted(folder.glob("SI_Format-*.xsd"))
+    return {"https://ptb.de/si": found[-1]} if found else {}
+
+
+def _of_version(folder: Path, space: str, location: str) -> Path | None:
+    """The file of an imported schema by the version in its address."""
+    version = re.search(r"v(\d+\.\d+\.\d+)", location)
+    if space != "https://ptb.de/si" or version is None:
+        return None
+    file = folder / f"SI_Format-{version[1]}.xsd"
+    return file if file.is_file() else None
+
+
+def _dsig(xmlschema: Any) -> Path:
+    """The schema of XML signatures that the xmlschema package has."""
+    return Path(xmlschema.__file__).parent / "schemas" / "DSIG" / "xmldsig-core-schema.xsd"

@@ -1,0 +1,193 @@
+"""XML as a tree of elements with their lines, and back: no DTD, no entities, nothing from elsewhere, within limits.
+
+Names of the namespaces of a DCC carry the prefix they commonly have, ``dcc:name``; others stand as ``{namespace}name``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import NoReturn
+from xml.parsers import expat
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import DCC_BYTES, XML_ATTRIBUTES, XML_DEPTH, XML_ELEMENTS
+
+NAMESPACES: Mapping[str, str] = {
+    "dcc": "https://ptb.de/dcc",
+    "si": "https://ptb.de/si",
+    "ds": "http://www.w3.org/2000/09/xmldsig#",
+    "xsi": "http://www.w3.org/2001/XMLSchema-instance",
+}
+"""By prefix."""
+
+_PREFIXES = {uri: prefix for prefix, uri in NAMESPACES.items()}
+_ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that no XML 1.0 can hold."""
+
+
+class Node:
+    """An element.
+
+    Parameters
+    ----------
+    tag : its name, ``prefix:name``.
+    attributes : by name.
+    line : of its start; 0 where it was not read.
+    parent : that it stands in.
+    """
+
+    __slots__ = ("attributes", "children", "line", "parent", "tag", "text")
+
+    def __init__(self, tag: str, attributes: Mapping[str, str], line: int = 0, parent: Node | None = None) -> None:
+        self.tag, self.attributes, self.line, self.parent = tag, dict(attributes), line, parent
+        self.children: list[Node] = []
+        self.text = ""
+
+    def __eq__(self, other: object) -> bool:
+        mine = (self.tag, self.attributes, self.text.strip(), self.children)
+        return isinstance(other, Node) and mine == (other.tag, other.attributes, other.text.strip(), other.children)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def xpath(self) -> str:
+        """Where it stands, ``/dcc:a/dcc:b[2]``."""
+        if self.parent is None:
+            return f"/{self.tag}"
+        alike = [child for child in self.parent.children if child.tag == self.tag]
+        place = f"[{next(i for i, child in enumerate(alike, 1) if child is self)}]" if len(alike) > 1 else ""
+        return f"{self.parent.xpath}/{self.tag}{place}"
+
+    def walk(self) -> Iterator[Node]:
+        """Itself and all below it, in the order of the file."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+
+def parsed(data: bytes, where: str) -> Node:
+    """The root of a file.
+
+    Raises
+    ------
+    CmmUqError : it is no XML, has a document type, or passes a limit.
+    """
+    if len(data) > DCC_BYTES.most:
+        raise CmmUqError(f"is larger than {DCC_BYTES.most} {DCC_BYTES.unit}", where=where, fix="Is it the right file?")
+    grown = _Growing(where)
+    try:
+        grown.parser.Parse(data, True)
+    except expat.ExpatError as error:
+        what = expat.errors.messages[error.code]
+        raise CmmUqError(f"is no XML: {what}", where=f"{where}, line {error.lineno}", fix="Ask for it again") from None
+    except (ValueError, LookupError) as error:
+        raise CmmUqError(f"is no XML: {error}", where=where, fix="Ask for it again") from None
+    return grown.root
+
+
+class _Growing:
+    """The tree while it is read."""
+
+    def __init__(self, where: str) -> None:
+        self.where, self.count, self.depth = where, 0, 0
+        self.open: list[Node] = []
+        self.root = Node("", {})
+        self.parser = parser = expat.ParserCreate(namespace_separator=" ")
+        parser.buffer_text = True
+        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
+        parser.CharacterDataHandler = self._text
+        parser.StartDoctypeDeclHandler = self._doctype
+
+    def _start(self, name: str, attributes: dict[str, str]) -> None:
+        self.count += 1
+        for found, limit in (
+            (self.count, XML_ELEMENTS),
+            (len(self.open), XML_DEPTH),
+            (len(attributes), XML_ATTRIBUTES),
+        ):
+            if found > limit.most:
+                self._refuse(f"has more than {limit.most} {limit.unit}")
+        parent = self.open[-1] if self.open else None
+        named = {_named(key): value for key, value in attributes.items()}
+        node = Node(_named(name), named, self.parser.CurrentLineNumber, parent)
+        if parent is None:
+            self.root = node
+        else:
+            parent.children.append(node)
+        self.open.append(node)
+
+    def _end(self, name: str) -> None:
+        self.open.pop()
+
+    def _text(self, text: str) -> None:
+        node = self.open[-1]
+        node.text = node.text + text if node.text else text
+
+    def _doctype(self, *declared: object) -> None:
+        self._refuse("has a document type (DOCTYPE), which can pull in other files")
+
+    def _refuse(self, problem: str) -> NoReturn:
+        line = self.parser.CurrentLineNumber
+        raise CmmUqError(problem, where=f"{self.where}, line {line}", fix="A certificate is XML without that")
+
+
+def _named(name: str) -> str:
+    space, _, local = name.rpartition(" ")
+    if not space:
+        return local
+    return f"{_PREFIXES[space]}:{local}" if space in _PREFIXES else f"{{{space}}}{local}"
+
+
+def serialised(root: Node) -> bytes:
+    """A file of a tree: UTF-8, two spaces a level, the same bytes for the same tree.
+
+    Raises
+    ------
+    CmmUqError : a text holds a character that no XML can.
+    """
+    declared = {f"xmlns:{prefix}": uri for prefix, uri in NAMESPACES.items() if prefix != "ds"}
+    parts = ['<?xml version="1.0" encoding="UTF-8"?>\n']
+    _write(root, declared, "", parts)
+    return "".join(parts).encode()
+
+
+def _write(node: Node, declared: Mapping[str, str], indent: str, parts: list[str]) -> None:
+    tag, further = _spelled(node.tag)
+    attributes = "".join(f' {key}="{_quoted(value)}"' for key, value in {**declared, **further}.items())
+    for key, value in node.attributes.items():
+        name, more = _spelled(key, "a")
+        attributes += "".join(f' {k}="{_quoted(v)}"' for k, v in more.items()) + f' {name}="{_quoted(value)}"'
+    if node.children:
+        parts.append(f"{indent}<{tag}{attributes}>\n")
+        if node.text.strip():
+            parts.append(_escaped(node.text.strip()) + "\n")
+        for child in node.children:
+            _write(child, {}, indent + "  ", parts)
+        parts.append(f"{indent}</{tag}>\n")
+    elif node.text:
+        parts.append(f"{indent}<{tag}{attributes}>{_escaped(node.text)}</{tag}>\n")
+    else:
+        parts.append(f"{indent}<{tag}{attributes}/>\n")
+
+
+def _spelled(name: str, prefix: str = "o") -> tuple[str, dict[str, str]]:
+    """A name with a prefix, and the declaration that the prefix needs here."""
+    if name.startswith("{"):
+        space, _, local = name[1:].rpartition("}")
+        return f"{prefix}:{local}", {f"xmlns:{prefix}": space}
+    known = name.partition(":")[0]
+    return name, {"xmlns:ds": NAMESPACES["ds"]} if known == "ds" else {}
+
+
+def _escaped(text: str) -> str:
+    found = _ILLEGAL.search(text)
+    if found:
+        raise CmmUqError(
+            f"{found[0]!r} is a character that XML cannot hold", fix="Take it out of the text it stands in"
+        )
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\r", "&#13;")
+
+
+def _quoted(text: str) -> str:
+    return _escaped(text).replace('"', "&quot;").replace("\n", "&#10;").replace("\t", "&#9;")

@@ -1,0 +1,305 @@
+"""When an error will first be beyond its limit: the whole distribution of the day, perhaps never.
+
+Paths are drawn from the state after the last certificate on a grid of days. Between two days a path without a step is a
+Brownian bridge, whose probability of touching a limit is known (Karatzas and Shreve 1991, section 4.3), so that nothing is
+lost between them; the probabilities are averaged. The random numbers are fixed: the same history gives the same days.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import date
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.laboratory.due.drift import (
+    HORIZON,
+    PARTS,
+    YEAR,
+    History,
+    RecordedSeries,
+    SideBySide,
+    history,
+    side_by_side,
+)
+from cmm_uq.laboratory.due.drift_filter import Filtered, filtered
+from cmm_uq.laboratory.due.drift_prior import Prior, default_prior, limit_for
+
+
+def grid(gaps: int) -> Floats:
+    """Days after the last certificate, (gaps + 1,): none, a week, and as many times further each up to the horizon."""
+    return np.concatenate([[0.0], np.geomspace(7.0, HORIZON * YEAR, gaps)])
+
+
+DAYS, FINE = grid(48), grid(160)
+"""A sixth further each, for many machines whose dates are wide; a twentieth, for one."""
+
+PATHS = 2048
+_AT_ONCE = 2_000_000
+_SEED = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Of N machines.
+
+    Attributes
+    ----------
+    last : (N,) ordinal of each machine's last certificate, or of an adjustment after it.
+    days, probability : (G,) and (N, G), of having been beyond the limit at some time until so many days after it.
+    level, u_level : (N,) the error at the last certificate, given all certificates, and its standard uncertainty.
+    rate, u_rate : (N,) per year.
+    """
+
+    last: Floats
+    days: Floats
+    probability: Floats
+    level: Floats
+    u_level: Floats
+    rate: Floats
+    u_rate: Floats
+
+    @staticmethod
+    def joined(parts: Sequence[Crossings]) -> Crossings:
+        """Of the machines of all parts."""
+        last, *rest = (
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("last", "probability", "level", "u_level", "rate", "u_rate")
+        )
+        return Crossings(last, parts[0].days, *rest)
+
+    def one(self, i: int) -> Crossing:
+        """Of one machine."""
+        return Crossing(
+            date.fromordinal(int(self.last[i])), self.days, self.probability[i], float(self.level[i]), float(self.u_level[i]),
+            float(self.rate[i]), float(self.u_rate[i]),
+        )  # fmt: skip
+
+    def by(self, days: Floats) -> Floats:
+        """Probability of having crossed by so many days after the last certificate, (N,)."""
+        logs = _log_survival(self.probability)
+        found = [
+            np.interp(day, self.days, row) for day, row in zip(np.broadcast_to(days, len(logs)), logs, strict=True)
+        ]
+        return np.asarray(-np.expm1(found), dtype=np.float64)
+
+    def quantile(self, part: float) -> Floats:
+        """Days after the last certificate by which the probability is ``part``, (N,); infinite beyond the horizon."""
+        return np.array([_quantile(self.days, row, np.log1p(-part)) for row in _log_survival(self.probability)])
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """Of one machine.
+
+    Attributes
+    ----------
+    last : day of the last certificate, or of an adjustment after it: from here on is looked ahead.
+    days, probability : (G,) of having crossed until so many days after it.
+    level, u_level, rate, u_rate : the error then and its rate per year, with standard uncertainties.
+    """
+
+    last: date
+    days: Floats
+    probability: Floats
+    level: float
+    u_level: float
+    rate: float
+    u_rate: float
+
+    @property
+    def already(self) -> float:
+        """Probability that the error was beyond the limit at the last certificate."""
+        return float(self.probability[0])
+
+    def by(self, day: date) -> float:
+        """Probability that the error has been beyond the limit by a day."""
+        return self.after(max(float(day.toordinal() - self.last.toordinal()), 0.0))
+
+    def after(self, days: float) -> float:
+        """The same by so many days after the last certificate."""
+        return float(-np.expm1(np.interp(days, self.days, _log_survival(self.probability))))
+
+    def quantile(self, part: float) -> date | None:
+        """Day by which the limit is crossed with a probability; None where that is beyond the horizon."""
+        days = _quantile(self.days, _log_survival(self.probability), np.log1p(-part))
+        return date.fromordinal(self.last.toordinal() + int(days)) if np.isfinite(days) else None
+
+    def interval(self, coverage: float = 0.9) -> tuple[date | None, date | None]:
+        """Days between which the limit is crossed with a probability, as much before as after them."""
+        return self.quantile((1 - coverage) / 2), self.quantile((1 + coverage) / 2)
+
+    def data(self) -> dict[str, Any]:
+        """For other programs: days, ``None`` beyond the horizon, and probabilities."""
+        dates = {f"day_{round(100 * part)}": self.quantile(part) for part in PARTS}
+        return {
+            "last": self.last.isoformat(), **{name: day.isoformat() if day else None for name, day in dates.items()},
+            "already": self.already, "within_a_year": self.after(YEAR),
+        }  # fmt: skip
+
+
+def crossing(
+    series: RecordedSeries | History,
+    limit: float,
+    prior: Prior | None = None,
+    *,
+    one_sided: bool = False,
+    paths: int = PATHS,
+) -> Crossing:
+    """When one machine's error will first be beyond its limit.
+
+    Parameters
+    ----------
+    series : of the records, or a history.
+    limit : the error conforms while |error| ≤ limit, or error ≤ limit.
+    prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_prior.FleetPrior.prior`), or none.
+    one_sided : only what is above the limit is beyond it.
+    paths : how many are drawn.
+
+    Raises
+    ------
+    CmmUqError : a limit that is not positive, or a history that cannot be used.
+    """
+    if not (np.isfinite(limit) and limit > 0):
+        raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
+    known = series if isinstance(series, History) else history(series)
+    prior = prior or default_prior(limit_for(limit, known.u))
+    machines = side_by_side([known])
+    many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, paths=paths, days=FINE)
+    return many.one(0)
+
+
+def crossings(
+    machines: SideBySide, prior: Prior, state: Filtered, limit: Floats | float, *, one_sided: bool = False,
+    paths: int = PATHS, until: float = HORIZON * YEAR, days: Floats = DAYS,
+) -> Crossings:  # fmt: skip
+    """When the errors of many machines will be.
+
+    Parameters
+    ----------
+    machines, prior, state : histories, nodes, and what :func:`filtered` made of them.
+    limit : (N,) or one of all.
+    one_sided : see :func:`crossing`.
+    paths : drawn for each machine.
+    until : days to look ahead where less than the horizon does; later probabilities are those of that day.
+    days : a :func:`grid`.
+    """
+    N = len(machines)
+    flat = _States.of(state, prior)
+    limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), N)
+    chunk = max(1, _AT_ONCE // (paths * 8))
+    numbers, ahead = _numbers(paths, len(days) - 1), days[: 1 + int(np.searchsorted(days, until))]
+    found = [_probabilities(flat, np.arange(i, min(i + chunk, N)), limits, one_sided, numbers, ahead)
+             for i in range(0, N, chunk)]  # fmt: skip
+    mean = (flat.weight * flat.mean).sum(axis=-1)
+    u = np.sqrt((flat.weight * (flat.variance + (flat.mean - mean[..., None]) ** 2)).sum(axis=-1))
+    probability = np.concatenate(found)
+    probability = np.pad(probability, [(0, 0), (0, len(days) - probability.shape[1])], mode="edge")
+    return Crossings(machines.last, days, probability, mean[0], u[0], mean[1], u[1])
+
+
+@dataclass(frozen=True, eq=False)
+class _States:
+    """Level and rate of N machines in each of C nodes and tales: mean and variance (2, N, C), covariance and weight (N, C)."""
+
+    mean: Floats
+    variance: Floats
+    covariance: Floats
+    weight: Floats
+    node: Ints
+    prior: Prior
+
+    @staticmethod
+    def of(state: Filtered, prior: Prior) -> _States:
+        """From what the filter left."""
+        N, K, M = state.log_weight.shape
+        C = K * M
+        matrix = state.covariance
+        return _States(
+            state.mean[:2].reshape(2, N, C), np.stack([matrix[0, 0], matrix[1, 1]]).reshape(2, N, C),
+            matrix[0, 1].reshape(N, C), state.weights(prior).reshape(N, C), np.repeat(np.arange(K), M), prior,
+        )  # fmt: skip
+
+
+@lru_cache(maxsize=3)
+def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Of each path: where it stands in the weights, numbers for its state, and for each gap of the grid for walk and steps.
+
+    The first two are a lattice in three dimensions (Roberts 2018); a normal number of the walk has its mirror image in another
+    path; steps take a uniform number and a normal one.
+    """
+    n = np.arange(paths)
+    root = 1.324717957244746  # of x³ = x + 1, for two dimensions beside an even one
+    state = special.ndtri((0.5 + np.outer(n + 1, root ** -np.arange(1.0, 3.0))) % 1.0)
+    random = np.random.default_rng(_SEED)
+    half = random.standard_normal((paths // 2 + 1, gaps))
+    walk = np.concatenate([half, -half])[:paths][random.permutation(paths)]
+    return (
+        (n + 0.5) / paths,
+        state,
+        walk,
+        np.stack([random.random((paths, gaps)), random.standard_normal((paths, gaps))]),
+    )
+
+
+def _probabilities(
+    states: _States, which: Ints, limits: Floats, one_sided: bool, numbers: tuple[Floats, ...], days: Floats
+) -> Floats:
+    """Of having crossed by each day of the grid, for some machines."""
+    place, normal, walk, stepping = numbers
+    cumulated = np.cumsum(states.weight[which], axis=1)
+    chosen = np.stack([np.searchsorted(row / row[-1], place) for row in cumulated])
+    chosen = np.minimum(chosen, cumulated.shape[1] - 1)
+    mean, variance = states.mean[:, which[:, None], chosen], states.variance[:, which[:, None], chosen]
+    level = mean[0] + np.sqrt(variance[0]) * normal[:, 0]
+    slope = states.covariance[which[:, None], chosen] / variance[0]
+    left = np.maximum(variance[1] - slope**2 * variance[0], 0.0)
+    rate = mean[1] + slope * (level - mean[0]) + np.sqrt(left) * normal[:, 1]
+    node, prior = states.node[chosen], states.prior
+    walking, often, size = prior.walk[node], prior.steps_per_year[node], prior.step_sd[node]
+    high = limits[which][:, None]
+    inside = _inside(level, high, one_sided).astype(np.float64)
+    survival = np.empty((len(which), len(days)))
+    survival[:, 0] = inside.mean(axis=1)
+    for g, years in enumerate(np.diff(days) / YEAR):
+        spread = walking**2 * years
+        after = level + rate * years + walking * np.sqrt(years) * walk[:, g]
+        inside *= _kept_inside(level, after, spread, high, one_sided)
+        step = stepping[0, :, g] < -np.expm1(-often * years)
+        level = after + step * size * stepping[1, :, g]
+        inside *= _inside(level, high, one_sided)
+        survival[:, g + 1] = inside.mean(axis=1)
+    return 1.0 - survival
+
+
+def _inside(level: Floats, high: Floats, one_sided: bool) -> Floats:
+    return np.asarray(level <= high if one_sided else np.abs(level) <= high)
+
+
+def _kept_inside(before: Floats, after: Floats, spread: Floats, high: Floats, one_sided: bool) -> Floats:
+    """Probability that a bridge from one level to another stays within the limits, given that its ends do."""
+    kept = -np.expm1(-2 * np.maximum((high - before) * (high - after), 0.0) / spread)
+    if not one_sided:
+        kept *= -np.expm1(-2 * np.maximum((high + before) * (high + after), 0.0) / spread)
+    return np.asarray(kept, dtype=np.float64)
+
+
+def _log_survival(probability: Floats) -> Floats:
+    return np.log1p(-np.minimum(probability, 1 - 1e-12))
+
+
+def _quantile(days: Floats, log_survival: Floats, wanted: float) -> float:
+    """Where the survival has fallen to a value, between the days of the grid as a constant hazard goes."""
+    if log_survival[0] <= wanted:
+        return 0.0
+    after = int(np.argmax(log_survival <= wanted))
+    if not after:
+        return float("inf")
+    high, low = log_survival[after - 1], log_survival[after]
+    return float(days[after - 1] + (days[after] - days[after - 1]) * (high - wanted) / (high - low))

@@ -1,0 +1,197 @@
+"""How one error of a machine drifts: its history as the model takes it, and histories of many machines side by side.
+
+The model, per error factor or figure of performance (docs/records/drift.md): between adjustments the error is a level that
+moves at a constant rate, wanders as a Wiener process and now and then makes a step; an adjustment puts it back near zero and
+leaves the rate. Certificates see it with their stated uncertainty, of which those made with one artefact share a part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Ints
+
+YEAR = 365.25
+"""Days: rates and spreads are stated per year."""
+
+HORIZON = 40.0
+"""Years that are looked ahead; what is later is never."""
+
+PARTS = (0.05, 0.5, 0.95)
+"""Probabilities at which the day of a crossing is stated: the ends of a 90 % interval, and its median."""
+
+MOST_SHARED = 0.999
+"""Of u, that certificates by one artefact have in common at most: two of one day never agree to the last digit."""
+
+
+class RecordedSeries(Protocol):
+    """What is asked of a series of the records: arrays of n certificates, ordered by day and entry.
+
+    ``day`` is an ordinal, ``adjusted_since`` too, or 0 or NaN where no adjustment is known.
+    """
+
+    @property
+    def day(self) -> NDArray[np.generic]: ...  # noqa: D102
+    @property
+    def value(self) -> NDArray[np.generic]: ...  # noqa: D102
+    @property
+    def u(self) -> NDArray[np.generic]: ...  # noqa: D102
+    @property
+    def u_artefact(self) -> NDArray[np.generic]: ...  # noqa: D102
+    @property
+    def artefact(self) -> NDArray[np.generic]: ...  # noqa: D102
+    @property
+    def adjusted_since(self) -> NDArray[np.generic]: ...  # noqa: D102
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """What the certificates of one machine say of one error.
+
+    Attributes
+    ----------
+    day : (n,) ordinals, not falling.
+    value, u : (n,) of the certificates; standard uncertainties.
+    u_artefact : (n,) the part of u that comes from the artefact, common to all certificates made with it.
+    artefact : n names.
+    adjusted_since : (n,) ordinal of the last adjustment before each certificate, NaN where none is known.
+    adjusted_after : ordinal of an adjustment after the last certificate, NaN for none: nobody has seen what it left.
+
+    Raises
+    ------
+    CmmUqError : arrays that do not fit, no certificate, a figure that is no number, an uncertainty that is not positive.
+    """
+
+    day: Floats
+    value: Floats
+    u: Floats
+    u_artefact: Floats
+    artefact: tuple[str, ...]
+    adjusted_since: Floats
+    adjusted_after: float = float("nan")
+
+    def __post_init__(self) -> None:
+        n = len(self.day)
+        if not n:
+            raise CmmUqError("a machine without a certificate has no trend", fix="Record one, or leave the machine out")
+        if any(len(each) != n for each in (self.value, self.u, self.u_artefact, self.artefact, self.adjusted_since)):
+            raise CmmUqError("the columns of a history differ in length", fix="Give one entry a certificate")
+        if not all(np.isfinite(each).all() for each in (self.day, self.value, self.u, self.u_artefact)):
+            raise CmmUqError("a history has a figure that is not a number", fix="Leave that certificate out")
+        if not (self.u > 0).all():
+            raise CmmUqError("a certificate states no uncertainty (u = 0), so that nothing says how much it counts",
+                             fix="Leave it out, or state u")  # fmt: skip
+        if (self.u_artefact < 0).any() or (self.u_artefact > self.u).any():
+            raise CmmUqError("the artefact's part of an uncertainty is more than the whole", fix="Correct u_artefact")
+        late = (self.adjusted_since > self.day).any() or self.adjusted_after < self.day[-1]
+        if (np.diff(self.day) < 0).any() or late:
+            raise CmmUqError("the days of a history run backwards, or an adjustment comes after its certificate",
+                             fix="Correct the dates")  # fmt: skip
+
+
+def history(series: RecordedSeries, adjusted_after: float | None = None) -> History:
+    """A series of the records as the model takes it.
+
+    Parameters
+    ----------
+    series : of the records.
+    adjusted_after : ordinal of the machine's newest adjustment; it counts where it is after the last certificate.
+
+    Raises
+    ------
+    CmmUqError : as :class:`History`.
+    """
+    day, value, u, shared, adjusted = (
+        np.asarray(column, dtype=np.float64)
+        for column in (series.day, series.value, series.u, series.u_artefact, series.adjusted_since)
+    )
+    names = tuple(map(str, series.artefact))
+    shared = np.where(
+        [bool(name) for name in names], shared, 0.0
+    )  # by an unknown artefact nothing is known to be common
+    known = np.where(adjusted > 0, adjusted, np.nan)
+    after = adjusted_after is not None and len(day) > 0 and adjusted_after > day[-1]
+    return History(day, value, u, shared, names, known, float(adjusted_after or 0) if after else np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class SideBySide:
+    """Histories of N machines as arrays, the k-th certificates beside each other; n of the longest, q artefacts at most.
+
+    Attributes
+    ----------
+    value, u : (n, N).
+    shared : (n, q, N) what one standard uncertainty of each artefact of the machine adds to the certificate.
+    years : (n, N) since the certificate before, or since the adjustment where one came between.
+    adjusted : (n, N) whether one did.
+    given : (n, N) whether the machine has so many certificates.
+    artefacts : (N, q) numbers into ``names``, −1 where a machine used fewer.
+    names : of the artefacts.
+    last : (N,) ordinal of the last certificate, or of an adjustment after it.
+    adjusted_after : (N,) whether there is one.
+    """
+
+    value: Floats
+    u: Floats
+    shared: Floats
+    years: Floats
+    adjusted: NDArray[np.bool_]
+    given: NDArray[np.bool_]
+    artefacts: Ints
+    names: tuple[str, ...]
+    last: Floats
+    adjusted_after: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.last)
+
+    def some(self, which: Ints) -> SideBySide:
+        """Of these machines only."""
+        most = int(self.given[:, which].sum(axis=0).max())
+        return SideBySide(
+            self.value[:most, which], self.u[:most, which], self.shared[:most][:, :, which], self.years[:most, which],
+            self.adjusted[:most, which], self.given[:most, which], self.artefacts[which], self.names, self.last[which],
+            self.adjusted_after[which],
+        )  # fmt: skip
+
+
+def side_by_side(histories: Sequence[History]) -> SideBySide:
+    """Histories as arrays."""
+    names = sorted({name for each in histories for name in each.artefact})
+    number = {name: i for i, name in enumerate(names)}
+    own = [list(dict.fromkeys(each.artefact)) for each in histories]
+    n, q, N = max(len(each.day) for each in histories), max(map(len, own)), len(histories)
+    value, u, years = np.zeros((n, N)), np.ones((n, N)), np.zeros((n, N))
+    shared, artefacts = np.zeros((n, q, N)), np.full((N, q), -1)
+    adjusted, given = np.zeros((n, N), dtype=bool), np.zeros((n, N), dtype=bool)
+    for i, (each, mine) in enumerate(zip(histories, own, strict=True)):
+        k = len(each.day)
+        value[:k, i], u[:k, i], given[:k, i] = each.value, each.u, True
+        adjusted[:k, i], years[:k, i] = _since(each)
+        artefacts[i, : len(mine)] = [number[name] for name in mine]
+        shared[np.arange(k), [mine.index(name) for name in each.artefact], i] = np.minimum(
+            each.u_artefact, MOST_SHARED * each.u
+        )
+    after = np.array([each.adjusted_after for each in histories])
+    last = np.where(np.isnan(after), [each.day[-1] for each in histories], after)
+    return SideBySide(value, u, shared, years, adjusted, given, artefacts, tuple(names), last, np.isfinite(after))
+
+
+def _since(of: History) -> tuple[NDArray[np.bool_], Floats]:
+    """Whether an adjustment comes between each certificate and the one before, and the years since the later of both.
+
+    An adjustment is taken for one between two certificates also where its date is before the first of them, which did not know
+    of it.
+    """
+    before = np.concatenate([[np.nan], of.adjusted_since[:-1]])
+    adjusted = np.isfinite(of.adjusted_since) & ~(of.adjusted_since <= before)
+    previous = np.concatenate([of.day[:1], of.day[:-1]])
+    begun = np.where(adjusted, of.adjusted_since, previous)
+    begun[1:] = np.maximum(begun[1:], previous[1:])
+    return adjusted, (of.day - begun) / YEAR

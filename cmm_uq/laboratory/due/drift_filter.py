@@ -1,0 +1,212 @@
+"""Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
+
+State of a machine: level, rate, and the errors of the artefacts that it was measured with, in their standard uncertainties.
+Given when steps came and which certificates were wrong, all is Gaussian and the filter is exact (Kalman 1960; Durbin and
+Koopman 2012, section 4.3). Those tales are summed over: each certificate makes four of one, and the likeliest are kept (a
+Gaussian sum, Alspach and Sorenson 1972).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.points import Floats
+from cmm_uq.laboratory.due.drift import SideBySide
+from cmm_uq.laboratory.due.drift_prior import WRONG, WRONG_TIMES, Prior
+
+KEPT = 12
+"""Tales kept of a machine at a node."""
+
+_ODDS = np.log([1 - WRONG, WRONG])
+_TIMES = WRONG_TIMES**2 - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Rate and artefacts' errors of each machine at each node, before its own certificates.
+
+    Attributes
+    ----------
+    mean : (1 + q, N, K).
+    covariance : (1 + q, 1 + q, N, K).
+    """
+
+    mean: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """After the last certificate, or an adjustment after it, for N machines, K nodes and M tales.
+
+    Attributes
+    ----------
+    mean : (2 + q, N, K, M) level, rate, errors of the artefacts.
+    covariance : (2 + q, 2 + q, N, K, M).
+    log_weight : (N, K, M) joint density of certificates and tale.
+    """
+
+    mean: Floats
+    covariance: Floats
+    log_weight: Floats
+
+    def between(self, first: int, last: int | None) -> Filtered:
+        """Of some machines."""
+        return Filtered(self.mean[:, first:last], self.covariance[:, :, first:last], self.log_weight[first:last])
+
+    @property
+    def log_evidence(self) -> Floats:
+        """Density of a machine's certificates at each node, (N, K)."""
+        return log_sum(self.log_weight)
+
+    def weights(self, prior: Prior) -> Floats:
+        """Of nodes and tales given the certificates, (N, K, M), one in all for each machine."""
+        evidence = self.log_evidence + np.log(prior.weight)
+        of_group = np.stack([log_sum(np.where(row, evidence, -np.inf)) for row in prior.members], axis=-1)
+        each = np.array([prior.weight[row].sum() for row in prior.members])
+        node = np.exp(evidence - of_group[:, prior.group]) * each[prior.group]
+        return np.asarray(node[..., None] * np.exp(self.log_weight - self.log_evidence[..., None]), dtype=np.float64)
+
+    def collapsed(self) -> tuple[Floats, Floats]:
+        """Mean (2 + q, N, K) and covariance (2 + q, 2 + q, N, K) over the tales."""
+        weight = np.exp(self.log_weight - self.log_evidence[..., None])
+        mean = (weight * self.mean).sum(axis=-1)
+        off = self.mean - mean[..., None]
+        return mean, (weight * (self.covariance + off[:, None] * off)).sum(axis=-1)
+
+
+def log_sum(values: Floats) -> Floats:
+    """Logarithm of the sum of exponentials over the last axis."""
+    top = values.max(axis=-1, keepdims=True)
+    top = np.where(np.isfinite(top), top, 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.exp(values - top).sum(axis=-1)) + top[..., 0], dtype=np.float64)
+
+
+def usual_start(machines: SideBySide, prior: Prior) -> Start:
+    """Rates of the prior, artefacts as their certificates say."""
+    q, N, K = machines.shared.shape[1], len(machines), len(prior)
+    mean, covariance = np.zeros((1 + q, N, K)), np.zeros((1 + q, 1 + q, N, K))
+    mean[0], covariance[0, 0] = prior.rate, prior.rate_sd**2
+    covariance[np.arange(1, 1 + q), np.arange(1, 1 + q)] = 1.0
+    return Start(mean, covariance)
+
+
+def filtered(machines: SideBySide, prior: Prior, start: Start | None = None, kept: int = KEPT) -> Filtered:
+    """Filter all certificates of all machines at all nodes.
+
+    Parameters
+    ----------
+    machines : their histories.
+    prior : nodes.
+    start : of rates and artefacts, where it is not :func:`usual_start`.
+    kept : tales kept after each certificate.
+    """
+    start = start or usual_start(machines, prior)
+    order = np.argsort(-machines.given.sum(axis=0), kind="stable")  # whoever has no further certificate is done
+    machines, start = machines.some(order), Start(start.mean[:, order], start.covariance[:, :, order])
+    d, N, K = len(start.mean) + 1, len(machines), len(prior)
+    mean, covariance = np.zeros((d, N, K, 1)), np.zeros((d, d, N, K, 1))
+    mean[1:, ..., 0], covariance[1:, 1:, ..., 0] = start.mean, start.covariance
+    covariance[0, 0] = (prior.first_sd**2)[:, None]
+    state, done = Filtered(mean, covariance, np.zeros((N, K, 1))), []
+    for k, left in enumerate(machines.given.sum(axis=1)):
+        done.append(state.between(left, None))
+        state = _measured(_moved(state.between(0, left), machines, prior, k), machines, prior, k, kept)
+    back = np.argsort(order)
+    state, after = _side_by_side([state, *reversed(done)], back), machines.adjusted_after[back][:, None, None]
+    if after.any():
+        _set_back(state, after, prior)
+    return state
+
+
+def _set_back(state: Filtered, adjusted: NDArray[np.bool_], prior: Prior) -> None:
+    """The level as an adjustment leaves it, in place; ``adjusted`` is (N, 1, 1)."""
+    state.mean[0] *= ~adjusted
+    state.covariance[0] *= ~adjusted
+    state.covariance[:, 0] *= ~adjusted
+    state.covariance[0, 0] += adjusted * (prior.as_left_sd**2)[:, None]
+
+
+def _side_by_side(parts: list[Filtered], order: NDArray[np.intp]) -> Filtered:
+    """Machines with few certificates have few tales; the others' further ones have no weight."""
+    most = max(part.log_weight.shape[-1] for part in parts)
+
+    def joined(arrays: list[Floats], value: float) -> Floats:
+        wide = [np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, most - array.shape[-1])], constant_values=value)
+                for array in arrays]  # fmt: skip
+        return np.concatenate(wide, axis=-3).take(order, axis=-3)
+
+    return Filtered(
+        joined([part.mean for part in parts], 0.0), joined([part.covariance for part in parts], 0.0),
+        joined([part.log_weight for part in parts], -np.inf),
+    )  # fmt: skip
+
+
+def _moved(state: Filtered, machines: SideBySide, prior: Prior, k: int) -> Filtered:
+    """To the day of certificate k: set back by an adjustment, along the rate, wandering; in place."""
+    mean, covariance, N = state.mean, state.covariance, len(state.log_weight)
+    adjusted, years = machines.adjusted[k, :N, None, None], machines.years[k, :N, None, None]
+    if adjusted.any():
+        _set_back(state, adjusted, prior)
+    mean[0] += years * mean[1]
+    covariance[0] += years * covariance[1]
+    covariance[:, 0] += years * covariance[:, 1]
+    covariance[0, 0] += years * (prior.walk**2)[:, None]
+    return state
+
+
+def _measured(state: Filtered, machines: SideBySide, prior: Prior, k: int, kept: int) -> Filtered:
+    """With certificate k: each tale becomes four (no step or one before it; right or wrong), the likeliest are kept."""
+    N, K, M = state.log_weight.shape
+    shared, variance = machines.shared[k, :, :N, None, None], machines.u[k, :N, None, None] ** 2
+    seen = state.covariance[:, 0] + (shared * state.covariance[:, 2:]).sum(axis=1)
+    expected = seen[0] + (shared * (seen[2:] - shared)).sum(axis=0) + variance
+    missed = machines.value[k, :N, None, None] - state.mean[0] - (shared * state.mean[2:]).sum(axis=0)
+    size = (prior.step_sd**2)[:, None]
+    steps = _log_steps(machines.years[k, :N], prior)
+    spread, log_weight = np.empty((N, K, 4, M)), np.empty((N, K, 4, M))
+    for tale in range(4):
+        stepped, wrong = divmod(tale, 2)
+        spread[:, :, tale] = expected + stepped * size + wrong * _TIMES * variance
+        log_weight[:, :, tale] = state.log_weight + (steps[stepped] + _ODDS[wrong])[..., None]
+    log_weight -= 0.5 * (np.log(2 * np.pi * spread) + missed[:, :, None] ** 2 / spread)
+    return _kept(state, log_weight, seen, spread, missed, size, kept)
+
+
+def _log_steps(years: Floats, prior: Prior) -> tuple[Floats, Floats]:
+    """Logarithms of the probabilities of no step and of one in the years since the certificate before, (N, K) each."""
+    expected = years[:, None] * prior.steps_per_year
+    with np.errstate(divide="ignore"):
+        return -expected, np.log(-np.expm1(-expected))
+
+
+def _kept(
+    state: Filtered, log_weight: Floats, seen: Floats, spread: Floats, missed: Floats, size: Floats, kept: int
+) -> Filtered:
+    """The likeliest tales, each with its Kalman update; ``log_weight`` and ``spread`` are (N, K, 4, M)."""
+    N, K, _, M = log_weight.shape
+    few, rows = min(kept, 4 * M), np.arange(N * K)[:, None]
+    flat = log_weight.reshape(N * K, 4 * M)
+    if few < 4 * M:
+        chosen = np.argpartition(-flat, few - 1, axis=-1)[:, :few]
+    else:
+        chosen = np.broadcast_to(np.arange(4 * M), flat.shape)
+    of, tale = (rows * M + chosen % M).ravel(), (rows * 4 * M + chosen).ravel()
+
+    def taken(values: Floats, which: NDArray[np.intp], own: int = 3) -> Floats:
+        """Of the last ``own`` axes: machine, node, and what tales are made of."""
+        lead = values.shape[: values.ndim - own]
+        return values.reshape(*lead, -1).take(which, axis=-1).reshape(*lead, N, K, few)
+
+    mean, covariance, seen = taken(state.mean, of), taken(state.covariance, of), taken(seen, of)
+    stepped = (chosen // M >= 2).reshape(N, K, few) * size
+    seen[0] += stepped
+    covariance[0, 0] += stepped
+    gain = seen / taken(spread, tale, 4)
+    mean += gain * taken(missed, of)
+    covariance -= gain[:, None] * seen
+    return Filtered(mean, covariance, taken(log_weight, tale, 4))

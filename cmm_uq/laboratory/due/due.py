@@ -1,0 +1,225 @@
+"""What is to be calibrated when, and why: a machine by its rule, its interim checks and its artefact.
+
+No certificate counts that is dated after the day asked about: a clock that was wrong would hide that a machine is overdue.
+"""
+
+from __future__ import annotations
+
+import calendar
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+from cmm_uq.base.messages import Text, Verbatim, day, foreign, number, say
+from cmm_uq.jobs.verdicts import BEYOND, NONE
+from cmm_uq.laboratory.due.checks import Checked, check_standings
+from cmm_uq.laboratory.due.interval import Interval, interval_by
+from cmm_uq.laboratory.due.observed import Pool, calibrations
+from cmm_uq.laboratory.due.rule import Rule
+from cmm_uq.laboratory.records import ArtefactRow, Certificate, Machine
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.due.drift_prior import Prior
+
+State = Literal["overdue", "due", "later", "unknown"]
+
+
+@dataclass(frozen=True)
+class Due:
+    """A machine or an artefact, and when it is to be calibrated.
+
+    Parameters
+    ----------
+    item : machine or artefact.
+    serial, name, model, place : of it.
+    last : day of its last calibration.
+    due : day by which it is to be calibrated again; ``None`` where nothing says so.
+    why : one sentence.
+    remarks : what else is to be known, a sentence each.
+    artefact : serial of the artefact that its last calibration was made with.
+    blocked : why no certificate of it can be made as things stand; empty where nothing is in the way.
+    beyond : whether its last certificate finds it beyond its limits: it is overdue from that day on.
+    """
+
+    item: Literal["machine", "artefact"]
+    serial: str
+    name: str
+    model: str
+    place: str
+    last: dt.date | None
+    due: dt.date | None
+    why: Text
+    remarks: tuple[Text, ...] = ()
+    artefact: str = ""
+    blocked: Text | None = None
+    beyond: bool = False
+
+    def state(self, on: dt.date, within: dt.timedelta) -> State:
+        """Overdue before a day or beyond its limits, due within a time of it, later, or unknown."""
+        if self.due is None:
+            return "unknown"
+        left = self.due - on  # and not on + within, which may lie beyond the calendar
+        return "overdue" if left.days < 0 or self.beyond else "due" if left <= within else "later"
+
+
+def after_months(start: dt.date, months: int) -> dt.date:
+    """The same day of a later month, or that month's last; no later than the calendar's last day."""
+    years, month = divmod(start.month - 1 + months, 12)
+    year = start.year + years
+    if year > dt.MAXYEAR:
+        return dt.date.max
+    return dt.date(year, month + 1, min(start.day, calendar.monthrange(year, month + 1)[1]))
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a machine on a day.
+
+    Parameters
+    ----------
+    machine, rule : as its newest certificate has them.
+    certificates : measured and standing ones up to the day, by day; of a fixed interval those since the last calibration.
+    limited : whether the last calibration sets a limit, or decides on one.
+    late : last date of those that are dated after the day; ``None`` where none is.
+    priors : what its fleet taught of each value, by name.
+    """
+
+    machine: Machine
+    rule: Rule
+    certificates: Sequence[Certificate]
+    limited: bool = True
+    late: dt.date | None = None
+    priors: Mapping[str, Prior] = field(default_factory=dict)
+
+
+def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> Due:
+    """When a machine is to be calibrated again.
+
+    Parameters
+    ----------
+    of : what is known of the machine.
+    artefacts : by serial.
+    on : the day asked about.
+    pool : intervals of all machines of its model.
+    """
+    machine, known = of.machine, of.certificates
+    remarks: list[Text] = []
+    if machine.by_name:
+        remarks.append(say("It has no serial number and is recognised by its name alone."))
+    if of.late is not None:
+        remarks.append(say("A recording of {day} is dated after {on} and does not count: a clock or a date is wrong.",
+                           day=day(of.late), on=day(on)))  # fmt: skip
+    done = calibrations(known)
+    if not done:
+        why = say("never calibrated up to {on}", on=day(on))
+        return Due(
+            "machine", machine.serial, machine.name, machine.model, machine.place, None, None, why, tuple(remarks)
+        )
+    last = done[-1]
+    if last.state == "draft":
+        remarks.append(say("Its certificate of {day} is a draft that nobody has released.", day=day(last.day)))
+    if not of.limited:
+        remarks.append(say("Its certificate has no limits, so that only time can say when it is due."))
+    elif last.decision not in (*BEYOND, NONE, "pass"):
+        remarks.append(
+            say("Its last certificate does not state that it conforms: {decision}.", decision=Verbatim(last.decision))
+        )
+    calibrated_again, reason = _machine_date(of, done, on, pool)
+    used = artefacts.get(last.artefact)
+    blocked = _blocked(used, on)
+    if used is not None and used.due is not None and blocked is None and used.due < calibrated_again:
+        remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.",
+                           artefact=Verbatim(used.serial), due=day(used.due)))  # fmt: skip
+    return Due("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, reason,
+               tuple(remarks), last.artefact, blocked, _is_beyond(of, last, on))  # fmt: skip
+
+
+def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Pool) -> tuple[dt.date, Text]:
+    """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
+    last, known, rule = done[-1], of.certificates, of.rule
+    if adjusted := _adjusted_after(of, last, on):
+        return min(adjusted), say("adjusted on {day}, and not calibrated since", day=day(min(adjusted)))
+    if _is_beyond(of, last, on):
+        return last.day, say("its last certificate finds it beyond its limits")
+    # the drift model takes checks after the calibration too; other methods count what calibrations found
+    seen = known if rule.method == "drift" else known[: known.index(last) + 1]
+    interval = interval_by(rule, seen, pool, of.priors)
+    planned = _ends(last.day, interval)
+    checks = check_standings(last, [one for one in known[known.index(last) + 1 :] if one.interim])
+    return _checked(rule, last, planned, interval.why, checks)
+
+
+def _adjusted_after(of: Known, last: Certificate, on: dt.date) -> list[dt.date]:
+    since = (*of.machine.adjusted, *(one.adjusted_since for one in of.certificates))
+    return [one for one in since if one is not None and last.day < one <= on]
+
+
+def _is_beyond(of: Known, last: Certificate, on: dt.date) -> bool:
+    """Whether its last certificate finds it beyond its limits, and nobody has adjusted it since."""
+    return last.decision in BEYOND and not _adjusted_after(of, last, on)
+
+
+def _ends(start: dt.date, interval: Interval) -> dt.date:
+    if interval.months is not None:
+        return after_months(start, interval.months)
+    return dt.date.fromordinal(min(start.toordinal() + int(interval.days or 0), dt.date.max.toordinal()))
+
+
+def _checked(
+    rule: Rule, last: Certificate, planned: dt.date, why: Text, checks: Sequence[Checked]
+) -> tuple[dt.date, Text]:
+    """What interim checks make of the date: an action ends the interval, a check in control may lengthen a fixed one."""
+    for one in checks:
+        if one.standing == "action":
+            return one.certificate.day, say(
+                "the interim check of {day} is out of control ({what})",
+                day=day(one.certificate.day),
+                what=_furthest(one),
+            )
+    if not checks:
+        return planned, why
+    newest = checks[-1]
+    if newest.standing == "warning":
+        return planned, say("{why}; the interim check of {day} warns ({what}): repeat it", why=why,
+                            day=day(newest.certificate.day), what=_furthest(newest))  # fmt: skip
+    if newest.standing == "nothing compared":
+        return planned, say("{why}; the interim check of {day} has no value in common with the calibration", why=why,
+                            day=day(newest.certificate.day))  # fmt: skip
+    if rule.method != "fixed" or rule.longest_months is None:
+        return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
+    carried = Interval((planned - last.day).days, None, why)
+    extended = min(_ends(newest.certificate.day, carried), after_months(last.day, rule.longest_months))
+    if extended <= planned:
+        return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
+    return extended, say("{why}; lengthened by the interim check of {day}, in control", why=why,
+                         day=day(newest.certificate.day))  # fmt: skip
+
+
+def _furthest(one: Checked) -> Text:
+    if not one.worst:
+        return say("nothing in it can be compared")
+    return say("{name}: {ratio} standard uncertainties from the calibration, limit {limit}", name=foreign(one.worst),
+               ratio=number(abs(one.ratio), ".1f"), limit=number(one.action, ".1f"))  # fmt: skip
+
+
+def _blocked(artefact: ArtefactRow | None, on: dt.date) -> Text | None:
+    if artefact is None or artefact.due is None or artefact.due >= on:
+        return None
+    return say("its artefact {artefact} is out of date since {due}: no certificate can be made with it",
+               artefact=Verbatim(artefact.serial), due=day(artefact.due))  # fmt: skip
+
+
+def artefact_due(artefact: ArtefactRow) -> Due:
+    """When an artefact is to be calibrated again, as its own certificate says."""
+    why: Text = say("as the jobs that use it say")
+    if artefact.certificate:
+        why = say("as its certificate {number} says", number=Verbatim(artefact.certificate))
+    if artefact.due is None:
+        why = say("no job says when its calibration ends")
+    return Due("artefact", artefact.serial, artefact.kind, "", "", artefact.calibrated, artefact.due, why)
+
+
+def in_order(found: Sequence[Due]) -> list[Due]:
+    """By day; those that nothing is known of come last."""
+    return sorted(found, key=lambda one: (one.due is None, one.due or dt.date.max, one.item, one.serial))

@@ -1,0 +1,291 @@
+"""A fleet of machines and one of their errors: what drift is usual, who does not belong, and each machine's own drift.
+
+Hyper-parameters are sampled by emcee, all else is exact given them (:mod:`cmm_uq.laboratory.due.fleet_model`). Each
+machine is judged and estimated with what all the *others* say as its prior, so that its certificates count once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.laboratory.due.crossing import Crossings, crossings
+from cmm_uq.laboratory.due.drift import History, SideBySide, side_by_side
+from cmm_uq.laboratory.due.drift_filter import Filtered, Start, filtered, log_sum
+from cmm_uq.laboratory.due.drift_prior import MEDIANS, NAMES, SPREADS, Prior, learnt_prior, limit_for
+from cmm_uq.laboratory.due.fleet_model import Shared, log_posterior, messages, others, shared_by, together
+from cmm_uq.laboratory.due.fleet_prior import FleetPrior
+from cmm_uq.maths.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Chains, run_ensembles
+from cmm_uq.maths.inference.proposals import tempered
+
+LEARNT_FROM = 200
+"""Machines at most that the hyper-parameters are sampled from: they know a spread between machines to 5 %."""
+
+DRAWS, LEAST_DRAWS, MANY = 64, 6, 20_000
+"""Draws of the hyper-parameters that machines are estimated at: fewer where there are many machines."""
+
+FALSE_DISCOVERIES = 0.05
+"""Part of the machines said not to belong that may well belong (Benjamini and Hochberg 1995)."""
+
+_WALKERS, _STEPS = 16, 50
+"""Of each of the four ensembles, and between two looks at how well they have mixed."""
+
+_AT_ONCE = 8000
+_FILTERED_AT_ONCE = 6000
+_LEAST_SHIFT = 0.02
+"""Of the variance of a rate: a machine that tells less of its own rate cannot show that it does not belong."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Member:
+    """A machine of the fleet: its name or serial, its model, its place, its certificates, and what the last one decides."""
+
+    machine: str
+    model: str
+    place: str
+    history: History
+    limit: float | None = None
+    outcome: str = ""
+
+
+@dataclass(frozen=True)
+class Usual:
+    """The rate per year that is usual for a group of machines, its standard uncertainty and 95 % interval.
+
+    ``kind`` is "fleet" (the average machine), "model" (at the fleet's average place) or "place" (for its average model).
+    """
+
+    kind: str
+    name: str
+    machines: int
+    rate: float
+    u: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A hyper-parameter: its name in the model, posterior median and 95 % interval."""
+
+    name: str
+    median: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Of N machines, rates per year.
+
+    Attributes
+    ----------
+    rate, u_rate : (N,) with the fleet as prior.
+    expected, u_expected : (N,) what all others say of a machine of its model and place, before its own certificates.
+    p : (N,) probability of a rate as far from that or farther, near 1 where its certificates say nothing of it.
+    crossing : where there is a limit.
+    """
+
+    rate: Floats
+    u_rate: Floats
+    expected: Floats
+    u_expected: Floats
+    p: Floats
+    crossing: Crossings | None
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet(FleetPrior):
+    """What was learnt: the prior for a further machine, and all else.
+
+    Attributes
+    ----------
+    usual, spreads : what is usual, and how much differs.
+    machines : names, in the order of the estimates.
+    estimates : of each.
+    learnt_from : machines that the hyper-parameters were sampled from.
+    chains : of emcee.
+    """
+
+    usual: tuple[Usual, ...]
+    spreads: tuple[Spread, ...]
+    machines: tuple[str, ...]
+    estimates: Estimates
+    learnt_from: int
+    chains: Chains
+
+
+def fit_fleet(
+    members: Sequence[Member], seed: int = 1, progress: Progress | None = None, *, learnt_from: int = LEARNT_FROM,
+    crossing_paths: int = 512,
+) -> Fleet:  # fmt: skip
+    """Learn from a fleet.
+
+    Parameters
+    ----------
+    members : machines with at least one certificate each; one alone is possible, and learns little.
+    seed : the same seed gives the same figures.
+    progress : told the part done.
+    learnt_from : machines that hyper-parameters are sampled from, drawn by lot where there are more.
+    crossing_paths : drawn for the day of crossing of each.
+
+    Raises
+    ------
+    CmmUqError : no machine.
+    """
+    if not members:
+        raise CmmUqError("no machine has a certificate that states this value",
+                         fix="Record certificates, or choose another --name")  # fmt: skip
+    machines = side_by_side([each.history for each in members])
+    limits = [each.limit for each in members if each.limit]
+    unit = limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))
+    shared = shared_by(machines, [each.model for each in members], [each.place for each in members])
+    chains, count = _sampled(machines, shared, unit, seed, progress, learnt_from)
+    theta = _spaced(chains.draws, int(np.clip(MANY // len(members), LEAST_DRAWS, DRAWS)))
+    said = messages(machines, shared, theta, unit)
+    all_together = together(said, shared, theta, unit)
+    covariance = np.asarray(np.linalg.inv(all_together.precision), dtype=np.float64)
+    mean = (covariance @ all_together.linear[..., None])[..., 0]
+    start = others(said, all_together, shared, theta, unit)
+    estimates = _estimated(machines, start, theta, unit, [each.limit for each in members], crossing_paths)
+    effects = 1 + len(shared.models) + len(shared.places)
+    return Fleet(
+        unit, theta, shared.models, shared.places, mean[:, :effects], covariance[:, :effects, :effects],
+        _usual(members, shared, mean, covariance), _spreads(chains.draws, unit), tuple(each.machine for each in members),
+        estimates, count, chains,
+    )  # fmt: skip
+
+
+def _sampled(
+    machines: SideBySide, shared: Shared, unit: float, seed: int, progress: Progress | None, most: int
+) -> tuple[Chains, int]:
+    """Draws of the hyper-parameters, and from how many machines."""
+    which = np.arange(len(machines))
+    if len(which) > most:
+        which = np.sort(
+            np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,))).choice(which, most, replace=False)
+        )
+    some, common = machines.some(which), shared.some(which)
+    at_once = max(1, _AT_ONCE // len(which))
+
+    def density(theta: Floats) -> Floats:
+        parts = [theta[i : i + at_once] for i in range(0, len(theta), at_once)]
+        return np.concatenate([log_posterior(some, common, part, unit) for part in parts])
+
+    proposal = tempered(density, np.log(MEDIANS), np.diag(SPREADS), seed)
+    chains = run_ensembles(density, proposal, seed, progress, effective_samples=LEAST_EFFECTIVE_SAMPLES,
+                           steps_at_once=_STEPS, walkers=_WALKERS)  # fmt: skip
+    return chains, len(which)
+
+
+def _spaced(draws: Floats, count: int) -> Floats:
+    """Draws from all parts of the chains."""
+    return draws[np.linspace(0, len(draws) - 1, count).astype(np.intp)]
+
+
+def _usual(members: Sequence[Member], shared: Shared, mean: Floats, covariance: Floats) -> tuple[Usual, ...]:
+    """Of the fleet's average machine, of each model at the average place, and of each place for the average model."""
+    average = shared.design[:, 0].mean(axis=0)
+    found = [_moments("fleet", "", len(members), average, mean, covariance)]
+    for kind, known, first, of in (
+        ("model", shared.models, 1, [each.model for each in members]),
+        ("place", shared.places, 1 + len(shared.models), [each.place for each in members]),
+    ):
+        for i, name in enumerate(known):
+            row = average.copy()
+            row[first : first + len(known)] = 0.0
+            row[first + i] = 1.0
+            found.append(_moments(kind, name, of.count(name), row, mean, covariance))
+    return tuple(found)
+
+
+def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covariance: Floats) -> Usual:
+    """Of a sum of effects over draws of the hyper-parameters."""
+    means, variances = mean @ row, np.einsum("i,wij,j->w", row, covariance, row)
+    rate, u = float(means.mean()), float(np.sqrt(variances.mean() + means.var()))
+    half = float(special.ndtri(0.975)) * u
+    return Usual(kind, name, count, rate, u, rate - half, rate + half)
+
+
+def _spreads(draws: Floats, unit: float) -> tuple[Spread, ...]:
+    """Posterior of each hyper-parameter in the unit of the values."""
+    quantiles = np.exp(np.quantile(draws, [0.5, 0.025, 0.975], axis=0))
+    scales = [1.0 if name == "steps_per_year" else unit for name in NAMES]
+    return tuple(
+        Spread(name, *(float(scale * q) for q in column))
+        for name, scale, column in zip(NAMES, scales, quantiles.T, strict=True)
+    )
+
+
+def _estimated(
+    machines: SideBySide, start: Start, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
+) -> Estimates:
+    """Each machine's own estimates, from what the others say and its certificates; in parts that fit the memory."""
+    prior = learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
+    limit = np.array([np.inf if each is None else each for each in limits])
+    chunk = max(1, _FILTERED_AT_ONCE // len(prior))
+    parts = []
+    for i in range(0, len(machines), chunk):
+        which = np.arange(i, min(i + chunk, len(machines)))
+        some = Start(start.mean[:, which][..., prior.group], start.covariance[:, :, which][..., prior.group])
+        few = machines.some(which)
+        state = filtered(few, prior, some)
+        parts.append((_rates(state, prior, some), crossings(few, prior, state, limit[which], paths=paths)))
+    rate, u, expected, u_expected, p = np.concatenate([part for part, _ in parts], axis=1)
+    crossing = Crossings.joined([part for _, part in parts]) if np.isfinite(limit).any() else None
+    return Estimates(rate, u, expected, u_expected, p, crossing)
+
+
+def _rates(state: Filtered, prior: Prior, start: Start) -> Floats:
+    """Rate and u with the certificates, the same before them, and the probability of so great a shift between, (5, N).
+
+    If the machine is one of its fleet, the certificates shift the mean of its rate by a normal deviate whose variance is what
+    they take from the variance of the rate.
+    """
+    weight = state.weights(prior)
+    rate, variance = state.mean[1], state.covariance[1, 1]
+    mean = (weight * rate).sum(axis=(1, 2))
+    total = (weight * (variance + (rate - mean[:, None, None]) ** 2)).sum(axis=(1, 2))
+    before, spread = start.mean[0], start.covariance[0, 0]
+    of_node = weight / weight.sum(axis=2, keepdims=True)
+    at_node = (of_node * rate).sum(axis=2)
+    left = (of_node * (variance + (rate - at_node[..., None]) ** 2)).sum(axis=2)
+    gained = np.maximum(spread - left, 0.0)
+    z = np.abs(at_node - before) / np.sqrt(np.maximum(gained, _LEAST_SHIFT * spread))
+    node = weight.sum(axis=2) * _without_it(state, prior)[:, prior.group]
+    node /= node.sum(axis=1, keepdims=True)
+    p = (node * 2 * special.ndtr(-z)).sum(axis=1)
+    expected = (node * before).sum(axis=1)
+    u_expected = np.sqrt((node * (spread + (before - expected[:, None]) ** 2)).sum(axis=1))
+    return np.stack([mean, np.sqrt(total), expected, u_expected, p])
+
+
+def _without_it(state: Filtered, prior: Prior) -> Floats:
+    """Weights (N, g) that make draws of a fleet's posterior those of the same fleet without the machine.
+
+    They are the inverse of the density of its certificates given those of the others, truncated (Ionides 2008): a machine far
+    from its fleet has widened what it is compared with.
+    """
+    each = np.array([prior.weight[row].sum() for row in prior.members])
+    log = state.log_evidence + np.log(prior.weight)
+    of_group = np.stack([log_sum(np.where(row, log, -np.inf)) for row in prior.members], axis=-1) - np.log(each)
+    weight = np.exp(of_group.min(axis=1, keepdims=True) - of_group)
+    weight /= weight.mean(axis=1, keepdims=True)
+    return np.asarray(np.minimum(weight, np.sqrt(len(each))), dtype=np.float64)
+
+
+def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> NDArray[np.bool_]:
+    """Whether machines belong, by Benjamini and Hochberg's step-up procedure over all (N,) probabilities."""
+    n = len(p)
+    order = np.sort(p)
+    passed = np.flatnonzero(order <= false_discoveries * np.arange(1, n + 1) / n)
+    threshold = order[passed[-1]] if len(passed) else -1.0
+    return np.asarray(p > threshold)

@@ -1,0 +1,172 @@
+"""The history of one machine: every value over its certificates, what it changed by, and when it will cross its limit."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, day, plural, say
+from cmm_uq.jobs.verdicts import BEYOND, NONE
+from cmm_uq.laboratory.due.change import Change, Stated, change
+from cmm_uq.laboratory.due.observed import is_of_machine
+from cmm_uq.laboratory.due.trend import Line, trend
+from cmm_uq.laboratory.records import Certificate, Machine, Series
+from cmm_uq.laboratory.records.facts import STANDING
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.due.crossing import Crossing
+    from cmm_uq.laboratory.due.drift_prior import Prior
+
+
+@dataclass(frozen=True)
+class ValueHistory:
+    """One value of a machine over time.
+
+    Parameters
+    ----------
+    series : its values, none of them after the day asked about.
+    change : since the recording before the last; ``None`` where there is one only.
+    adjusted : whether the machine was adjusted between the two.
+    line : through the values since the last adjustment; ``None`` where they do not give one.
+    adjusted_after : ordinal of the machine's newest adjustment; ``None`` where none is known.
+    prior : what the machine's fleet taught of this value; ``None`` for the default one.
+    outcome : of the newest certificate's statement on it; empty where it states none.
+    """
+
+    series: Series
+    change: Change | None
+    adjusted: bool
+    line: Line | None
+    adjusted_after: int | None = None
+    prior: Prior | None = None
+    outcome: str = ""
+
+    @cached_property
+    def crossing(self) -> Crossing | None:
+        """When the limit will be crossed by the drift model; ``None`` without a limit, or a history that the model takes.
+
+        Worked out when it is first asked for: the model takes longer to load than all the rest.
+        """
+        if not self.series.limit:
+            return None
+        from cmm_uq.laboratory.due.crossing import crossing
+        from cmm_uq.laboratory.due.drift import history
+
+        try:
+            return crossing(history(self.series, self.adjusted_after), self.series.limit, self.prior)
+        except CmmUqError:
+            return None
+
+    @property
+    def beyond(self) -> bool:
+        """Whether the last certificate finds it so; where that states nothing, whether the last value is beyond its limit."""
+        if self.outcome:
+            return self.outcome in BEYOND
+        return self.series.limit is not None and abs(float(self.series.value[-1])) > self.series.limit
+
+    def probably_beyond(self, on: dt.date) -> bool:
+        """Whether the limit has more probably been crossed by a day than not, although the last value was within it."""
+        return not self.beyond and self.crossing is not None and self.crossing.by(on) >= 0.5
+
+
+@dataclass(frozen=True)
+class MachineHistory:
+    """All of a machine.
+
+    Parameters
+    ----------
+    machine, on : which, and up to which day.
+    certificates : its certificates and interim checks, by day, those withdrawn or replaced too.
+    values : in the order of the newest certificate.
+    remarks : what is to be known, a sentence each.
+    """
+
+    machine: Machine
+    on: dt.date
+    certificates: tuple[Certificate, ...]
+    values: tuple[ValueHistory, ...]
+    remarks: tuple[Text, ...]
+
+    @property
+    def decision(self) -> str:
+        """Of the newest certificate that counts, the gravest of its statements of conformity; ``none`` without any."""
+        standing = [one for one in self.certificates if one.state in STANDING and not one.interim]
+        return standing[-1].decision if standing else NONE
+
+    def significant(self, value: ValueHistory) -> bool:
+        """Whether a value changed by more than chance among all that are compared."""
+        compared = sum(one.change is not None and not one.adjusted for one in self.values)
+        return value.change is not None and not value.adjusted and value.change.significant(compared)
+
+
+def machine_history(
+    machine: Machine,
+    certificates: Sequence[Certificate],
+    series: Mapping[str, Series],
+    on: dt.date,
+    priors: Mapping[str, Prior] | None = None,
+    outcomes: Mapping[int, Mapping[str, str]] | None = None,
+) -> MachineHistory:
+    """The history up to a day.
+
+    Parameters
+    ----------
+    machine : which.
+    certificates : of it, by day.
+    series : its values, by name.
+    on : the day; what is dated later does not count.
+    priors : what its fleet taught of each value, by name.
+    outcomes : what certificates state of their values, by entry and name.
+    """
+    known = tuple(one for one in certificates if one.day <= on)
+    remarks: list[Text] = []
+    if machine.by_name:
+        remarks.append(say("The machine has no serial number and is recognised by its name alone."))
+    late = len(certificates) - len(known)
+    if late:
+        remarks.append(plural(
+            late,
+            one=say("One certificate is dated after {on} and does not count: a clock or a date is wrong.", on=day(on)),
+            many=say("{count} certificates are dated after {on} and do not count: a clock or a date is wrong.",
+                     count=late, on=day(on)),
+        ))  # fmt: skip
+    cut = (_until(one, on) for one in series.values())
+    adjusted = max((one.toordinal() for one in machine.adjusted if one <= on), default=None)
+    values = tuple(
+        _value(
+            one, adjusted, (priors or {}).get(one.name), (outcomes or {}).get(int(one.entry[-1]), {}).get(one.name, "")
+        )
+        for one in cut
+        if len(one.day) and is_of_machine(one.unit)
+    )
+    if values and not any(one.series.limit is not None for one in values):
+        remarks.append(say("No certificate has limits, so that none can be met."))
+    if known and len({one.day for one in known}) == 1:
+        remarks.append(say("There is one day of recordings only: a trend needs two."))
+    return MachineHistory(machine, on, known, values, tuple(remarks))
+
+
+def _until(series: Series, on: dt.date) -> Series:
+    """The series without what is dated later."""
+    rows = series.day <= on.toordinal()
+    if rows.all():
+        return series
+    names = ("day", "value", "u", "u_artefact", "artefact", "entry", "adjusted_since", "interim")
+    return replace(series, **{name: getattr(series, name)[rows] for name in names})
+
+
+def _value(series: Series, adjusted_after: int | None, prior: Prior | None, outcome: str) -> ValueHistory:
+    changed = None
+    adjusted = False
+    if len(series.day) > 1:
+        before, now = (
+            Stated(float(series.value[i]), float(series.u[i]), float(series.u_artefact[i]), str(series.artefact[i]))
+            for i in (-2, -1)
+        )
+        changed = change(before, now)
+        adjusted = bool(series.adjusted_since[-2] != series.adjusted_since[-1])
+    return ValueHistory(series, changed, adjusted, trend(series), adjusted_after, prior, outcome)

@@ -1,0 +1,68 @@
+"""By which rule a machine's next calibration is found, as its newest job says it (``[machine] calibrate``)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from cmm_uq.base.messages import Text, plural, say
+from cmm_uq.laboratory.due.changing import Changing
+
+DAYS_A_MONTH = 365.2425 / 12
+
+USUAL_MONTHS = 12
+"""Interval of a machine whose job says nothing."""
+
+USUAL_RELIABILITY = 0.95
+
+LONGEST_MONTHS = 60
+"""Longest interval that a method comes to where nothing is said: the five years of suncal."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule; see :class:`cmm_uq.jobs.recalibration.Recalibration`.
+
+    Parameters
+    ----------
+    method : one of fixed, A3, S2, staircase, control chart, drift.
+    every_months : interval, or the one that a method begins with.
+    reliability : wanted at the end of an interval.
+    shortest_months, longest_months : bounds of what a method, or a check, comes to; no longest one where nothing is said.
+    stated : whether the job says anything.
+    """
+
+    method: str = "fixed"
+    every_months: int = USUAL_MONTHS
+    reliability: float = USUAL_RELIABILITY
+    shortest_months: int = 1
+    longest_months: int | None = None
+    stated: bool = False
+
+    @classmethod
+    def of(cls, said: Mapping[str, Any] | None) -> Rule:
+        """From the table of a job, which was checked when it was read; ``None`` where it has none."""
+        if said is None:
+            return cls()
+        known = {field.name for field in fields(cls)}
+        given = {name: value for name, value in said.items() if value is not None and name in known}
+        given.setdefault("method", "A3" if "reliability" in given else "fixed")
+        return cls(**given, stated=True)
+
+    @property
+    def days(self) -> float:
+        """The interval that it begins with."""
+        return self.every_months * DAYS_A_MONTH
+
+    @property
+    def changing(self) -> Changing:
+        """Within which bounds a method changes it."""
+        longest = max(self.longest_months or LONGEST_MONTHS, self.every_months)
+        return Changing(shortest_days=self.shortest_months * DAYS_A_MONTH, longest_days=longest * DAYS_A_MONTH)
+
+
+def months_of(rule: Rule) -> Text:
+    """The interval that a rule begins with, in words."""
+    count = rule.every_months
+    return plural(count, one=say("one month"), many=say("{count} months", count=count))

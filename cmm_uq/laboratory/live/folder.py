@@ -1,0 +1,187 @@
+"""The folder of a recording that is taken live: its lock, its journals one a session, and what of it can be opened again."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.output.locking import locked
+from cmm_uq.laboratory.live.journal import Journal, Moment, Record, opened, refuse_damaged
+from cmm_uq.laboratory.live.story import Story
+
+FOLDER = "acquisition"
+"""Inside the job's."""
+
+LOCK = "lock"
+EVENTS, STREAMS = "{:04d}-events.jsonl", "{:04d}-streams.jsonl"
+"""Names of the two journals of a session, by its number."""
+
+_EVENTS = re.compile(r"(\d{4})-events\.jsonl")
+
+
+@dataclass
+class Journals:
+    """The journals of the session that is running.
+
+    Parameters
+    ----------
+    folder : of all sessions.
+    events : of what happened: points, gaps, notes.
+    streams : of the readings that come by themselves.
+    story : all sessions so far.
+    """
+
+    folder: Path
+    events: Journal
+    streams: Journal
+    story: Story
+    _lock: int
+
+    def say(self, kind: str, data: Mapping[str, Any], moment: Moment) -> Record:
+        """A record of what happened, kept by the next :meth:`commit`."""
+        record = self.events.append(kind, data, moment)
+        self.story.take(record)
+        return record
+
+    def commit(self) -> None:
+        """Put both on the disk.
+
+        Raises
+        ------
+        OutputError : there is no room.
+        """
+        self.events.commit()
+        self.streams.commit()
+
+    def close(self) -> None:
+        """Give files and lock back."""
+        self.events.close()
+        self.streams.close()
+        with contextlib.suppress(OSError):
+            os.close(self._lock)
+
+
+def sessions_in(folder: Path) -> list[Path]:
+    """Journals of events of all sessions, in order."""
+    try:
+        names = sorted(path.name for path in folder.iterdir() if _EVENTS.fullmatch(path.name))
+    except OSError:
+        return []
+    return [folder / name for name in names]
+
+
+def begin(folder: Path, said: Mapping[str, Any], moment: Moment, *, skip_damaged: bool = False) -> Journals:
+    """Begin a session: take the lock, read what earlier ones left, cut what was never finished, and open new journals.
+
+    Parameters
+    ----------
+    folder : of all sessions; made where it is not there.
+    said : what the session begins with.
+    moment : now.
+    skip_damaged : go on behind damaged lines, which the new session then names.
+
+    Raises
+    ------
+    CmmUqError : another program is recording this job, or a line is damaged.
+    OutputError : the folder cannot be written to.
+    """
+    lock = _taken(folder)
+    try:
+        return _begun(folder, said, moment, skip_damaged, lock)
+    except BaseException:
+        os.close(lock)
+        raise
+
+
+def read_story(folder: Path, *, skip_damaged: bool = False) -> Story:
+    """What all sessions in a folder come to; nothing is changed.
+
+    Raises
+    ------
+    CmmUqError : a line is damaged.
+    """
+    return _read(folder, skip_damaged)[0]
+
+
+def _read(folder: Path, skip_damaged: bool) -> tuple[Story, int, list[tuple[Path, bytes]], list[str]]:
+    """The story, the number of the next record, what was torn off which file, and damaged lines."""
+    story, following, torn, damaged = Story(), 1, [], []
+    for path in sessions_in(folder):
+        found = opened(path, first=following)
+        if not skip_damaged:
+            refuse_damaged(path, found)
+        damaged += [f"{path.name} line {number}" for number in found.damaged]
+        for record in found.records:
+            story.take(record)
+        following = max(following, *(record.number + 1 for record in found.records), 1)
+        if found.torn:
+            torn.append((path, found.torn))
+    return story, following, torn, damaged
+
+
+def _begun(folder: Path, said: Mapping[str, Any], moment: Moment, skip_damaged: bool, lock: int) -> Journals:
+    story, following, torn, damaged = _read(folder, skip_damaged)
+    known = {line for session in story.sessions for line in session.said.get("damaged", [])}
+    number = 1 + max((int(path.name[:4]) for path in sessions_in(folder)), default=0)
+    streams = folder / STREAMS.format(number - 1)
+    torn += [(streams, tail)] if (tail := _torn_end(streams)) else []
+    events = Journal(folder / EVENTS.format(number), first=following)
+    journals = Journals(folder, events, Journal(folder / STREAMS.format(number)), story, lock)
+    fresh = [line for line in damaged if line not in known]
+    journals.say("session", {"session": number, **said, **({"damaged": fresh} if fresh else {})}, moment)
+    for path, tail in torn:
+        journals.say("cut", {"file": path.name, "bytes": len(tail), "text": tail.decode("latin-1")}, moment)
+    journals.commit()  # before anything is cut, it is kept here
+    for path, tail in torn:
+        _cut(path, len(tail))
+    return journals
+
+
+def _torn_end(path: Path) -> bytes:
+    """What stands behind the last line feed of a file that may be large."""
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, os.SEEK_END)
+            step = 65536
+            while True:
+                start = max(0, size - step)
+                file.seek(start)
+                text = file.read(size - start)
+                if b"\n" in text or start == 0:
+                    return text[text.rfind(b"\n") + 1 :]
+                step *= 2
+    except OSError:
+        return b""
+
+
+def _cut(path: Path, count: int) -> None:
+    """Cut bytes off a file's end."""
+    try:
+        with path.open("rb+") as file:
+            file.truncate(path.stat().st_size - count)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError as error:
+        raise OutputError(f"cannot be written: {error.strerror}", where=str(path), fix="Mend its permissions") from None
+
+
+def _taken(folder: Path) -> int:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with (folder / LOCK).open("ab"):
+            pass
+        lock = locked(folder / LOCK, create=False)
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written: {error.strerror}", where=str(folder), fix="Mend its permissions"
+        ) from None
+    if lock is None:
+        raise CmmUqError("this job is being recorded by another program", where=str(folder),
+                         fix="End it there; a program that was killed holds no lock")  # fmt: skip
+    return lock

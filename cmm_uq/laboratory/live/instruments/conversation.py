@@ -1,0 +1,89 @@
+"""When which question is asked, and which message answers it; knows no port, and no clock but the time that it is told."""
+
+from __future__ import annotations
+
+from cmm_uq.laboratory.live.instruments.control_codes import bytes_of
+from cmm_uq.laboratory.live.instruments.profile import Send
+
+SECOND = 1_000_000_000
+"""ns."""
+
+PAUSE = SECOND // 2
+"""After an answer that did not come: where several questions are asked, a late one would be taken for the next one's."""
+
+
+class Conversation:
+    """Questions to one instrument, one after the other, a round every so often.
+
+    Parameters
+    ----------
+    send : what the instrument is sent.
+    now : monotonic clock, ns.
+    replayed : whether the answers come from a file, where nothing is asked.
+
+    Attributes
+    ----------
+    asked : which question waits for its answer, or was answered last; −1 before the first.
+    waiting : whether an answer is waited for.
+    gap : whether the instrument is silent: it is then asked without regard to the rounds, so that its return is noticed.
+    """
+
+    def __init__(self, send: Send, now: int, *, replayed: bool = False) -> None:
+        self._polls = [bytes_of(poll.send) for poll in send.poll]
+        self._every, self._patience = round(send.every_s * SECOND), round(send.answer_within_s * SECOND)
+        silent = send.silent_after_s
+        self._silence = None if self._polls or silent is None or replayed else round(silent * SECOND)
+        self._replayed = replayed
+        self._due = self._since = self._asked_at = self._heard_at = self._pause = now
+        self.asked = 0 if replayed else -1
+        self.waiting = self.gap = False
+
+    @property
+    def several(self) -> bool:
+        """Whether an answer may belong to one of several questions."""
+        return len(self._polls) > 1 and not self._replayed
+
+    def question(self, now: int) -> bytes | None:
+        """What to send now; ``None``: nothing yet."""
+        if not self._polls or self._replayed:
+            return None
+        if self.waiting:
+            if not self.gap or self.several or now - self._asked_at < min(self._patience, SECOND):
+                return None
+            self._asked_at = now
+            return self._polls[self.asked]
+        following = (self.asked + 1) % len(self._polls)
+        if now < self._pause or (following == 0 and now < self._due and not self.gap):
+            return None
+        if following == 0:
+            self._due += self._every * max(1, 1 + (now - self._due) // self._every)
+        self.asked, self.waiting = following, True
+        self._since = self._asked_at = now
+        return self._polls[following]
+
+    def heard(self, now: int, *, answer: bool) -> None:
+        """A message came.
+
+        Parameters
+        ----------
+        now : monotonic clock, ns.
+        answer : whether it answers a question.
+        """
+        self._heard_at = now
+        if answer:
+            self.waiting = self.gap = False
+            if self._replayed and self._polls:
+                self.asked = (self.asked + 1) % len(self._polls)
+
+    def overdue(self, now: int) -> bool:
+        """Whether an answer did not come in time, or an instrument that speaks by itself is silent; said once each time."""
+        if self.waiting and now - self._since >= self._patience:
+            self.waiting = False
+            self._pause = now + PAUSE if self.several else now
+            return True
+        if self._silence is not None:
+            allowed = min(self._silence, SECOND) if self.gap else self._silence
+            if now - self._heard_at >= allowed:
+                self._heard_at = now
+                return True
+        return False

@@ -1,0 +1,279 @@
+"""An instrument as a source: its port, its messages with their times, its silence and its return."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.laboratory.live.instruments.control_codes import bytes_of
+from cmm_uq.laboratory.live.instruments.conversation import SECOND, Conversation
+from cmm_uq.laboratory.live.instruments.framing import Framed, Framer
+from cmm_uq.laboratory.live.instruments.introduction import Introduction, another
+from cmm_uq.laboratory.live.instruments.parsing import Parser, Understood
+from cmm_uq.laboratory.live.instruments.port import Port, PortLostError
+from cmm_uq.laboratory.live.instruments.ports import Opened
+from cmm_uq.laboratory.live.instruments.profile import ProfileFile
+from cmm_uq.laboratory.live.instruments.reading import Reading
+from cmm_uq.laboratory.live.instruments.replay import EndOfFileError, ReplayedFile
+from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, Returned
+
+RETRY_S = 0.25
+"""Between two attempts to open a port that is gone; a return is to be noticed within 2 s."""
+
+INTRODUCED_WITHIN_S = 0.7
+"""Time for an instrument that came back to say which one it is."""
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """When the last byte of something came, by both clocks, ns."""
+
+    utc_ns: int
+    monotonic_ns: int
+
+
+class Instrument:
+    """An instrument at a port.
+
+    Parameters
+    ----------
+    identity : what the job says of it.
+    profile : how it speaks.
+    opened : opens its port.
+    clock : that stamps.
+    reopen_when_silent : whether the connection is made anew where nothing comes: one over a network may be dead unnoticed.
+
+    Raises
+    ------
+    CmmUqError : the port cannot be opened, or another instrument is there.
+    """
+
+    def __init__(
+        self, identity: Identity, profile: ProfileFile, opened: Opened, clock: Clock, *, reopen_when_silent: bool = False
+    ) -> None:  # fmt: skip
+        self.name = identity.name
+        self._declared, self._identity = identity, identity
+        self._profile, self._opened, self._clock = profile, opened, clock
+        self._reopen_when_silent = reopen_when_silent
+        self._parser, self._framer = Parser(profile), Framer(profile.frame)
+        self._number, self._gap_at, self._closed = 0, -1, False
+        self._byte_at = clock.monotonic_ns()
+        self._told, self._known = "", False
+        self._port: Port | None = opened()
+        self._conversation = self._begun()
+        self._held: list[Event] = []
+        try:
+            self._held = list(self._introduced(self._port, profile.send.answer_within_s))
+        except PortLostError as lost:
+            raise CmmUqError(
+                f"the port was lost at once: {lost}", where=self.name, fix="Check cable and power"
+            ) from None
+        except CmmUqError:
+            self._port.close()
+            raise
+
+    def identity(self) -> Identity:
+        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.identity`."""
+        return self._identity
+
+    def close(self) -> None:
+        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.close`."""
+        self._closed = True
+        port, self._port = self._port, None
+        if port is not None:
+            with contextlib.suppress(PortLostError):
+                for text in self._profile.send.stop:
+                    port.write(bytes_of(text))
+            port.close()
+
+    def events(self, stop: threading.Event) -> Iterator[Event]:
+        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.events`; those of a replayed file end with it."""
+        held, self._held = self._held, []
+        yield from held
+        while not stop.is_set() and not self._closed:
+            port = self._port
+            if port is None:
+                yield from self._reconnected()
+                continue
+            try:
+                yield from self._step(port)
+            except EndOfFileError as end:
+                yield from self._rest()
+                yield from self._silent(say("{why}", why=Verbatim(str(end))))
+                return
+            except PortLostError as lost:
+                if not self._closed:
+                    yield from self._lost(say("the port was lost: {why}", why=Verbatim(str(lost))))
+        yield from self._rest()
+
+    def _step(self, port: Port) -> Iterator[Event]:
+        """Ask what is due, read what came, notice what did not."""
+        now = self._clock.monotonic_ns()
+        question = self._conversation.question(now)
+        if question is not None:
+            if self._profile.frame.length and not self._profile.frame.start:
+                yield from self._rest()
+            port.write(question)
+        received = port.read()
+        stamp = self._stamp()
+        if received:
+            self._byte_at = stamp.monotonic_ns
+            for framed in self._framer.feed(received):
+                yield from self._message(framed, stamp, port)
+        elif self._framer.waiting and stamp.monotonic_ns - self._byte_at > self._profile.send.answer_within_s * SECOND:
+            yield from self._rest()
+        if self._conversation.overdue(self._clock.monotonic_ns()):
+            yield from self._overdue(port)
+
+    def _message(self, framed: Framed, stamp: Stamp, port: Port | None = None) -> Iterator[Event]:
+        """What came, with the return of an instrument that was silent; with a port, that is asked first who it is."""
+        understood = self._parser.read(framed, max(self._conversation.asked, 0))
+        if self._conversation.several and not self._conversation.waiting and understood.answers:
+            understood = Understood(status=say("comes too late, or answers no question"))
+        self._conversation.heard(stamp.monotonic_ns, answer=understood.answers)
+        if understood.answers and self._gap_at >= 0:
+            yield from self._returned(framed, understood, stamp, port)
+        else:
+            yield self._reading(framed, understood, stamp)
+
+    def _returned(self, framed: Framed, understood: Understood, stamp: Stamp, port: Port | None) -> Iterator[Event]:
+        """The first that an instrument says after a gap."""
+        gap, self._gap_at = self._gap_at, -1
+        try:
+            further = [] if self._known or port is None else list(self._introduced(port, INTRODUCED_WITHIN_S))
+        except (CmmUqError, PortLostError) as error:
+            self._gap_at, self._conversation.gap = gap, True
+            yield self._reading(framed, Understood(status=Verbatim(str(error))), stamp)
+            yield from self._refused(error)
+            return
+        self._told = ""
+        yield Returned(self.name, stamp.utc_ns, stamp.monotonic_ns, (stamp.monotonic_ns - gap) / SECOND)
+        yield self._reading(framed, understood, stamp)
+        yield from further
+
+    def _refused(self, error: CmmUqError | PortLostError) -> Iterator[Event]:
+        """Another instrument is there, or the port is lost again: the gap goes on, and a new reason for it is said."""
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
+        why = error.problem if isinstance(error, CmmUqError) else str(error)
+        if self._told != why:
+            self._told, stamp = why, self._stamp()
+            yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(why))
+
+    def _reading(self, framed: Framed, understood: Understood, stamp: Stamp) -> Reading:
+        self._number += 1
+        return Reading(
+            self.name, self._number, stamp.utc_ns, stamp.monotonic_ns, framed.raw, dict(understood.values), understood.status
+        )  # fmt: skip
+
+    def _rest(self) -> Iterator[Event]:
+        """A message whose end did not come."""
+        rest = self._framer.rest()
+        if rest is not None:
+            yield self._reading(rest, self._parser.read(rest), self._stamp())
+
+    def _overdue(self, port: Port) -> Iterator[Event]:
+        yield from self._rest()
+        asked = bool(self._profile.send.poll)
+        why = say("no answer within {s:g} s", s=self._profile.send.answer_within_s) if asked else say("nothing comes")
+        if self._reopen_when_silent and self._gap_at >= 0:
+            yield from self._lost(why)
+        else:
+            yield from self._silent(why)
+            for text in self._profile.send.start:  # an instrument that was switched off has forgotten what it was told
+                port.write(bytes_of(text))
+
+    def _silent(self, why: Text) -> Iterator[Event]:
+        """Say that nothing comes, once for each reason."""
+        self._conversation.gap = True
+        stamp = self._stamp()
+        if self._gap_at < 0:
+            self._gap_at, self._known = stamp.monotonic_ns, False
+        if not self._told:
+            self._told = why
+            yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, why)
+
+    def _lost(self, why: Text) -> Iterator[Event]:
+        """Give up the port; what waited for its end is said first."""
+        yield from self._rest()
+        port, self._port = self._port, None
+        if port is not None:
+            port.close()
+        yield from self._silent(why)
+
+    def _reconnected(self) -> Iterator[Event]:
+        """Try to open the port once."""
+        try:
+            port = self._opened()
+        except CmmUqError:
+            self._clock.sleep(RETRY_S)
+            return
+        self._conversation, self._port = self._begun(), port
+        self._conversation.gap = True
+        try:
+            yield from self._introduced(port, INTRODUCED_WITHIN_S)
+        except PortLostError:
+            self._port = None
+            port.close()
+            self._clock.sleep(RETRY_S)
+        except CmmUqError as error:
+            yield from self._refused(error)
+            self._clock.sleep(RETRY_S)
+
+    def _introduced(self, port: Port, within_s: float) -> Iterator[Event]:
+        """Ask which instrument it is and begin; what comes meanwhile is kept."""
+        self._byte_at = self._clock.monotonic_ns()
+        wanted = self._profile.identify
+        if wanted is not None and not isinstance(port, ReplayedFile):
+            introduction = Introduction(wanted)
+            port.write(bytes_of(wanted.send))
+            until = self._clock.monotonic_ns() + round(within_s * SECOND)
+            came, lost = self._answers(port, introduction, until)
+            found = introduction.found
+            wrong = None if found is None else another(self._identity, found, self._declared)
+            status = None if wrong is None else Verbatim(str(wrong))
+            for place, (framed, stamp) in enumerate(came):
+                if introduction.tells(place) or wrong is not None:
+                    yield self._reading(framed, Understood(status=status), stamp)
+                else:
+                    yield from self._message(framed, stamp)
+            if (failed := wrong or lost) is not None:
+                raise failed
+            if found is not None:
+                self._identity, self._known = _completed(found, self._declared), True
+        for text in self._profile.send.start:
+            port.write(bytes_of(text))
+
+    def _answers(
+        self, port: Port, introduction: Introduction, until: int
+    ) -> tuple[list[tuple[Framed, Stamp]], PortLostError | None]:  # fmt: skip
+        """What comes until the instrument has said who it is, or the time is over, or the port is lost."""
+        came: list[tuple[Framed, Stamp]] = []
+        while introduction.found is None and self._clock.monotonic_ns() < until:
+            try:
+                received = port.read()
+            except PortLostError as lost:
+                return came, lost
+            stamp = self._stamp()
+            for framed in self._framer.feed(received):
+                came.append((framed, stamp))
+                introduction.hear(framed)
+        return came, None
+
+    def _begun(self) -> Conversation:
+        replayed = isinstance(self._port, ReplayedFile)
+        return Conversation(self._profile.send, self._clock.monotonic_ns(), replayed=replayed)
+
+    def _stamp(self) -> Stamp:
+        return Stamp(self._clock.utc_ns(), self._clock.monotonic_ns())
+
+
+def _completed(found: Identity, declared: Identity) -> Identity:
+    """What the instrument says, and what only the job says."""
+    said = {key: value for key, value in vars(found).items() if value is not None}
+    return replace(declared, **(said | {"name": declared.name, "certificate": declared.certificate}))

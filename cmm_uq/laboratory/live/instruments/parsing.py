@@ -1,0 +1,200 @@
+"""What a message says: values by quantity, or in words what is wrong; whatever comes in, an answer comes out."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isclose
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.sentences import unit_of
+from cmm_uq.base.messages import Text, Verbatim, say, semicolons
+from cmm_uq.laboratory.live.instruments.control_codes import bytes_of, shown
+from cmm_uq.laboratory.live.instruments.framing import Framed, Framer
+from cmm_uq.laboratory.live.instruments.profile import Example, Parse, ProfileFile, Quantity
+from cmm_uq.laboratory.live.instruments.quantities import NoValueError, conversion, number_of, value_of
+
+_SHOWN = 60
+"""Bytes of a message that was not understood, as messages show them."""
+
+_PLAIN = Quantity()
+_NOTHING = Parse(pattern="(?!)")
+"""Understands nothing."""
+
+
+@dataclass(frozen=True)
+class Understood:
+    """What a message says.
+
+    Parameters
+    ----------
+    values : by quantity; empty where it says none.
+    status : what is wrong; ``None``: nothing.
+    answers : whether it is an answer: it has values, or says that something is wrong with the instrument.
+    """
+
+    values: Mapping[str, float] = field(default_factory=dict)
+    status: Text | None = None
+    answers: bool = False
+
+
+class Parser:
+    """The messages of one instrument.
+
+    Parameters
+    ----------
+    profile : of the instrument.
+    """
+
+    def __init__(self, profile: ProfileFile) -> None:
+        self._profile, self._parse = profile, profile.parse or _NOTHING
+        self._ignored = [re.compile(pattern) for pattern in self._parse.ignore]
+        self._ill = [(re.compile(one.pattern), one.says) for one in profile.ill]
+        usual, polls = self._parse.pattern, profile.send.poll
+        texts = [poll.pattern or usual for poll in polls] or [usual]
+        self._patterns = [None if text is None else re.compile(text) for text in texts]
+
+    def read(self, message: Framed, answers: int = 0) -> Understood:
+        """What it says.
+
+        Parameters
+        ----------
+        message : as framed.
+        answers : which question was asked.
+        """
+        text = message.body.decode("latin-1")
+        if any(pattern.fullmatch(text) for pattern in self._ignored):
+            return Understood()
+        if not message.whole:
+            return Understood(status=say("part of a message, or noise: {seen}", seen=_seen(message.raw)))
+        for pattern, says in self._ill:
+            if pattern.search(text):
+                told = say("the instrument says {seen}: {meaning}", seen=_seen(message.raw), meaning=Verbatim(says))
+                return Understood(status=told, answers=True)
+        try:
+            return self._valued(list(self._numbers(message.body, text, answers)))
+        except NoValueError as error:
+            return Understood(status=error.why)
+
+    def _valued(self, found: list[tuple[str, str | float, str]]) -> Understood:
+        """Values of what a message has, each by itself: one open thermocouple does not spoil the others."""
+        values: dict[str, float] = {}
+        wrong: list[Text] = []
+        for name, given, said in found:
+            try:
+                raw = number_of(given, self._parse.decimal) if isinstance(given, str) else given
+                values[name] = value_of(name, raw, self._profile.quantities.get(name, _PLAIN), said)
+            except NoValueError as error:
+                wrong.append(error.why)
+        return Understood(values, semicolons(wrong) if wrong else None, answers=bool(values))
+
+    def _numbers(self, body: bytes, text: str, answers: int) -> Iterator[tuple[str, str | float, str]]:
+        """Name, number as sent and unit as said of each quantity of a message.
+
+        Raises
+        ------
+        NoValueError : the message is another.
+        """
+        if self._parse.struct is not None:
+            yield from self._binary(body, self._parse.struct)
+        elif self._parse.separator is not None:
+            yield from self._separated(text, self._parse.separator)
+        else:
+            yield from self._matched(text, answers)
+
+    def _matched(self, text: str, answers: int) -> Iterator[tuple[str, str | float, str]]:
+        pattern = self._patterns[answers % len(self._patterns)]
+        found = pattern.search(text) if pattern else None
+        if found is None:
+            raise NoValueError(_not_understood(text))
+        groups = found.groupdict()
+        units = {one.unit_group for one in self._profile.quantities.values()}
+        for name, given in groups.items():
+            if given is not None and name not in units:
+                group = self._profile.quantities.get(name, _PLAIN).unit_group
+                yield name, given, (groups.get(group) or "").strip()
+
+    def _separated(self, text: str, separator: str) -> Iterator[tuple[str, str | float, str]]:
+        parts = re.split(separator, text.strip())
+        names = self._parse.fields
+        if len(parts) > len(names) or (len(parts) < len(names) and not self._parse.fewer):
+            raise NoValueError(
+                say("{seen} has {count} fields, not {wanted}", seen=_seen(text.encode("latin-1")), count=len(parts),
+                    wanted=len(names))
+            )  # fmt: skip
+        yield from ((name, part, "") for name, part in zip(names, parts, strict=False) if name)
+
+    def _binary(self, body: bytes, layout: str) -> Iterator[tuple[str, str | float, str]]:
+        if len(body) != struct.calcsize(layout):
+            raise NoValueError(_not_understood(body.decode("latin-1")))
+        for name, value in zip(self._parse.fields, struct.unpack(layout, body), strict=True):
+            if name and isinstance(value, (int, float)):
+                yield name, float(value), ""
+
+
+def _not_understood(text: str) -> Text:
+    return say("not understood: {seen}", seen=_seen(text.encode("latin-1")))
+
+
+def _seen(raw: bytes) -> Text:
+    return Verbatim(f"{shown(raw[:_SHOWN])}{'…' if len(raw) > _SHOWN else ''}")
+
+
+def check_profile(profile: ProfileFile, where: str) -> None:
+    """Refuse a profile that contradicts itself, or reads its own examples otherwise than they say.
+
+    Parameters
+    ----------
+    profile : as read.
+    where : its file.
+
+    Raises
+    ------
+    CmmUqError : with what was seen and what was expected.
+    """
+    if profile.protocol == "ipp":
+        return
+    if profile.parse is None:
+        raise CmmUqError("is missing: it says what a message means", where=f"{where}: [parse]",
+                         fix="Give pattern, or fields with separator or struct")  # fmt: skip
+    if profile.frame.length and not profile.frame.start and not profile.send.poll:
+        raise CmmUqError("is for instruments that are asked: nothing else ends a message that is cut",
+                         where=f"{where}: [frame] length", fix="Give start, or [send] poll")  # fmt: skip
+    _check_quantities(profile, where)
+    parser = Parser(profile)
+    for place, example in enumerate(profile.example, 1):
+        _check_example(profile, parser, example, f"{where}: [[example]] {place}")
+
+
+def _check_quantities(profile: ProfileFile, where: str) -> None:
+    named = profile.named()
+    for name, quantity in profile.quantities.items():
+        at = f"{where}: [quantities.{name}]"
+        if name not in named:
+            raise CmmUqError("is no group or field of a message", where=at, fix=suggestion(name, named))
+        for unit in (quantity.unit, *quantity.units.values()):
+            try:
+                conversion(unit, unit_of(name))
+            except CmmUqError as error:
+                raise CmmUqError(error.problem, where=at, fix=error.fix) from None
+
+
+def _check_example(profile: ProfileFile, parser: Parser, example: Example, at: str) -> None:
+    framer = Framer(profile.frame)
+    raw = bytes_of(example.received)
+    messages = framer.feed(raw)
+    if len(messages) != 1 or framer.waiting:
+        raise CmmUqError(f"{shown(raw)} is {len(messages)} messages and {'a part' if framer.waiting else 'no rest'}",
+                         where=at, fix="Mend [frame], or write the message with its framing")  # fmt: skip
+    found = parser.read(messages[0], example.answers)
+    if bool(found.status) != example.ill or not _same(found.values, example.values):
+        seen = ", ".join(f"{name} = {value!r}" for name, value in found.values.items()) or found.status or "nothing"
+        wanted = ", ".join(f"{name} = {value!r}" for name, value in example.values.items())
+        raise CmmUqError(f"{shown(raw)} is read as {seen}, not as {wanted or 'what is wrong with the instrument'}",
+                         where=at, fix="Mend [parse] and [quantities], or the example")  # fmt: skip
+
+
+def _same(found: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
+    return found.keys() == wanted.keys() and all(isclose(found[name], wanted[name], rel_tol=1e-9) for name in wanted)

@@ -1,0 +1,201 @@
+"""Ports: serial lines, plain TCP, RFC 2217 device servers and files, all read alike and lost alike."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import re
+import socket
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.live.instruments.port import TICK_S, Port, PortLostError
+from cmm_uq.laboratory.live.instruments.profile import Connection
+from cmm_uq.laboratory.live.instruments.visa_port import VisaPort
+
+if TYPE_CHECKING:
+    import serial
+
+FILE = "file:"
+NETWORK = ("tcp://", "socket://")
+"""Plain TCP, by two names."""
+RFC2217 = "rfc2217://"
+
+CONNECT_WITHIN_S = 1.0
+"""Time for a connection over the network: twice of it is less than what a reconnection may take."""
+
+KEPT_ALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
+"""So that a connection whose other side was switched off is lost after 8 s, where nothing is sent that would show it."""
+
+_CHUNK = 65536
+_ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
+
+
+Opened = Callable[[], Port]
+"""Opens a port, again and again."""
+
+
+def opener(port: str, connection: Connection, *, tcp_port: int | None = None) -> Opened:
+    """How a port is opened.
+
+    Parameters
+    ----------
+    port : as a job names it.
+    connection : settings of a serial line.
+    tcp_port : the usual one, for an address without.
+
+    Raises
+    ------
+    CmmUqError : the name is none of a port.
+    """
+    if port.startswith("visa://"):
+        return lambda: VisaPort(port)
+    if "://" not in port:
+        if not port.strip():
+            raise CmmUqError("no port is named", fix='Give port = "/dev/ttyUSB0", "COM3" or "socket://host:port"')
+        return lambda: SerialPort(port, connection)
+    if tcp_port is not None and re.fullmatch(r"\w+://[^\s:/]+/?", port):
+        port = f"{port.rstrip('/')}:{tcp_port}"
+    address = _ADDRESS.fullmatch(port)
+    if address is None or not 0 < int(address["port"]) < 65536:
+        raise CmmUqError("is no address", where=port, fix="Write it as socket://host:port")
+    if port.startswith(NETWORK):
+        return lambda: TcpPort(address["host"].strip("[]"), int(address["port"]), port)
+    if port.startswith(RFC2217):
+        return lambda: SerialPort(port, connection)
+    raise CmmUqError(f"{address['scheme']}:// is no way to an instrument", where=port,
+                     fix="Known: a serial port, socket://, tcp://, rfc2217://, visa://, file:")  # fmt: skip
+
+
+class SerialPort:
+    """A serial line of this computer, or one behind an RFC 2217 device server; no other program has it at the same time."""
+
+    def __init__(self, port: str, connection: Connection) -> None:
+        import serial
+
+        far = port.startswith(RFC2217)
+        flow = {"xonxoff": connection.flow == "xon-xoff", "rtscts": connection.flow == "rts-cts"}
+        settings: dict[str, Any] = {
+            "baudrate": connection.baud, "bytesize": connection.data_bits, "parity": connection.parity[0].upper(),
+            "stopbits": connection.stop_bits, "dsrdtr": connection.flow == "dsr-dtr", **flow,
+        }  # fmt: skip
+        self._failures = (serial.SerialException, OSError, TypeError, ValueError)
+        own: dict[str, Any] = {} if far else {"exclusive": True, "write_timeout": 1.0}
+        url = f"{port}?timeout={CONNECT_WITHIN_S}" if far else port
+        try:
+            with warnings.catch_warnings(
+                action="ignore", category=DeprecationWarning
+            ):  # of pyserial's way to make a thread
+                made = serial.serial_for_url(url, do_not_open=True, timeout=TICK_S, **settings, **own)
+                self._serial = cast("serial.Serial", made)
+                self._serial.dtr, self._serial.rts = connection.dtr, connection.rts
+                self._serial.open()
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise _refused(port, error) from None
+
+    def read(self) -> bytes:
+        """See :meth:`Port.read`."""
+        try:
+            first: bytes = self._serial.read(1)
+            return first + (self._serial.read(waiting) if first and (waiting := self._serial.in_waiting) else b"")
+        except self._failures as error:
+            raise PortLostError(str(error)) from None
+
+    def write(self, data: bytes) -> None:
+        """See :meth:`Port.write`."""
+        try:
+            self._serial.write(data)
+        except self._failures as error:
+            raise PortLostError(str(error)) from None
+
+    def close(self) -> None:
+        """See :meth:`Port.close`."""
+        with contextlib.suppress(*self._failures):
+            self._serial.close()
+
+
+class TcpPort:
+    """A connection by TCP."""
+
+    def __init__(self, host: str, port: int, name: str) -> None:
+        try:
+            self._socket = socket.create_connection((host, port), timeout=CONNECT_WITHIN_S)
+        except OSError as error:
+            raise _refused(name, error) from None
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        for name, value in KEPT_ALIVE.items():
+            if hasattr(socket, name):
+                self._socket.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+
+    def read(self) -> bytes:
+        """See :meth:`Port.read`."""
+        try:
+            self._socket.settimeout(TICK_S)
+            received = self._socket.recv(_CHUNK)
+        except TimeoutError:
+            return b""
+        except OSError as error:
+            raise PortLostError(error.strerror or str(error)) from None
+        if not received:
+            raise PortLostError("the other side closed the connection")
+        return received
+
+    def write(self, data: bytes) -> None:
+        """See :meth:`Port.write`."""
+        try:
+            self._socket.settimeout(CONNECT_WITHIN_S)
+            self._socket.sendall(data)
+        except OSError as error:
+            raise PortLostError(error.strerror or str(error)) from None
+
+    def close(self) -> None:
+        """See :meth:`Port.close`."""
+        self._socket.close()
+
+
+def _refused(port: str, error: Exception) -> CmmUqError:
+    """Why a port cannot be opened: what was seen, and what to check."""
+    code = getattr(error, "errno", None)
+    text = str(error)
+    if "exclusively lock" in text or code in (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK):
+        return CmmUqError("the port is busy: another program has it", where=port,
+                          fix="Close that program; one port is for one program")  # fmt: skip
+    if code in (errno.EACCES, errno.EPERM) or "Access is denied" in text or "PermissionError" in text:
+        group = "" if os.name == "nt" else ": on Linux, join the group that owns it (ls -l), often dialout"
+        return CmmUqError("the port may not be opened by this user", where=port, fix=f"Ask for the permission{group}")
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or "FileNotFoundError" in text:
+        return CmmUqError("there is no such port", where=port, fix=f"Check cable and power. {_present()}")
+    if code == errno.ENOTTY or "Inappropriate ioctl" in text:
+        return CmmUqError("is no serial port", where=port, fix=_present())
+    if isinstance(error, ConnectionRefusedError) or "refused" in text:
+        return CmmUqError("nobody listens at this address", where=port, fix="Check host, port number and power")
+    if isinstance(error, TimeoutError) or "timed out" in text:
+        return CmmUqError(f"no connection within {CONNECT_WITHIN_S:g} s", where=port,
+                          fix="Check address, cable and firewall")  # fmt: skip
+    if isinstance(error, socket.gaierror):
+        return CmmUqError("no computer of this name is known", where=port, fix="Check the address")
+    return CmmUqError(f"cannot be opened: {text}", where=port, fix="Check port, cable and settings")
+
+
+def _present() -> str:
+    names = [name for name, _ in serial_ports()]
+    return f"Ports here: {', '.join(names)}" if names else "No serial port is here"
+
+
+def serial_ports() -> list[tuple[str, str]]:
+    """Name and description of the serial ports of this computer."""
+    from serial.tools import list_ports
+
+    return sorted(
+        (port.device, "" if port.description == "n/a" else str(port.description)) for port in list_ports.comports()
+    )
+
+
+def file_named(port: str, folder: Path) -> Path:
+    """File of a port that replays one."""
+    return folder / port.removeprefix(FILE).partition("?")[0]

@@ -1,0 +1,298 @@
+"""Append-only files of records, a line each with a checksum, that open whatever happened while they were written.
+
+A line is the CRC-32 of its text, a blank, the text (JSON on one line, ASCII only), and a line feed. Records are numbered, so
+that one that is missing shows. A record counts as kept once :meth:`Journal.commit` has returned: it is then on the disk.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+_CHECKSUM = 8
+"""Hexadecimal digits of it."""
+
+MOST_WAITING = 64 * 2**20
+"""Bytes that wait in memory for room on the disk: twenty minutes of six instruments at 100 Hz."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment by both clocks, ns: the wall clock since 1970, which is set at times, and the monotonic one, which never is."""
+
+    utc_ns: int
+    monotonic_ns: int
+
+
+@dataclass(frozen=True)
+class Record:
+    """A record.
+
+    Parameters
+    ----------
+    number : ascending by one in a file.
+    kind : what it is of.
+    moment : when it was written down.
+    data : what it says, plain data.
+    """
+
+    number: int
+    kind: str
+    moment: Moment
+    data: Mapping[str, Any]
+
+
+def line_of(record: Record) -> bytes:
+    """A record as its line."""
+    parts = [record.number, record.kind, record.moment.utc_ns, record.moment.monotonic_ns, record.data]
+    text = json.dumps(parts, separators=(",", ":"), allow_nan=False).encode()
+    return b"%08x %s\n" % (zlib.crc32(text), text)
+
+
+def record_of(line: bytes) -> Record | None:
+    """The record of a line without its line feed; ``None`` where it is none that was written whole."""
+    checksum, text = line[:_CHECKSUM], line[_CHECKSUM + 1 :]
+    if len(checksum) < _CHECKSUM or line[_CHECKSUM : _CHECKSUM + 1] != b" " or b"%08x" % zlib.crc32(text) != checksum:
+        return None
+    try:
+        number, kind, utc_ns, monotonic_ns, data = json.loads(text)
+    except (ValueError, TypeError):
+        return None
+    return Record(number, kind, Moment(utc_ns, monotonic_ns), data)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of a file, read.
+
+    Parameters
+    ----------
+    number : in the file, from 1.
+    start : its first byte.
+    record : ``None`` where it is damaged, or was never finished.
+    whole : whether it ends with a line feed; only the last may not.
+    """
+
+    number: int
+    start: int
+    record: Record | None
+    whole: bool
+
+
+def lines_in(path: Path) -> Iterator[Line]:
+    """Every line of a journal, one at a time."""
+    start = 0
+    with path.open("rb") as file:
+        for number, line in enumerate(file, 1):
+            whole = line.endswith(b"\n")
+            yield Line(number, start, record_of(line[:-1]) if whole else None, whole)
+            start += len(line)
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What a journal holds.
+
+    Parameters
+    ----------
+    records : all that are sound, in order.
+    torn : bytes behind the last whole line, which nobody was told were kept.
+    damaged : lines, from 1, whose checksum does not fit, or behind which a record is missing.
+    """
+
+    records: tuple[Record, ...]
+    torn: bytes
+    damaged: tuple[int, ...]
+
+
+def opened(path: Path, *, first: int | None = None) -> Opened:
+    """Read a journal; nothing of it is changed.
+
+    Parameters
+    ----------
+    first : number that its first record must have; any when left out.
+    """
+    records: list[Record] = []
+    damaged, torn_at, expected = [], None, first
+    for line in lines_in(path):
+        if not line.whole:
+            torn_at = line.start
+        elif line.record is None:
+            damaged.append(line.number)
+            expected = None if expected is None else expected + 1
+        else:
+            if expected is not None and line.record.number != expected:
+                damaged.append(line.number)
+            records.append(line.record)
+            expected = line.record.number + 1
+    torn = b"" if torn_at is None else path.read_bytes()[torn_at:]
+    return Opened(tuple(records), torn, tuple(damaged))
+
+
+def refuse_damaged(path: Path, found: Opened) -> None:
+    """Refuse to go on behind a damaged line: what it said, an undone point perhaps, would be forgotten.
+
+    Raises
+    ------
+    CmmUqError : a line is damaged.
+    """
+    if found.damaged:
+        others = f", and {len(found.damaged) - 1} more" if len(found.damaged) > 1 else ""
+        raise CmmUqError(
+            f"the line is damaged{others}: its checksum, or its number, does not fit",
+            where=f"{path} line {found.damaged[0]}",
+            fix="Put a copy of the file in its place, or go on without it: --skip-damaged, which the recording then says",
+        )
+
+
+class NoRoomError(OutputError):
+    """The disk takes nothing more; what was to be written waits in memory."""
+
+
+class Journal:
+    """A journal that is written.
+
+    Parameters
+    ----------
+    path : of a file that does not exist yet.
+    first : number of its first record.
+
+    Attributes
+    ----------
+    written : bytes that are on the disk.
+
+    Raises
+    ------
+    OutputError : it cannot be made.
+    """
+
+    def __init__(self, path: Path, *, first: int = 1) -> None:
+        self.path, self.next = path, first
+        self.written = 0
+        self._waiting: list[bytes] = []
+        self._bytes = 0
+        try:
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+            _keep_name(path.parent)
+        except OSError as error:
+            raise _refused("cannot be made", error, path) from None
+
+    def append(self, kind: str, data: Mapping[str, Any], moment: Moment) -> Record:
+        """A record that will be kept by the next :meth:`commit`.
+
+        Raises
+        ------
+        OutputError : too much waits already for room on the disk.
+        """
+        record = Record(self.next, kind, moment, data)
+        line = line_of(record)
+        if self._bytes + len(line) > MOST_WAITING:
+            raise OutputError(
+                f"the disk has been full for so long that {self._bytes} bytes wait in memory", where=str(self.path),
+                fix="Make room, then go on; what was shown as accepted is kept",
+            )  # fmt: skip
+        self.next += 1
+        self._waiting.append(line)
+        self._bytes += len(line)
+        return record
+
+    @property
+    def waiting(self) -> int:
+        """Records that are not on the disk yet."""
+        return len(self._waiting)
+
+    def commit(self) -> None:
+        """Put everything that waits on the disk.
+
+        Raises
+        ------
+        NoRoomError : there is no room for it; it goes on waiting, and the file ends with its last whole record.
+        """
+        if not self._waiting:
+            return
+        text = b"".join(self._waiting)
+        try:
+            _write(self._file, text)
+            os.fsync(self._file)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self.written)
+            if error.errno not in _NO_ROOM:
+                raise _refused("cannot be written", error, self.path) from None
+            raise NoRoomError(
+                f"there is no room on the disk ({error.strerror}): {self.waiting} records wait in memory, not accepted",
+                where=str(self.path), fix="Make room; they are written as soon as there is some",
+            ) from None  # fmt: skip
+        self.written += len(text)
+        self._waiting.clear()
+        self._bytes = 0
+
+    def close(self) -> None:
+        """Give the file back; what still waits is lost."""
+        with contextlib.suppress(OSError):
+            os.close(self._file)
+
+
+def _refused(what: str, error: OSError, path: Path) -> OutputError:
+    return OutputError(f"{what}: {error.strerror}", where=str(path), fix="Make room, or mend the folder's permissions")
+
+
+def _write(file: int, text: bytes) -> None:
+    left = memoryview(text)
+    while left:
+        left = left[os.write(file, left) :]
+
+
+def _keep_name(folder: Path) -> None:
+    """Put the names in a folder on the disk, where the system can."""
+    if os.name == "nt":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def made_folder(folder: Path) -> None:
+    """Make a folder, and those above it, that may be there already.
+
+    Raises
+    ------
+    OutputError : it cannot be made, or is a file.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot be made: {error.strerror}", where=str(folder), fix="Name another folder") from None
+
+
+def written_whole(path: Path, content: bytes) -> None:
+    """Write a file, or write it anew: whoever reads it finds the old content or the new one, also after a power cut.
+
+    Raises
+    ------
+    OutputError : it cannot be written.
+    """
+    temporary = path.with_name(f".unfinished-{path.name}")
+    try:
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+        _keep_name(path.parent)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise _refused("cannot be written", error, path) from None

@@ -1,0 +1,220 @@
+"""What is said of a point as soon as it is there: live length and deviation, and what a screening would say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.analysis.screening.screened import impossible_values, screened
+from cmm_uq.analysis.screening.shape import Screening
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, number, say, signed
+from cmm_uq.base.points import Floats, Ints, Machine, Points
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.laboratory.live.expectation import LEVEL, RARE, Predicted, predicted, scatter
+from cmm_uq.laboratory.live.lead import Lead, Run, Step
+from cmm_uq.laboratory.live.recorder import COORDINATES
+from cmm_uq.laboratory.live.story import Place, Point, Story
+from cmm_uq.laboratory.live.table import Row
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model.kind import Observe
+from cmm_uq.machine.physics.effect import Effect
+
+_EXCHANGED, _BETTER = 0.1, 0.25
+"""Points of a set-up are exchanged where they miss the plan, moved as a whole, by more than this part of their distance (rms),
+and by less than this part of that (squares) once they change places."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What is said.
+
+    Parameters
+    ----------
+    shown : live figures.
+    warnings : what is odd.
+    again : why the set-up should be measured once more; ``None``: nothing asks for it.
+    """
+
+    shown: tuple[Text, ...] = ()
+    warnings: tuple[Text, ...] = ()
+    again: Text | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Knows the artefact, the machine and the model of a job.
+
+    Parameters
+    ----------
+    facts, screening, observe : of the artefact, and what its kind offers; ``observe`` is ``None`` where it offers none.
+    machine : that is measured.
+    effects : that the job names.
+    sigma : standard uncertainty of a coordinate as stated, mm.
+    where : the recording's name, for messages.
+    """
+
+    facts: ArtefactFacts
+    screening: Screening | None
+    observe: Observe | None
+    machine: Machine
+    effects: tuple[Effect, ...]
+    sigma: float | None
+    where: str
+
+    def point(self, step: Step, story: Story, lead: Lead) -> Judged:
+        """Of a point that was just accepted."""
+        place, taken = step.place, story.by_place
+        own = taken[place]
+        points = self.points([Row(own, step)])
+        warnings = [finding.why for finding in impossible_values(points)]
+        if (copied := _copied(own, story)) is not None:
+            warnings.append(say(
+                "its coordinates are those of measurement {m}, point {p}, repeat {r} to the last digit: a copied reading, or "
+                "the machine did not measure", m=copied[0], p=copied[1], r=copied[2],
+            ))  # fmt: skip
+        steps = lead.steps((place[0], place[2]))
+        if (other := _exchanged(step, steps, taken)) is not None:
+            warnings.append(say("points {own} and {other} seem exchanged against the plan", own=place[1], other=other))
+        return Judged(self._live(step, steps, story), tuple(warnings))
+
+    def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> Judged:
+        """Of a set-up that is complete, with all that are.
+
+        Parameters
+        ----------
+        run : its measurement and repeat.
+        rows : the recording so far.
+        repeats_most : repeats beyond which no further one is asked for.
+        """
+        if self.observe is None or not rows:
+            return Judged()
+        points = self.points(rows)
+        needed = {column for effect in self.effects for column in effect.columns}
+        try:
+            found = screened(
+                points, self.facts, self.screening, self.observe, needed=needed & set(points.columns), set_aside=(),
+                where=self.where,
+            )  # fmt: skip
+            warnings = [one.why for one in found.findings if run[0] in one.measurements]
+            shown, again = self._expected(run, found.points, repeats_most)
+        except CmmUqError as error:
+            return Judged((), (Verbatim(f"{error.problem}. {error.fix or ''}".rstrip()),))
+        return Judged(shown, tuple(warnings), again)
+
+    def points(self, rows: Sequence[Row]) -> Points:
+        """Rows as points, with the columns that all of them have."""
+        columns: dict[str, list[float]] = {name: [] for name in _columns(rows)}
+        for row in rows:
+            own = {**row.step.columns, **row.point.columns, **{k: v.value for k, v in row.point.joined.items()}}
+            for name, values in columns.items():
+                values.append(row.point.time_s if name == "time_s" else own[name])
+        places = np.array([row.point.place for row in rows], dtype=np.int64)
+        return Points(
+            np.array([_xyz(row.point) for row in rows]), places[:, 0], places[:, 1], places[:, 2], self.machine,
+            {name: np.array(values, dtype=np.float64) for name, values in columns.items()},
+        )  # fmt: skip
+
+    def _expected(self, run: Run, points: Points, repeats_most: int) -> tuple[tuple[Text, ...], Text | None]:
+        """Deviation against expectation, and why to measure again."""
+        if self.observe is None or not ((points.measurement == run[0]) & (points.repeat == run[1])).any():
+            return (), None
+        artefact = self.observe(self.facts, points, where=self.where)
+        acting = tuple(one for one in self.effects if set(one.columns) <= set(points.columns) and not one.shape)
+        model = MeasurementModel(artefact, acting, self.sigma)
+        own = (artefact.measurement == run[0]) & (artefact.repeat == run[1])
+        found = predicted(model)
+        if found is None:
+            return (
+                say("what to expect is said once repeats show the scatter, or with u_coordinate_um in [recording]"),
+            ), None
+        shown, odd = _against(found, np.flatnonzero(own))
+        again = None
+        if run[1] < repeats_most:
+            spread = scatter(model, run[0])
+            again = odd if spread is None else spread.words
+        return shown, again
+
+    def _live(self, step: Step, steps: Sequence[Step], story: Story) -> tuple[Text, ...]:
+        first = story.by_place.get(steps[0].place)
+        own = story.by_place[step.place]
+        if first is None or first is own:
+            return ()
+        length = float(np.linalg.norm(_xyz(own) - _xyz(first)))
+        nominal = float(np.linalg.norm(step.xyz - steps[0].xyz))
+        return (say(
+            "{length} mm from point {first}; the plan has {nominal} mm: {off} µm",
+            length=number(length, ".4f"), first=steps[0].place[1], nominal=number(nominal, ".4f"),
+            off=signed((length - nominal) / MICROMETRE, "+.1f"),
+        ),)  # fmt: skip
+
+
+def _columns(rows: Sequence[Row]) -> list[str]:
+    every = [{*row.step.columns, *row.point.columns, *row.point.joined} - {*COORDINATES} for row in rows]
+    timed = {"time_s"} if all(row.point.timed for row in rows) else set()
+    return sorted(set.intersection(*every) | timed)
+
+
+def _against(found: Predicted, own: Ints) -> tuple[tuple[Text, ...], Text | None]:
+    """The worst observation of a set-up against what is expected of it, and whether it is too far off to be chance."""
+    own = own[np.isfinite(found.expected[own])]
+    if not len(own):
+        return (), None
+    off = np.abs(found.measured - found.expected)[own] / found.u[own]
+    worst = int(own[int(np.argmax(off))])
+    value, expected = found.measured[worst], found.expected[worst]
+    half = found.factor * found.u[worst]
+    which = say("deviation") if len(own) == 1 else say("worst of {count} deviations", count=len(own))
+    shown = say(
+        "{which} {value} µm; expected {expected} ± {half} µm ({level:.0f} %)", which=which, value=signed(value, "+.1f"),
+        expected=signed(expected, "+.1f"), half=number(half, ".1f"), level=100 * LEVEL,
+    )  # fmt: skip
+    chance = min(1.0, len(own) * 2 * float(special.ndtr(-off.max() * special.ndtri(0.5 + LEVEL / 2) / found.factor)))
+    if chance >= RARE:
+        return (shown,), None
+    return (shown,), say(
+        "it lies {off} µm from what all else says, and chance does that once in {times:.0f} set-ups: measure it once more",
+        off=signed(value - expected, "+.1f"), times=min(1 / max(chance, 1e-6), 1e6),
+    )  # fmt: skip
+
+
+def _copied(own: Point, story: Story) -> Place | None:
+    """The place of another point with the same figures."""
+    figures = tuple(own.columns.get(name) for name in COORDINATES)
+    for other in story.points.values():
+        if (
+            other is not own
+            and other.place != own.place
+            and tuple(other.columns.get(n) for n in COORDINATES) == figures
+        ):
+            return other.place
+    return None
+
+
+def _exchanged(step: Step, steps: Sequence[Step], taken: Mapping[Place, Point]) -> int | None:
+    """Number of the point of its set-up that the newest has changed places with; where the set-up stands is no matter."""
+    there = [other for other in steps if other.place in taken]
+    planned, found = np.array([other.xyz for other in there]), np.array([_xyz(taken[other.place]) for other in there])
+    missed, own = _missed(planned, found), there.index(step)
+    for i, other in enumerate(there):
+        apart = float(np.linalg.norm(other.xyz - step.xyz))
+        if not apart or missed <= len(there) * (_EXCHANGED * apart) ** 2:
+            continue
+        order = np.arange(len(there))
+        order[[own, i]] = order[[i, own]]
+        if _missed(planned, found[order]) < _BETTER * missed:
+            return other.place[1]
+    return None
+
+
+def _missed(planned: Floats, found: Floats) -> float:
+    """Sum of squares by which points miss the plan, their means laid on each other."""
+    return float(np.sum((found - found.mean(axis=0) - planned + planned.mean(axis=0)) ** 2))
+
+
+def _xyz(point: Point) -> Floats:
+    return np.array([point.columns[name] for name in COORDINATES])

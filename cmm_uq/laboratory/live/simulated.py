@@ -1,0 +1,145 @@
+"""Instruments that are not there, for a first try without any: thermometers that drift, and a machine with known errors.
+
+Nothing of it is ever taken for a measurement: a session with them runs only in a job whose origin is ``simulated``.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cmm_uq.base.points import AXES
+from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.laboratory.live.instruments.reading import Reading
+from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity
+from cmm_uq.laboratory.live.lead import Step
+from cmm_uq.laboratory.live.recorder import COORDINATES
+
+MAKER = "simulated"
+RATE_HZ = 10.0
+NOISE_MM = 1e-3
+"""Standard deviation of a coordinate."""
+
+ERRORS = np.array([[30e-6, 20e-6, 0.0], [0.0, -20e-6, 15e-6], [0.0, 0.0, 10e-6]])
+"""What the machine indicates too much: 30, −20, 10 ppm along x, y, z, and two axes that are not square by 20 and 15 µrad."""
+
+TAKES_S = 0.7
+"""Time to measure a point."""
+
+_PLACED_MM = 5.0
+"""How far off the plan the artefact is set up."""
+
+_USUAL = {"pressure_hpa": 1013.2, "humidity_pct": 45.0}
+
+
+class SimulatedThermometer:
+    """A stream: each quantity near a usual value, with a slow wave of a tenth and noise of a thousandth.
+
+    Parameters
+    ----------
+    name : in the job.
+    quantities : that it gives.
+    """
+
+    def __init__(
+        self, name: str, quantities: Sequence[str], *, clock: Clock, seed: int, rate_hz: float = RATE_HZ
+    ) -> None:
+        self.name, self._quantities, self._clock, self._rate = name, tuple(quantities), clock, rate_hz
+        self._random = np.random.default_rng([seed, *name.encode()])
+
+    def identity(self) -> Identity:
+        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+        return Identity(self.name, MAKER, "thermometer", "0", "1", "none: simulated")
+
+    def events(self, stop: threading.Event) -> Iterator[Event]:
+        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+        number, begin = 0, self._clock.monotonic_ns()
+        while not stop.is_set():
+            number += 1
+            wait = number / self._rate - (self._clock.monotonic_ns() - begin) * 1e-9
+            if wait > 0:
+                self._clock.sleep(wait)
+            yield self._reading(number)
+
+    def close(self) -> None:
+        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+
+    def _reading(self, number: int) -> Reading:
+        wave = 0.1 * np.sin(2 * np.pi * number / self._rate / 1800)
+        noise = 1e-3 * self._random.standard_normal(len(self._quantities))
+        values = {
+            name: round(_USUAL.get(name, 20.0) + float(wave + e), 3)
+            for name, e in zip(self._quantities, noise, strict=True)
+        }
+        raw = " ".join(f"{value:.3f}" for value in values.values()).encode() + b"\r\n"
+        return Reading(self.name, number, self._clock.utc_ns(), self._clock.monotonic_ns(), raw, values)
+
+
+class SimulatedMachine:
+    """A machine that measures the point that it is asked for.
+
+    Parameters
+    ----------
+    name : in the job.
+    seed : of its noise, and of where the artefact stands.
+    noise_mm : standard deviation of a coordinate.
+    """
+
+    def __init__(self, name: str, *, clock: Clock, seed: int, noise_mm: float = NOISE_MM) -> None:
+        self.name, self._clock, self._seed, self._noise_mm = name, clock, seed, noise_mm
+        self._asked: queue.Queue[Step] = queue.Queue()
+        self._number = 0
+
+    def identity(self) -> Identity:
+        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+        return Identity(self.name, MAKER, "machine", "0", "1", "none: simulated")
+
+    def measure(self, step: Step) -> None:
+        """Have a point measured."""
+        self._asked.put(step)
+
+    def events(self, stop: threading.Event) -> Iterator[Event]:
+        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+        while not stop.is_set():
+            try:
+                step = self._asked.get(timeout=0.1)
+            except queue.Empty:
+                continue
+            yield self._probed(step)
+
+    def close(self) -> None:
+        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+
+    def _probed(self, step: Step) -> Reading:
+        """The same point at the same place, whenever it is asked for, but for the noise of its repeat."""
+        self._clock.sleep(TAKES_S)
+        self._number += 1
+        placed = _PLACED_MM * np.random.default_rng([self._seed, step.place[0]]).standard_normal(3)
+        noise = self._noise_mm * np.random.default_rng([self._seed, *step.place]).standard_normal(3)
+        xyz = step.xyz + placed
+        indicated = np.round(xyz + ERRORS @ xyz + noise, 5)
+        raw = "PtMeas(" + ", ".join(f"{a.upper()}({v:.5f})" for a, v in zip(AXES, indicated, strict=True)) + ")\r\n"
+        values = dict(zip(COORDINATES, indicated.tolist(), strict=True))
+        return Reading(self.name, self._number, self._clock.utc_ns(), self._clock.monotonic_ns(), raw.encode(), values,
+                       point="PtMeas")  # fmt: skip
+
+
+def simulated(
+    declared: Sequence[DeclaredSource], *, clock: Clock, seed: int, noise_mm: float = NOISE_MM
+) -> tuple[list[SimulatedThermometer | SimulatedMachine], SimulatedMachine]:
+    """In place of what a job declares, and the machine among them; a thermometer and a machine where it declares nothing."""
+    found: list[SimulatedThermometer | SimulatedMachine] = []
+    taken = {source.name for source in declared}
+    machine = SimulatedMachine(
+        "machine" if "machine" not in taken else "simulated-machine", clock=clock, seed=seed, noise_mm=noise_mm
+    )
+    for source in declared:
+        streams = [name for name in source.values if name not in COORDINATES]
+        if streams:
+            found.append(SimulatedThermometer(source.name, streams, clock=clock, seed=seed))
+    if not found:
+        found.append(SimulatedThermometer("thermometer", ["temp_artefact_c", "temp_air_c"], clock=clock, seed=seed))
+    return [*found, machine], machine

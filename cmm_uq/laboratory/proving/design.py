@@ -1,0 +1,308 @@
+"""The set-ups of a job, and the cases that are drawn on them.
+
+A case is a function of the seed and its number alone, so that it does not matter who draws it, or when. Kinds of noise cycle
+within each kind of case. Where the set-ups show no cause of a kind, a case hides what comes before it in the list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.laboratory.proving.cases import (
+    ARTEFACT,
+    AXIS,
+    CYCLE,
+    GROWING,
+    NOTHING,
+    ONE,
+    OUTSIDE,
+    OWN,
+    RESOLUTION,
+    SET_UP,
+    SLOWLY,
+    STRONGEST,
+    TAILS,
+    TWO,
+    WALKING,
+    WEAKEST,
+    WHITE,
+    Case,
+    Hidden,
+    Stranger,
+)  # fmt: skip
+from cmm_uq.laboratory.proving.foreign import (
+    FUNCTIONS,
+    Foreign,
+    Form,
+    OfForm,
+    drawn_form,
+    fault,
+    nodes,
+    possible_faults,
+)
+from cmm_uq.laboratory.proving.sight import ALLOWED, Sight, acting, remaining, white_of
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.machine.model.placings import LAST_DIGIT
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.noise import AXES as AXIS_NOISE
+from cmm_uq.maths.inference.noise import GROWTH, PLACING, SLOW
+
+_LARGEST_FOREIGN_UM = 200.0
+_SHORTEST_PERIOD_MM = 6.0
+"""As the diagnosis tries them; beyond the range of the readings a wave is no wave."""
+
+_ATTEMPTS = 40
+_AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2.0, 4.0, 3.0, 0.125, 2.0
+"""How the kinds of noise differ from the job's own, in units of its reading noise; forgetting over a part of the duration."""
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """The set-ups that cases are drawn on.
+
+    Parameters
+    ----------
+    model : what the job names, with its artefact in its set-ups.
+    values : (k,) true parameters of what it names, and sizes of the artefact.
+    noise : the job's own.
+    cte_per_k : expansion of the artefact; 0 where it is not stated.
+    dates : recordings of which the observations are differences, each with the noise: two where the artefact was
+        recorded earlier, which is not drawn again.
+    """
+
+    model: MeasurementModel
+    values: Floats
+    noise: Noise
+    cte_per_k: float = 0.0
+    dates: int = 1
+    sights: dict[str, Sight] = field(default_factory=dict)
+
+    @property
+    def coefficients(self) -> Floats:
+        """Of the effects that the job names."""
+        return self.values[: len(self.values) - len(self.model.artefact.sizes)]
+
+    def sight(self, noise: Noise) -> Sight:
+        """What shows under one noise."""
+        key = repr(noise)
+        if key not in self.sights:
+            self.sights[key] = Sight.of(self.model, self.values, noise)
+        return self.sights[key]
+
+    @cached_property
+    def noises(self) -> tuple[str, ...]:
+        """Kinds of noise that these set-ups could show, in the order of cases: every other one the job's own."""
+        possible = noise_of(self.model, values=self.values).possible
+        asked = ((SET_UP, PLACING), (AXIS, AXIS_NOISE), (GROWING, GROWTH), (SLOWLY, SLOW), (WALKING, SLOW))
+        kinds = (WHITE, *(kind for kind, component in asked if component in possible), TAILS, RESOLUTION)
+        return tuple(each for kind in kinds for each in (OWN, kind))
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """That could act, and whose largest sizes would show under the job's own noise."""
+        sight = self.sight(self.noise)
+        reach = {name: max(_length(c) for c in versions) for name, versions in sight.candidates.items()}
+        return tuple(
+            effect
+            for effect in acting(self.model)
+            if ALLOWED * reach[effect.name] >= WEAKEST and self._between(effect) is not None
+        )
+
+    def _between(self, effect: Effect) -> list[tuple[float, float]] | None:
+        """Lowest and highest nonlinear parameters to draw; ``None`` where the readings could show none of them."""
+        found = []
+        for shape in effect.shape:
+            low, high = shape.low, shape.high
+            if shape.period_along is not None:
+                span = float(np.ptp(self.model.artefact.points.readings[shape.period_along]))
+                low, high = max(low, _SHORTEST_PERIOD_MM), min(high, span)
+            if low >= high:
+                return None
+            found.append((low, high))
+        return found
+
+    def noise_of_kind(self, kind: str, random: np.random.Generator) -> Noise:
+        """The noise of a kind, as large as the job's own readings."""
+        own, white = self.noise, white_of(self.noise)
+        sigma = float(np.asarray(white.coordinate)[0])
+        if kind == AXIS:
+            worse = int(random.integers(3))
+            x, y, z = (sigma * (_AXIS_TIMES if axis == worse else 1.0) for axis in range(3))
+            return replace(white, coordinate=(x, y, z))
+        time = self.model.artefact.points.columns.get("time_s", np.zeros(1))
+        return {
+            OWN: own, WHITE: white, SET_UP: replace(white, placing=sigma),
+            GROWING: replace(white, growth=_GROWN_TIMES * sigma),
+            SLOWLY: replace(white, slow=sigma, slow_time_s=max(_SLOW_PART * float(np.ptp(time)), 1e-6)),
+            WALKING: replace(white, slow=_WALKED_TIMES * sigma, slow_time_s=inf),
+            TAILS: replace(white, tails=_DOF), RESOLUTION: replace(white, resolution=_STEP_TIMES * sigma),
+        }[kind]  # fmt: skip
+
+    def case(self, seed: int, number: int) -> Case:
+        """The case of a number."""
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number, 0)))
+        cycle, place = divmod(number, len(CYCLE))
+        kind = CYCLE[place]
+        rank = cycle * CYCLE.count(kind) + CYCLE[:place].count(kind)
+        noise_kind = self.noises[rank % len(self.noises)]
+        noise = self.noise_of_kind(noise_kind, random)
+        case = Case(number, kind, noise_kind, noise, self._sizes(random))
+        sight = self.sight(noise)
+        if kind in (OUTSIDE, ARTEFACT):
+            stranger = self._stranger(sight, kind, random)
+            if stranger is not None:
+                return replace(case, stranger=stranger)
+            kind = ONE
+        hidden = self._hidden(sight, 2 if kind == TWO else 1, seed, rank, random) if kind != NOTHING else ()
+        return replace(case, kind=(NOTHING, ONE, TWO)[len(hidden)], hidden=hidden)
+
+    def _sizes(self, random: np.random.Generator) -> tuple[float, ...]:
+        """True sizes: within the uncertainty of their certificate, or as estimated."""
+        sizes = self.model.artefact.sizes
+        own = self.values[len(self.values) - len(sizes) :]
+        draws = random.standard_normal(len(sizes))
+        drawn = [s.nominal + s.sd * z if s.certified else value for s, value, z in zip(sizes, own, draws, strict=True)]
+        return tuple(float(size) for size in drawn)
+
+    def _hidden(
+        self, sight: Sight, count: int, seed: int, rank: int, random: np.random.Generator
+    ) -> tuple[Hidden, ...]:
+        """One or two effects, the first of them each in its turn."""
+        if not self.effects:
+            return ()
+        order = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,))).permutation(len(self.effects))
+        for attempt in range(_ATTEMPTS):
+            first = int(order[(rank + attempt) % len(order)])
+            others = [i for i in range(len(self.effects)) if i != first]
+            second = [int(random.choice(others))] if count == 2 and others else []
+            found = self._of_effects(sight, [self.effects[i] for i in (first, *second)], random)
+            if found:
+                return found
+        return self._hidden(sight, 1, seed, rank, random) if count == 2 else ()
+
+    def _of_effects(self, sight: Sight, chosen: list[Effect], random: np.random.Generator) -> tuple[Hidden, ...]:
+        """These effects with strengths at random; none where one would have to be larger than physics allows."""
+        shapes = [_drawn(self._between(effect) or [], random) for effect in chosen]
+        ways = [_direction(len(effect.coefficients), random) for effect in chosen]
+        seen = [sight.effect(e, shape) @ way for e, shape, way in zip(chosen, shapes, ways, strict=True)]
+        found = []
+        for i, effect in enumerate(chosen):
+            others = [column for j, column in enumerate(seen) if j != i]
+            length = remaining(seen[i], np.column_stack(others)) if others else _length(seen[i])
+            most = min(STRONGEST, ALLOWED * length)
+            if most < WEAKEST:
+                return ()
+            strength = float(random.uniform(WEAKEST, most))
+            prior = np.array([c.prior_sd for c in effect.coefficients])
+            coefficients = strength / length * prior * ways[i] * random.choice([-1.0, 1.0])
+            told = effect.to_reported(coefficients, np.array(shapes[i], dtype=np.float64))
+            found.append(Hidden(effect.name, {name: float(value) for name, value in told.items()}, strength))
+        return tuple(found)
+
+    def _stranger(self, sight: Sight, kind: str, random: np.random.Generator) -> Stranger | None:
+        """A cause outside the catalogue of which no single effect of it leaves too little to be seen."""
+        faults = tuple(possible_faults(self.model))
+        for _ in range(_ATTEMPTS):
+            what = str(random.choice(FUNCTIONS if kind == OUTSIDE else faults))
+            found = self.stranger(sight, what, random)
+            if found is not None and found.left >= WEAKEST:
+                return found
+        return None
+
+    def stranger(self, sight: Sight, what: str, random: np.random.Generator) -> Stranger | None:
+        """A function or a fault with a strength at random; ``None`` where it shows at no size that is possible."""
+        form: Form | None = None
+        errors: tuple[tuple[float, ...], ...] = ()
+        if what in FUNCTIONS:
+            form = drawn_form(self.model.artefact.points, what, random)
+            if form is None:
+                return None
+        elif what == "nodes":
+            number, frames = nodes(self.model.placed(self.values), self.model.artefact.points)
+            drawn = random.standard_normal((int(number.max()) + 1, frames.shape[2]))
+            errors = tuple(tuple(float(value) for value in row) for row in drawn)
+        strength = float(random.uniform(WEAKEST, STRONGEST))
+        unit = Stranger(what, 1.0, strength, 0.0, "", form, errors)
+        column = sight.seen(self.effect_of(unit).basis(self.model.artefact.points))[:, 0]
+        length = _length(column)
+        if strength > _LARGEST_FOREIGN_UM * length:
+            return None
+        size = strength / length * float(random.choice([-1.0, 1.0]))
+        like, left = sight.nearest(column * size)
+        return replace(unit, size_um=size, left=left, like=like)
+
+    def effect_of(self, stranger: Stranger) -> Foreign:
+        """Its error, of a micrometre."""
+        if stranger.form is not None:
+            return OfForm(stranger.form)
+        return fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
+
+    def recording(self, case: Case, seed: int, effects: Mapping[str, Effect]) -> Points:
+        """What is recorded of a case.
+
+        Parameters
+        ----------
+        case : what is true of it.
+        seed : of its noise, with its number.
+        effects : of the catalogue, by name.
+
+        Raises
+        ------
+        CmmUqError : errors that no machine has.
+        """
+        random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.number, 1)))
+        given = [(effects[h.effect], *effects[h.effect].from_reported(h.parameters)) for h in case.hidden]
+        acting_ = [*self.model.effects, *(effect for effect, _, _ in given)]
+        coefficients = [self.coefficients, *(each for _, each, _ in given)]
+        if case.stranger is not None:
+            acting_.append(self.effect_of(case.stranger))
+            coefficients.append(np.array([case.stranger.size_um]))
+        shapes = {effect.name: shape for effect, _, shape in given}
+        model = MeasurementModel(self.model.artefact, tuple(acting_), shapes={**self.model.shapes, **shapes})
+        drawn = model.simulate(
+            np.concatenate(coefficients), np.array(case.sizes), self._of_all_dates(case.noise), random
+        )
+        if not np.all(np.isfinite(drawn)):
+            raise CmmUqError(f"case {case.number} has no finite coordinates", where="the recording drawn")
+        return self._as_read(drawn)
+
+    def _of_all_dates(self, noise: Noise) -> Noise:
+        times = float(np.sqrt(self.dates))
+        x, y, z = (times * float(each) for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
+        return replace(noise, coordinate=(x, y, z), placing=times * noise.placing, growth=times * noise.growth,
+                       slow=times * noise.slow)  # fmt: skip
+
+    def _as_read(self, drawn: Floats) -> Points:
+        """The points, with coordinates that nobody read as they stood."""
+        artefact = self.model.artefact
+        points, xyz = artefact.points, drawn.copy()
+        rows = np.unique(artefact.rows[artefact.unread()])
+        for number in np.unique(points.measurement[rows]):
+            own = np.flatnonzero(points.measurement == number)
+            still = np.ptp(points.xyz[own], axis=0) <= LAST_DIGIT
+            xyz[np.ix_(own, np.flatnonzero(still))] = points.xyz[np.ix_(own, np.flatnonzero(still))]
+        return points.at(xyz)
+
+
+def _drawn(between: list[tuple[float, float]], random: np.random.Generator) -> tuple[float, ...]:
+    """Nonlinear parameters at random, evenly in their logarithm."""
+    return tuple(float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in between)
+
+
+def _direction(count: int, random: np.random.Generator) -> Floats:
+    """(count,) of length one, in prior standard deviations."""
+    way = random.standard_normal(count)
+    return np.asarray(way / np.linalg.norm(way))
+
+
+def _length(columns: Floats) -> float:
+    """Largest length of a combination of columns (m,) or (m, j) with coefficients of length one."""
+    return float(np.linalg.norm(columns, 2))

@@ -1,0 +1,183 @@
+"""Backup, whole and checked, and restored over nothing that still holds."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sqlite3
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sqlalchemy import select
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.output.refusing import writing_to
+from cmm_uq.base.output.staging import synced
+from cmm_uq.laboratory.records.entries import Entry
+from cmm_uq.laboratory.records.opening import open_records
+from cmm_uq.laboratory.records.place import is_url, shown
+from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.tables import entries
+from cmm_uq.laboratory.records.verifying import chain
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.records.store import Records
+
+_MENDED = "Free the disk, mend the permissions, or name another file"
+
+KEPT = ".before-restore"
+"""What restored records are put in place of is kept under its name with this behind it."""
+
+
+def back_up(records: Records, out: Path) -> tuple[int, str]:
+    """Write all entries, and what follows from them, into a new SQLite file, whatever database they are in.
+
+    Parameters
+    ----------
+    records : that others may write to meanwhile.
+    out : a file that is not there yet.
+
+    Returns
+    -------
+    number and hash of the last entry in it.
+
+    Raises
+    ------
+    CmmUqError : the chain of the records is broken.
+    OutputError : something is there, or it cannot be written.
+    """
+    if os.path.lexists(out):
+        raise OutputError("is there already", where=str(out), fix="Name another file; nothing is overwritten")
+    with _temporary(out) as path:
+        if isinstance(records.place, Path):
+            with told(records.place), _raw(records.place) as source, _raw(path) as target:
+                source.backup(target)
+                target.execute("PRAGMA journal_mode = DELETE")  # one file, without a journal beside it
+        else:
+            _copied(records, path)
+        head = _checked(path)
+        _in_place(path, out)
+    return head
+
+
+def restore(file: Path, place: str | Path) -> tuple[int, str]:
+    """Make records of a backup; records that are there are kept beside them.
+
+    Parameters
+    ----------
+    file : the backup.
+    place : of the records; a database of a server must hold none yet.
+
+    Returns
+    -------
+    number and hash of the last entry.
+
+    Raises
+    ------
+    CmmUqError : it is no backup, or its chain is broken.
+    OutputError : the place cannot be written to.
+    """
+    head = _checked(file)
+    if is_url(place):
+        _to_server(file, str(place))
+        return head
+    target = Path(place)
+    if target.is_dir():
+        raise CmmUqError("is a folder, and records are a file", where=str(target), fix="Name a file in it: records.db")
+    with writing_to(target, _MENDED):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    with _temporary(target) as path:
+        with writing_to(target, _MENDED):
+            shutil.copyfile(file, path)
+        _set_aside(target)
+        _in_place(path, target)
+    with _raw(target) as raw:
+        raw.execute("PRAGMA journal_mode = WAL")
+    return head
+
+
+def _set_aside(target: Path) -> None:
+    """Keep the present file, with all that is still in its journal."""
+    if not target.exists():
+        return
+    kept, number = target.with_name(target.name + KEPT), 1
+    while os.path.lexists(kept):
+        number += 1
+        kept = target.with_name(f"{target.name}{KEPT}-{number}")
+    with writing_to(target, _MENDED):
+        with contextlib.suppress(sqlite3.Error), _raw(target) as raw:
+            raw.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        for end in ("", "-wal", "-shm"):
+            if os.path.lexists(f"{target}{end}"):
+                Path(f"{target}{end}").rename(f"{kept}{end}")
+
+
+def _checked(path: Path) -> tuple[int, str]:
+    """Number and hash of the last entry of a file whose chain holds.
+
+    Raises
+    ------
+    CmmUqError : it is no file of records, or its chain is broken.
+    """
+    with open_records(path, read_only=True) as records:
+        with told(path), records.engine.connect() as connection:
+            found = chain(connection)
+        if found:
+            raise CmmUqError(f"entry {found[0].entry}: {found[0].problem}", where=str(path),
+                             fix="cmm-uq records verify says all; a backup with a broken chain is none")  # fmt: skip
+        return records.head()
+
+
+def _copied(records: Records, path: Path) -> None:
+    path.unlink()
+    with (
+        open_records(path, create=True) as made, made.writing() as writing, told(records.place),
+        records.engine.connect() as source,
+    ):  # fmt: skip
+        rows = source.execution_options(yield_per=2000).execute(select(entries).order_by(entries.c.number))
+        writing.copy(Entry(*row) for row in rows)
+    with _raw(path) as raw:
+        raw.execute("PRAGMA journal_mode = DELETE")
+
+
+def _to_server(file: Path, url: str) -> None:
+    with open_records(url, create=True) as target, open_records(file, read_only=True) as source:
+        if target.head()[0]:
+            raise CmmUqError("holds entries already", where=shown(url), fix="Restore into an empty database")
+        with target.writing() as writing:
+            writing.copy(source.entries())
+
+
+@contextlib.contextmanager
+def _raw(path: Path) -> Iterator[sqlite3.Connection]:
+    raw = sqlite3.connect(path, isolation_level=None)
+    try:
+        yield raw
+    finally:
+        raw.close()
+
+
+@contextlib.contextmanager
+def _temporary(out: Path) -> Iterator[Path]:
+    """An empty file beside another, gone afterwards."""
+    with writing_to(out, _MENDED):
+        descriptor, name = tempfile.mkstemp(dir=out.absolute().parent, prefix=".unfinished-")
+        os.close(descriptor)
+    path = Path(name)
+    try:
+        with writing_to(out, _MENDED):
+            yield path
+    finally:
+        for end in ("", "-wal", "-shm", "-journal"):
+            Path(f"{path}{end}").unlink(missing_ok=True)
+
+
+def _in_place(path: Path, out: Path) -> None:
+    """Have a file on the disk, then under its name."""
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+    path.rename(out)
+    synced(out.absolute().parent)

@@ -1,0 +1,248 @@
+"""From entries to the tables that follow from them: what an entry says, as rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from sqlalchemy import Connection, Table, func, insert, select, update
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.records.entries import CERTIFIED, Entry
+from cmm_uq.laboratory.records.facts import STANDING
+from cmm_uq.laboratory.records.recognised import artefact_key, called, machine_key, spelled
+from cmm_uq.laboratory.records.tables import (
+    INDEX,
+    adjustments,
+    artefacts,
+    certificates,
+    covariances,
+    figures,
+    machines,
+    quantities,
+    signatures,
+)
+
+Row = dict[str, Any]
+
+STATE_AFTER = {"withdrawal": "withdrawn", "replacement": "replaced"}
+
+
+class Indexer:
+    """Adds the rows of entries, one after the other; :meth:`flush` writes them.
+
+    Parameters
+    ----------
+    connection : in a transaction that writes.
+    """
+
+    def __init__(self, connection: Connection) -> None:
+        self.connection = connection
+        self._rows: dict[Table, list[Row]] = {table: [] for table in INDEX}
+        self._machines: dict[str, Row] = {}
+        self._artefacts: dict[str, Row] = {}
+        self._quantities: dict[tuple[str, str, str], int] = {}
+        self._certificates: dict[int, Row] = {}
+        self._counts: dict[Table, int] = {}
+        self._adjusted: set[tuple[int, str]] = set()
+
+    def add(self, entry: Entry) -> None:
+        """Add what an entry says.
+
+        Raises
+        ------
+        CmmUqError : it says something that no entry before it allows.
+        """
+        data = entry.data
+        try:
+            if entry.kind in CERTIFIED:
+                self._certificate(entry, data)
+            elif entry.kind == "machine":
+                self._machine(data, str(data.get("day") or entry.at[:10]), entry.number)
+            elif entry.kind == "artefact":
+                self._artefact(data, str(data.get("kind") or ""), str(data.get("day") or entry.at[:10]), entry.number)
+            elif entry.kind == "adjustment":
+                machine = self._machine(data["machine"], "", entry.number)
+                self._adjustment(machine["id"], data["day"], entry.number)
+            elif entry.kind in ("release", "withdrawal", "replacement"):
+                self._signature(entry, data)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise CmmUqError(f"cannot be recorded as {entry.kind}: {error!r} is missing or no such thing",
+                             where=f"entry {entry.number}") from error  # fmt: skip
+
+    def flush(self) -> None:
+        """Write what was added."""
+        for table, rows in self._rows.items():
+            if rows:
+                self.connection.execute(insert(table), rows)
+                self._rows[table] = []
+        self._certificates.clear()
+
+    def _certificate(self, entry: Entry, data: Mapping[str, Any]) -> None:
+        day = str(data["day"])
+        machine = self._machine(data["machine"], day, entry.number)
+        used = data.get("artefact") or {}
+        artefact = self._artefact(used, str(data["kind"]), day, entry.number)
+        if since := data.get("adjusted_since"):
+            self._adjustment(machine["id"], since, entry.number)
+        row = {
+            "entry": entry.number, "machine": machine["id"], "artefact": artefact, "command": data.get("command", "report"),
+            "job": data["job"], "number": data.get("number") or data["job"], "kind": data["kind"],
+            "origin": data["origin"], "day": day, "at": entry.at, "adjusted_since": since or None, "state": "draft",
+            "decision": data.get("decision") or "none", "diagnosis": data.get("diagnosis") or "",
+            "interim": bool(data.get("interim")) or entry.kind == "check", "folder": data.get("folder") or "",
+            "version": data.get("version") or "", "results_sha256": data.get("results_sha256") or "",
+            "artefact_due": used.get("due") or None,
+        }  # fmt: skip
+        self._rows[certificates].append(row)
+        self._certificates[entry.number] = row
+        for place, (name, quantity, unit, value, u, lower, upper, u_artefact, limit) in enumerate(
+            data.get("values") or ()
+        ):
+            self._rows[figures].append({
+                "certificate": entry.number, "place": place, "quantity": self._quantity((name, quantity, unit)),
+                "value": value, "u": u, "lower": lower, "upper": upper, "u_artefact": u_artefact, "at_most": limit,
+            })  # fmt: skip
+        if together := data.get("covariance"):
+            self._rows[covariances].append({
+                "certificate": entry.number, "names": json.dumps(together["names"], ensure_ascii=False),
+                "lower": json.dumps(together["lower"]),
+            })  # fmt: skip
+
+    def _machine(self, facts: Mapping[str, Any], day: str, entry: int) -> Row:
+        """The machine's row, with the facts of its newest day."""
+        key = machine_key(facts)
+        row = self._known(machines, self._machines, key)
+        said = {name: called(facts, name) for name in ("name", "manufacturer", "model", "place")}
+        said["named"] = spelled(said["name"])
+        rule = json.dumps(facts["calibrate"], sort_keys=True) if facts.get("calibrate") else None
+        if row is None:
+            row = {
+                "id": self._next(machines), "recognised": key, "called": self._name_of(facts),
+                "spelled": spelled(called(facts, "serial", "name")), **said, "calibrate": rule, "day": day,
+                "entry": entry,
+            }  # fmt: skip
+            self._machines[key] = row
+            self._rows[machines].append(row)
+        elif day >= row["day"]:
+            changed: Row = {name: value for name, value in said.items() if value and value != row[name]}
+            if "calibrate" in facts and rule != row["calibrate"]:
+                changed["calibrate"] = rule
+            self._change(machines, row, {**changed, "day": day, "entry": entry} if changed else {})
+        return row
+
+    def _name_of(self, facts: Mapping[str, Any]) -> str:
+        """As it is asked for: its serial, and where another has the same, what tells them apart behind it."""
+        name = called(facts, "serial", "name") or "unnamed"
+        others = {row["called"] for row in self._machines.values()}
+        taken = select(machines.c.called)
+        candidates = [name, f"{name} ({called(facts, 'manufacturer', 'name') or 'other'})"]
+        candidates += [f"{name} ({i})" for i in range(2, 100)]
+        for candidate in candidates:
+            there = candidate in others
+            if not there and not self.connection.execute(taken.where(machines.c.called == candidate)).first():
+                return candidate
+        raise ValueError(name)
+
+    def _artefact(self, facts: Mapping[str, Any], kind: str, day: str, entry: int) -> int | None:
+        key = artefact_key(facts)
+        if not key:
+            return None
+        row = self._known(artefacts, self._artefacts, key)
+        said: Row = {name: called(facts, name) for name in ("certificate", "laboratory")}
+        said |= {name: facts.get(name) or None for name in ("calibrated", "due")}
+        said["kind"] = kind
+        if row is None:
+            name = called(facts, "serial", "certificate", "name")
+            row = {"id": self._next(artefacts), "recognised": key, "called": name, **said, "day": day, "entry": entry}
+            self._artefacts[key] = row
+            self._rows[artefacts].append(row)
+        elif day >= row["day"]:
+            changed = {name: value for name, value in said.items() if value != row[name]}
+            self._change(artefacts, row, {**changed, "day": day, "entry": entry} if changed else {})
+        return int(row["id"])
+
+    def _adjustment(self, machine: int, day: str, entry: int) -> None:
+        there = select(adjustments.c.entry).where(adjustments.c.machine == machine, adjustments.c.day == day)
+        if (machine, day) in self._adjusted or self.connection.execute(there).first():
+            return
+        self._adjusted.add((machine, day))
+        self._rows[adjustments].append({"machine": machine, "day": day, "entry": entry})
+
+    def _signature(self, entry: Entry, data: Mapping[str, Any]) -> None:
+        number = int(data["certificate"])
+        row = self._certificates.get(number)
+        if row is None:
+            found = (
+                self.connection.execute(select(certificates).where(certificates.c.entry == number)).mappings().first()
+            )
+            if found is None:
+                raise ValueError(f"certificate {number}")
+            row = dict(found)
+        self._rows[signatures].append({
+            "entry": entry.number, "certificate": number, "what": entry.kind, "by": data["by"],
+            "reason": _reason(data), "at": entry.at, "replaced_by": data.get("replaced_by"),
+        })  # fmt: skip
+        state = STATE_AFTER.get(entry.kind, "released" if data.get("complete", True) else row["state"])
+        if state == "released" and row["state"] not in STANDING:
+            raise ValueError(f"the certificate {number}, {row['state']},")
+        if number in self._certificates:
+            row["state"] = state
+        else:
+            self.connection.execute(update(certificates).where(certificates.c.entry == number).values(state=state))
+
+    def _quantity(self, key: tuple[str, str, str]) -> int:
+        if key not in self._quantities:
+            c = quantities.c
+            there = select(c.id).where(c.name == key[0], c.quantity == key[1], c.unit == key[2])
+            number = self.connection.execute(there).scalar()
+            if number is None:
+                number = self._next(quantities)
+                self._rows[quantities].append(
+                    dict(zip(("id", "name", "quantity", "unit"), (number, *key), strict=True))
+                )
+            self._quantities[key] = number
+        return self._quantities[key]
+
+    def _known(self, table: Table, cache: dict[str, Row], key: str) -> Row | None:
+        if key not in cache:
+            found = self.connection.execute(select(table).where(table.c.recognised == key)).mappings().first()
+            if found is None:
+                return None
+            cache[key] = dict(found)
+        return cache[key]
+
+    def _change(self, table: Table, row: Row, changed: Row) -> None:
+        """Change a row, be it written already or not."""
+        if not changed:
+            return
+        row.update(changed)
+        if not self._waits(table, row):
+            self.connection.execute(update(table).where(table.c.id == row["id"]).values(**changed))
+
+    def _waits(self, table: Table, row: Row) -> bool:
+        """Whether a row, the very object, is still to be written: rows are numbered as they come."""
+        first = self._rows[table][0]["id"] if self._rows[table] else None
+        return first is not None and row["id"] >= first
+
+    def _next(self, table: Table) -> int:
+        """The next number of a table's rows."""
+        if table not in self._counts:
+            self._counts[table] = self.connection.execute(select(func.coalesce(func.max(table.c.id), 0))).scalar_one()
+        self._counts[table] += 1
+        return self._counts[table]
+
+
+def index(connection: Connection, entries: Iterable[Entry]) -> None:
+    """Add what entries say to the tables that follow from them."""
+    indexer = Indexer(connection)
+    for entry in entries:
+        indexer.add(entry)
+    indexer.flush()
+
+
+def _reason(data: Mapping[str, Any]) -> str:
+    """Why something was signed, and what was said of a certificate that states no pass."""
+    despite = f"{data['outcome']}: {data['despite']}" if data.get("despite") else ""
+    return "; ".join(filter(None, (data.get("reason"), despite)))

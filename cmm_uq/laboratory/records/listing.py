@@ -1,0 +1,314 @@
+"""What a list of the records shows: where each machine stands, and certificates by what a reader chooses, a page at a time.
+
+Few columns, no values: a list of 10⁵ certificates is counted and paged by the database.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from sqlalchemy import ColumnElement, Connection, func, or_, select
+
+from cmm_uq.jobs.verdicts import Verdicts, gravest
+from cmm_uq.laboratory.records.entries import Entry
+from cmm_uq.laboratory.records.facts import PERFORMANCE, STANDING, Machine
+from cmm_uq.laboratory.records.queries import adjusted_before, blocks
+from cmm_uq.laboratory.records.recognised import BY_NAME, spelled
+from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.store import Records
+from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
+
+
+class Listed(NamedTuple):
+    """A certificate, interim check or diagnosis in a list; fields as in :class:`~cmm_uq.laboratory.records.facts.Certificate`.
+
+    A tuple, as the others here are: ten thousand of them are made in a tenth of the time of dataclasses.
+    """
+
+    entry: int
+    job: str
+    number: str
+    machine: str
+    machine_name: str
+    artefact: str
+    kind: str
+    origin: str
+    day: dt.date
+    state: str
+    decision: str
+    diagnosis: str
+    interim: bool
+    command: str
+
+
+class Called(NamedTuple):
+    """What a machine is called: fields as in :class:`~cmm_uq.laboratory.records.facts.Machine`."""
+
+    serial: str
+    name: str
+    manufacturer: str
+    model: str
+    place: str
+    by_name: bool
+
+
+class Newest(NamedTuple):
+    """A machine and its newest measured certificate that stands; ``None`` where it has none."""
+
+    machine: Called
+    certificate: Listed | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which certificates are listed; what is empty or ``None`` leaves all.
+
+    Parameters
+    ----------
+    text : in the job's id, the certificate's number, or the machine's serial or name; capitals do not matter.
+    machine, artefact : as they are called in the records.
+    origin : of the recording.
+    command : report or diagnose.
+    states, decisions, verdicts : of the certificate, its statements, its diagnosis.
+    interim : whether interim checks, or certificates.
+    since, until : first and last day.
+    """
+
+    text: str = ""
+    machine: str = ""
+    artefact: str = ""
+    origin: str = "measured"
+    command: str = "report"
+    states: Collection[str] = ()
+    decisions: Collection[str] = ()
+    verdicts: Collection[str] = ()
+    interim: bool | None = None
+    since: dt.date | None = None
+    until: dt.date | None = None
+
+
+COMMANDS = ("report", "diagnose")
+"""That make what is listed; named, so that the database finds its index."""
+
+_C = certificates.c
+_COLUMNS = (
+    _C.entry, _C.job, _C.number, machines.c.called.label("machine"), machines.c.name.label("machine_name"),
+    func.coalesce(artefacts.c.called, "").label("artefact"), _C.kind, _C.origin, _C.day, _C.state, _C.decision,
+    _C.diagnosis, _C.interim, _C.command,
+)  # fmt: skip
+_JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.artefact)
+
+
+def standing_of_all(records: Records) -> list[Newest]:
+    """Every machine with its newest certificate, in the order in which they were first recorded.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    newest = certificates.alias()
+    of_machine = (
+        select(newest.c.entry)
+        .where(newest.c.machine == machines.c.id, newest.c.command == "report", newest.c.origin == "measured",
+               newest.c.state.in_(STANDING), newest.c.interim.is_(False))
+        .order_by(newest.c.day.desc(), newest.c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
+    )  # fmt: skip
+    m = machines.c
+    query = (
+        select(m.called, m.name.label("of_name"), m.manufacturer, m.model, m.place, m.recognised, *_COLUMNS)
+        .select_from(machines.outerjoin(certificates, _C.entry == of_machine)
+                     .outerjoin(artefacts, artefacts.c.id == _C.artefact))
+        .order_by(m.id)
+    )  # fmt: skip
+    with told(records.place), records.engine.connect() as connection:
+        rows = connection.execute(query).all()
+    return [
+        Newest(
+            Called(serial, name, maker, model, place, key.startswith(BY_NAME)), None if own[0] is None else _listed(own)
+        )
+        for serial, name, maker, model, place, key, *own in rows
+    ]
+
+
+def chosen(records: Records, choice: Choice, most: int, left_out: int = 0) -> tuple[list[Listed], int]:
+    """Certificates, newest first, and how many there are.
+
+    Parameters
+    ----------
+    most : of a page.
+    left_out : newer ones on the pages before.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    with told(records.place), records.engine.connect() as connection:
+        where = _conditions(connection, choice)
+        count = connection.execute(select(func.count()).select_from(certificates).where(*where)).scalar_one()
+        wanted = select(_C.entry).where(*where).order_by(_C.day.desc(), _C.entry.desc()).limit(most).offset(left_out)
+        page = connection.execute(wanted).scalars().all()  # from an index alone; names are looked up for these only
+        rows = connection.execute(select(*_COLUMNS).select_from(_JOINED).where(_C.entry.in_(page))).all()
+    found = {row.entry: _listed(row) for row in rows}
+    return [found[entry] for entry in page], int(count)
+
+
+def _listed(row: Any) -> Listed:
+    entry, job, number, machine, name, artefact, kind, origin, day, state, decision, verdict, interim, command = row
+    return Listed(entry, job, number, machine, name, artefact, kind, origin, dt.date.fromisoformat(day), state, decision,
+                  verdict, bool(interim), command)  # fmt: skip
+
+
+def _conditions(connection: Connection, choice: Choice) -> list[ColumnElement[bool]]:
+    found: list[ColumnElement[bool]] = [_C.command.in_(COMMANDS if not choice.command else (choice.command,))]
+    if choice.origin:
+        found.append(_C.origin == choice.origin)
+    if choice.machine:
+        found.append(_C.machine == select(machines.c.id).where(machines.c.called == choice.machine).scalar_subquery())
+    if choice.artefact:
+        found.append(_C.artefact.in_(select(artefacts.c.id).where(artefacts.c.called == choice.artefact)))
+    several = ((_C.state, choice.states), (_C.decision, choice.decisions), (_C.diagnosis, choice.verdicts))
+    found += [column.in_(tuple(values)) for column, values in several if values]
+    if choice.interim is not None:
+        found.append(_C.interim.is_(choice.interim))
+    if choice.since is not None:
+        found.append(_C.day >= choice.since.isoformat())
+    if choice.until is not None:
+        found.append(_C.day <= choice.until.isoformat())
+    return [*found, *_with_text(connection, choice.text)]
+
+
+def _with_text(connection: Connection, text: str) -> list[ColumnElement[bool]]:
+    """A text in the job's id or the certificate's number, or in the machine's serial or name however they are spelled."""
+    if not text:
+        return []
+    key = spelled(text)
+    of_machine = or_(*(column.contains(key, autoescape=True) for column in (machines.c.spelled, machines.c.named)))
+    escaped = "".join(f"/{c}" if c in "%_/" else c for c in text)
+    sqlite = connection.dialect.name == "sqlite"  # whose LIKE takes capitals for small letters, and its lower() is slow
+    named = ((column.like if sqlite else column.ilike)(f"%{escaped}%", escape="/") for column in (_C.job, _C.number))
+    return [or_(*named, _C.machine.in_(select(machines.c.id).where(of_machine)))]
+
+
+class Stated(NamedTuple):
+    """One value as one certificate or interim check states it.
+
+    Parameters
+    ----------
+    entry, day : of the certificate.
+    value, lower, upper : with the ends of the stated interval.
+    limit : of its amount; ``None`` where none is set.
+    interim : whether it is of an interim check.
+    adjusted_since : the last adjustment of the machine before it.
+    """
+
+    entry: int
+    day: dt.date
+    value: float
+    lower: float
+    upper: float
+    limit: float | None
+    interim: bool
+    adjusted_since: dt.date | None
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """One value of one machine over its newest certificates and interim checks, oldest first.
+
+    Parameters
+    ----------
+    name, quantity, unit : of the value.
+    stated : at each.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    stated: list[Stated]
+
+
+def courses(records: Records, machine: Machine, most: int) -> list[Course]:
+    """What a machine's measured certificates and interim checks state, as far as they stand.
+
+    Parameters
+    ----------
+    machine : of the records.
+    most : certificates, the newest.
+
+    Returns
+    -------
+    in the order of the newest certificate, then what only older ones state.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    newest = (
+        select(_C.entry, _C.day, _C.interim, _C.adjusted_since)
+        .where(_C.machine == select(machines.c.id).where(machines.c.called == machine.serial).scalar_subquery(),
+               _C.command == "report", _C.origin == "measured", _C.state.in_(STANDING))
+        .order_by(_C.day.desc(), _C.entry.desc()).limit(most).subquery()
+    )  # fmt: skip
+    f, q = figures.c, quantities.c
+    query = (
+        select(newest, q.name, q.quantity, q.unit, f.value, f.lower, f.upper,
+               f.at_most)
+        .select_from(newest.join(figures, f.certificate == newest.c.entry).join(quantities, q.id == f.quantity))
+        .order_by(newest.c.day.desc(), newest.c.entry.desc(), f.place)
+    )  # fmt: skip
+    found: dict[tuple[str, str], Course] = {}
+    adjusted = [day.isoformat() for day in machine.adjusted]
+    with told(records.place), records.engine.connect() as connection:
+        rows = connection.execute(query).all()
+    for row in rows:
+        course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
+        course.stated.append(
+            Stated(row.entry, dt.date.fromisoformat(row.day), row.value, row.lower, row.upper, row.at_most, bool(row.interim),
+                   adjusted_before(row.adjusted_since, row.day, adjusted))
+        )  # fmt: skip
+    for course in found.values():
+        course.stated.reverse()
+    return list(found.values())
+
+
+def _outcomes(verdicts: Verdicts) -> dict[str, str]:
+    """What is stated of each value, by the name that the records gives it; the gravest, where several are."""
+    found: dict[str, str] = {}
+    for one in verdicts:
+        name = PERFORMANCE + (one.name or one.by) if one.by else one.name
+        if one.by and name in found:
+            name = f"{name} ({one.by})"
+        found[name] = gravest((one.outcome, found.get(name, one.outcome)))
+    return found
+
+
+def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[str, str]]:
+    """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    found = {}
+    with told(records.place), records.engine.connect() as connection:
+        for block in blocks(sorted(numbers)):
+            query = select(entries.c.number, entries.c.content).where(entries.c.number.in_(block))
+            for number, content in connection.execute(query):
+                found[int(number)] = _outcomes(Verdicts.of_results(json.loads(content)))
+    return found
+
+
+def entry_of(records: Records, number: int) -> Entry | None:
+    """One entry; ``None`` where there is none of that number.
+
+    Raises
+    ------
+    CmmUqError : the records are damaged or locked.
+    """
+    with told(records.place), records.engine.connect() as connection:
+        row = connection.execute(select(entries).where(entries.c.number == number)).first()
+    return None if row is None else Entry(*row)

@@ -1,0 +1,241 @@
+"""Opens records: found, made, recognised as this program's and of this version, with every refusal in words."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sqlite3
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.laboratory.records.place import APPLICATION, ENVIRONMENT, NONE, is_url, place_of, shown
+from cmm_uq.laboratory.records.refusals import told
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection, Engine
+
+    from cmm_uq.laboratory.records.store import Records
+
+PATIENCE_S = 15.0
+"""How long to wait for another process that writes."""
+_TURNS = 150
+
+REVISION = "0002"
+"""Newest revision of the tables; see :mod:`cmm_uq.laboratory.records.migrations`."""
+
+KNOWN = ("0001", "0002")
+"""All revisions, oldest first."""
+
+
+def open_records(where: str | Path | None = None, *, create: bool = False, read_only: bool = False) -> Records:
+    """Open the history.
+
+    Parameters
+    ----------
+    where : SQLite file, or URL of a PostgreSQL database; ``None`` for what the environment names, else
+        ``reports/records.db``.
+    create : make it where there is none.
+    read_only : nothing is written, not even what a crash left is completed.
+
+    Returns
+    -------
+    the records; a context manager that closes them.
+
+    Raises
+    ------
+    CmmUqError : there are none, or they are another program's, of a newer or older version, locked or damaged.
+    OutputError : they cannot be written to.
+    """
+    from cmm_uq.laboratory.records.store import Records
+
+    place = place_of(where)
+    if place is None:
+        raise CmmUqError("no records are asked for", where=f"--records {NONE}", fix="Name a file or a URL")
+    engine = engine_of(place, create=create, read_only=read_only)
+    records = Records(engine, place, read_only=read_only)
+    try:
+        with told(place), engine.connect() as connection:
+            state = state_of(connection)
+        if state == "" and create and not read_only:
+            _make(records)
+        else:
+            check_revision(state, place)
+        if not read_only:
+            records.settle()
+    except BaseException:
+        records.close()
+        raise
+    return records
+
+
+def engine_of(place: str | Path, *, create: bool = False, read_only: bool = False) -> Engine:
+    """Connections to a place.
+
+    Raises
+    ------
+    CmmUqError : there is nothing, or no driver for it.
+    """
+    return _server(str(place), read_only) if is_url(place) else _file(Path(place), create, read_only)
+
+
+def _file(path: Path, create: bool, read_only: bool) -> Engine:
+    from sqlalchemy import create_engine, event
+    from sqlalchemy.pool import QueuePool
+
+    _check_file(path, create)
+    mode = "ro" if read_only else "rwc" if create else "rw"
+    if read_only and not os.access(path.parent, os.W_OK):
+        mode = (
+            "ro&immutable=1"  # without its -shm file a database in WAL mode can only be read as one that nobody writes
+        )
+    uri = f"{path.absolute().as_uri()}?mode={mode}"
+
+    def connect() -> sqlite3.Connection:
+        made = sqlite3.connect(uri, uri=True, timeout=PATIENCE_S, isolation_level=None, check_same_thread=False)
+        with contextlib.suppress(sqlite3.Error):  # what is wrong with the file is told when it is first read
+            made.execute("PRAGMA foreign_keys = ON")
+            made.execute("PRAGMA synchronous = FULL")
+            made.execute("PRAGMA recursive_triggers = ON")
+            made.execute("PRAGMA cache_size = -65536")  # KiB: pages of the indexes of 10⁵ certificates
+        return made
+
+    engine = create_engine("sqlite://", creator=connect, poolclass=QueuePool)
+
+    @event.listens_for(engine, "begin")
+    def begin(connection: Connection) -> None:
+        writing = connection.get_execution_options().get("writing")
+        connection.exec_driver_sql("BEGIN IMMEDIATE" if writing else "BEGIN")
+
+    return engine
+
+
+def _check_file(path: Path, create: bool) -> None:
+    """The file itself is not looked into: closing it would drop SQLite's locks of this process on it."""
+    if path.is_dir():
+        raise CmmUqError("is a folder, and records are a file", where=str(path), fix="Name a file in it: records.db")
+    try:
+        if not path.exists():
+            if not create:
+                raise CmmUqError(
+                    "there are no records", where=str(path),
+                    fix=f"Name them with --records or {ENVIRONMENT}, or begin them: cmm-uq records import FOLDER",
+                )  # fmt: skip
+            path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot be opened: {error.strerror}", where=str(path), fix="Mend the permissions") from error
+
+
+def _server(url: str, read_only: bool) -> Engine:
+    from sqlalchemy import create_engine
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import ArgumentError, NoSuchModuleError
+
+    try:
+        made = make_url(url)
+        if made.get_backend_name() == "postgresql" and "+" not in made.drivername:
+            made = made.set(drivername="postgresql+psycopg")
+        if made.get_backend_name() != "postgresql":
+            raise CmmUqError(f"{made.get_backend_name()} is no database for records", where=shown(url),
+                             fix="Name a file, or postgresql://…")  # fmt: skip
+        options: dict[str, Any] = {"connect_args": {"connect_timeout": 10}}
+        if read_only:
+            options["connect_args"]["options"] = "-c default_transaction_read_only=on"
+        return create_engine(made, pool_pre_ping=True, **options)
+    except ModuleNotFoundError as error:
+        raise CmmUqError(f"the driver {error.name} is not installed", where=shown(url),
+                         fix='pip install "cmm-uq[postgres]"') from error  # fmt: skip
+    except (ArgumentError, NoSuchModuleError, ValueError) as error:
+        raise CmmUqError("is no URL of a database", where=shown(url),
+                         fix="postgresql://USER@HOST/DATABASE, or a file") from error  # fmt: skip
+
+
+def state_of(connection: Connection) -> str:
+    """Revision of the tables; empty where there are none yet.
+
+    Raises
+    ------
+    CmmUqError : they are another program's.
+    """
+    from sqlalchemy import inspect
+
+    sqlite = connection.dialect.name == "sqlite"
+    application = connection.exec_driver_sql("PRAGMA application_id").scalar() if sqlite else None
+    names = set(inspect(connection).get_table_names())
+    ours = application == APPLICATION if sqlite else {"entries", "alembic_version"} <= names
+    if not names and application in (None, 0, APPLICATION):
+        return ""
+    if not ours or "alembic_version" not in names:
+        raise CmmUqError("is the database of another program", where=where_of(connection),
+                         fix="Name another file or database for the records")  # fmt: skip
+    return str(connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalar() or "")
+
+
+def check_revision(state: str, place: str | Path) -> None:
+    """Refuse tables that this version does not know.
+
+    Raises
+    ------
+    CmmUqError : they are of a newer version, an older one, or not there.
+    """
+    if state == REVISION:
+        return
+    if state == "":
+        raise CmmUqError("holds no records", where=shown(place), fix="Begin them: cmm-uq records import FOLDER")
+    if state in KNOWN:
+        raise CmmUqError("the records are of an older version", where=shown(place),
+                         fix="Back them up, then: cmm-uq records migrate")  # fmt: skip
+    raise CmmUqError(f"the records are of a newer version (revision {state})", where=shown(place),
+                     fix="Update cmm-uq; nothing was changed")  # fmt: skip
+
+
+def _make(records: Records) -> None:
+    """Make the tables, in one transaction."""
+    from sqlalchemy import text
+
+    from cmm_uq.laboratory.records.tables import META, TRIGGERS
+
+    engine = records.engine
+    with told(records.place):
+        if engine.dialect.name == "sqlite":
+            with engine.connect() as connection:
+                raw = connection.connection.driver_connection
+                connection.rollback()
+                if isinstance(raw, sqlite3.Connection):
+                    _write_ahead(raw)  # not possible inside a transaction
+        with engine.connect().execution_options(writing=True) as connection, connection.begin():
+            if engine.dialect.name == "postgresql":
+                connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": APPLICATION})
+            if state_of(connection):
+                return  # another process was faster
+            META.create_all(connection)
+            for trigger in TRIGGERS[engine.dialect.name]:
+                connection.exec_driver_sql(trigger)
+            connection.exec_driver_sql(
+                "CREATE TABLE alembic_version (version_num VARCHAR(32) NOT NULL, "
+                "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
+            )
+            connection.execute(text("INSERT INTO alembic_version VALUES (:now)"), {"now": REVISION})
+            if engine.dialect.name == "sqlite":
+                connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION}")
+
+
+def where_of(connection: Connection) -> str:
+    """Of a connection, for messages."""
+    if connection.dialect.name == "sqlite":
+        rows = connection.exec_driver_sql("PRAGMA database_list").all()
+        return str(rows[0][2]) if rows else "records"
+    return str(connection.engine.url.render_as_string(hide_password=True))
+
+
+def _write_ahead(raw: sqlite3.Connection) -> None:
+    """Journal in WAL mode; who makes the same file at the same moment is waited for, which SQLite does not do here."""
+    for turn in range(_TURNS):
+        try:
+            raw.execute("PRAGMA journal_mode = WAL")
+            return
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error) or turn == _TURNS - 1:
+                raise
+        time.sleep(PATIENCE_S / _TURNS)

@@ -1,0 +1,299 @@
+"""A scheduled run: every job folder that is new or changed, one after another; then what is due; then the messages.
+
+Nothing that goes wrong with one job stops the others. What may pass (a full disk, locked records, a mail server that does
+not answer) is tried again when everything else is done.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.laboratory.schedule.found import Found, Snapshot, job_folders, quiet_since, snapshot
+from cmm_uq.laboratory.schedule.notices import Notice, of_error
+from cmm_uq.laboratory.schedule.outbox import Delivery, Outbox
+from cmm_uq.laboratory.schedule.problems import Problems
+from cmm_uq.laboratory.schedule.settings import RunTable
+from cmm_uq.laboratory.schedule.work import BUSY, FAILED, GONE, UNCHANGED, WAITING, WOULD, Ended, Work
+
+SCHEMA = "cmm-uq/scheduled/1"
+
+_IN_A_ROW = 3
+"""Jobs one after another whose output is impossible: then it is so for the others too."""
+
+_PATIENCE_S = 60.0
+"""How long to wait for another run that sends messages."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time, as a run knows it.
+
+    Parameters
+    ----------
+    now : the moment, UTC; it may jump.
+    passed : seconds from some moment on; they do not.
+    sleep : waits so many seconds.
+    """
+
+    now: Callable[[], dt.datetime]
+    passed: Callable[[], float]
+    sleep: Callable[[float], None]
+
+    def moment(self) -> str:
+        """ISO 8601, to the second."""
+        return self.now().strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a scheduled run goes by.
+
+    Parameters
+    ----------
+    folders : with job folders in them.
+    settings : of ``[run]``.
+    work : how a job is reported.
+    outbox : takes messages.
+    due : what is due, or drifts, on a day.
+    tell : takes a line for a program.
+    log : takes a line for a person.
+    clock : time.
+    dry : say what would happen, and do nothing.
+    """
+
+    folders: Sequence[Path]
+    settings: RunTable
+    work: Work
+    outbox: Outbox
+    due: Callable[[dt.date], Iterable[Notice]]
+    tell: Callable[[dict[str, Any]], None]
+    log: Callable[[str], None]
+    clock: Clock
+    dry: bool = False
+    counted: dict[str, int] = field(default_factory=dict)
+    codes: set[int] = field(default_factory=lambda: {0})
+
+    def through(self) -> int:
+        """Do all of it; the exit code.
+
+        0: all is well. 1: something needs a person. 2: bad input. 3: output impossible.
+        """
+        problems = Problems(self.work.out)
+        jobs = self._distinct(self._found(problems), problems)
+        if self.dry:
+            for job in jobs:
+                self._end(self._would(job), problems)
+            return self._conclude()
+        self._send(1, last=False)
+        ready, changing = self._parted(jobs, problems)
+        self._report_all(ready, problems)
+        self._report_all(self._settled(changing, {job.id.casefold() for job in jobs}, problems), problems)
+        self._look_what_is_due()
+        self._send(self.settings.tries, last=True)
+        return self._conclude()
+
+    def _found(self, problems: Problems) -> list[Found]:
+        """Every job folder once; what is wrong with a folder of the schedule is told."""
+        found: dict[Path, Found] = {}
+        for root in self.folders:
+            try:
+                inside = list(job_folders(root, self.work.out))
+                if not inside and not self.settings.may_be_empty:
+                    raise CmmUqError("holds no job", where=str(root),
+                                     fix="A job is a folder with a job.toml; [run] may_be_empty allows none")  # fmt: skip
+            except CmmUqError as error:
+                self._end(Ended.refused(Found(root, root), error), problems)
+                continue
+            self._mended(str(root), problems)
+            for job in inside:
+                found.setdefault(job.folder.resolve(), job)
+        return list(found.values())
+
+    def _distinct(self, jobs: Sequence[Found], problems: Problems) -> list[Found]:
+        """Jobs whose id no other one has; of the others neither is reported, or each would replace the other's."""
+        by_id: dict[str, list[Found]] = {}
+        for job in jobs:
+            by_id.setdefault(job.id.casefold() or str(job.folder), []).append(job)
+        for same in by_id.values():
+            for job, other in zip(same, [*same[1:], same[0]], strict=True):
+                if job is not other:
+                    error = CmmUqError(f"its id {job.id!r} is that of {other.folder} too", where=str(job.folder),
+                                       fix="Give each job an id of its own")  # fmt: skip
+                    self._end(Ended.refused(job, error), problems)
+        alone = [same[0] for same in by_id.values() if len(same) == 1]
+        # a job in which the last run ended comes last, so that it cannot keep the others from being reported
+        return sorted(alone, key=self.work.was_left)
+
+    def _would(self, job: Found) -> Ended:
+        """What would come of a job."""
+        if job.planned:
+            return Ended(job, WAITING, "not measured yet")
+        try:
+            why = self.work.reason(job)
+        except CmmUqError as error:
+            return Ended.refused(job, error)
+        if not why:
+            return Ended(job, UNCHANGED)
+        unchanged_s = quiet_since(snapshot(job.folder), self.clock.now().timestamp())
+        quiet = unchanged_s >= self.settings.quiet_s
+        return Ended(job, WOULD, why) if quiet else Ended(job, WAITING, "changed a moment ago")
+
+    def _parted(
+        self, jobs: Iterable[Found], problems: Problems
+    ) -> tuple[list[Found], dict[Found, tuple[float, Snapshot]]]:
+        """Jobs that can be taken, and those that somebody may still be copying, as they are now."""
+        ready, changing = [], {}
+        for job in jobs:
+            would = self._would(job)
+            if would.state == WOULD or (would.state == UNCHANGED and self.work.was_left(job)):
+                ready.append(job)
+            elif would.state == WAITING and not job.planned:
+                changing[job] = (self.clock.passed(), snapshot(job.folder))
+            else:
+                self._end(would, problems)
+        return ready, changing
+
+    def _settled(
+        self, changing: Mapping[Found, tuple[float, Snapshot]], ids: Collection[str], problems: Problems
+    ) -> list[Found]:
+        """Of the jobs that were changed a moment ago, or have times of the future, those that nobody changes now.
+
+        Parameters
+        ----------
+        changing : when each was looked at, and what lay in its folder.
+        ids : of all jobs, without regard to case.
+        problems : that stand.
+        """
+        settled = []
+        for job, (looked, seen) in changing.items():
+            self.clock.sleep(max(0.0, looked + self.settings.quiet_s - self.clock.passed()))
+            again = _looked_at_again(job)
+            same_id = again.id == job.id or again.id.casefold() not in ids
+            if snapshot(job.folder) == seen and same_id and not again.planned:
+                settled.append(again)
+            else:
+                self._end(Ended(job, WAITING, "is still being changed: left for the next run"), problems)
+        return settled
+
+    def _report_all(self, jobs: Sequence[Found], problems: Problems) -> None:
+        """Report jobs; those whose output is impossible now again after the others."""
+        left = list(jobs)
+        for attempt in range(1, self.settings.tries + 1):
+            left = self._attempt(left, problems, last=attempt == self.settings.tries)
+            if not left:
+                return
+            self._back_off(attempt)
+
+    def _attempt(self, jobs: Sequence[Found], problems: Problems, *, last: bool) -> list[Found]:
+        """Report jobs; those that are to be tried again."""
+        again: list[Found] = []
+        in_a_row = 0
+        for i, job in enumerate(jobs):
+            ended = self.work.take(job)
+            if last or ended.state != FAILED:
+                in_a_row = 0
+                self._end(ended, problems)
+                continue
+            again.append(job)
+            in_a_row += 1
+            self._log(f"will be tried again {ended.name}: {ended.why}")
+            if in_a_row == _IN_A_ROW:
+                return [
+                    *jobs[i + 1 :],
+                    *again,
+                ]  # whatever is wrong with these, it keeps none of the others from its turn
+        return again
+
+    def _back_off(self, attempt: int) -> None:
+        self.clock.sleep(float(self.settings.back_off_s * 2 ** (attempt - 1)))
+
+    def _look_what_is_due(self) -> None:
+        try:
+            for notice in self.due(self.clock.now().date()):
+                new = bool(self._queue([notice])) or not self.outbox.channels
+                self._line({"due": notice.about, "event": notice.event, "why": str(notice.text)}, int(new))
+        except CmmUqError as error:
+            self._line({"due": None, "event": "error", "why": str(error)}, 3 if isinstance(error, OutputError) else 2)
+
+    def _send(self, tries: int, *, last: bool) -> None:
+        """Send what waits, again where a server does not answer; of the last failure a person must know."""
+        for attempt in range(1, tries + 1):
+            try:
+                deliveries = self.outbox.deliver(_PATIENCE_S)
+            except CmmUqError as error:
+                self._line({"message": None, "why": str(error)}, 3)
+                return
+            failed = [one for one in deliveries if one.problem]
+            ended = attempt == tries and last
+            for one in deliveries:
+                if ended or not one.problem:
+                    self._sent(one)
+            if not failed or attempt == tries:
+                return
+            self._back_off(attempt)
+
+    def _sent(self, one: Delivery) -> None:
+        why, code = one.problem or one.remark or None, int(bool(one.problem))
+        told = {"message": one.message.title, "channel": one.channel, "sent": not one.problem, "why": why}
+        self._line(told, code)
+
+    def _end(self, ended: Ended, problems: Problems) -> None:
+        """Tell what came of a job; an error goes out once while it stands."""
+        self.counted[ended.state] = self.counted.get(ended.state, 0) + 1
+        self.codes.add(ended.code)
+        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **ended.line()})
+        if ended.error is not None and not self.dry:
+            about = ended.name
+            self._queue([of_error(ended.error, about, problems.since(about, ended.why, self.clock.moment()))])
+        elif ended.state not in (BUSY, WAITING, GONE):
+            self._mended(ended.name, problems)
+            self._mended(str(ended.job.folder), problems)
+        if ended.state != UNCHANGED:
+            said = ended.why if ended.error is not None else ", ".join(filter(None, (ended.why, *ended.events)))
+            self._log(f"{ended.state} {ended.name}" + (f": {said}" if said else ""))
+
+    def _mended(self, about: str, problems: Problems) -> None:
+        if not self.dry:
+            problems.mended(about)
+
+    def _queue(self, notices: Sequence[Notice]) -> list[Notice]:
+        """Let notices go out; where they cannot be kept they are sent at once, and again by the next run."""
+        try:
+            return self.outbox.add(notices)
+        except CmmUqError as error:  # a full disk, or records that were lost meanwhile
+            self.codes.add(3)
+            self._log(f"a message cannot be kept: {error}")
+            for one in self.outbox.sent_at_once(notices):
+                self._sent(one)
+            return list(notices)
+
+    def _line(self, told: dict[str, Any], code: int) -> None:
+        self.codes.add(code)
+        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **told, "exit_code": code})
+        self._log(", ".join(f"{key} {value}" for key, value in told.items() if value not in (None, "")))
+
+    def _log(self, text: str) -> None:
+        if not self.dry:
+            self.log(f"{self.clock.moment()} {text}")
+
+    def _conclude(self) -> int:
+        code = max(self.codes)
+        told = {"run": self.counted, "dry": self.dry, "messages_waiting": self.outbox.waiting(), "exit_code": code}
+        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **told})
+        counts = ", ".join(f"{count} {state}" for state, count in self.counted.items()) or "nothing found"
+        self._log(f"run ended with {code}: {counts}")
+        return code
+
+
+def _looked_at_again(job: Found) -> Found:
+    """A job that may have been read while it was being copied."""
+    try:
+        again = next(job_folders(job.folder), job)
+    except CmmUqError:  # it went away, which taking it says
+        return job
+    return replace(again, root=job.root)

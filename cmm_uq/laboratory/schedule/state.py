@@ -1,0 +1,171 @@
+"""What earlier runs have done: which inputs a job was last reported from, and which messages were sent.
+
+The records of the laboratory keep it, or the folder of the reports where there are none: the manifest of a report says that
+it is whole, its results.json what it was made from.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.output import read_manifest, sha256_of
+from cmm_uq.jobs.file_names import RESULTS
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.records import Certificate
+    from cmm_uq.laboratory.records.store import Records
+
+PRIVATE = ".scheduled"
+"""Folder beside the reports with locks and messages."""
+
+COMMAND = "report"
+
+
+@dataclass(frozen=True)
+class Reported:
+    """A certificate that was written.
+
+    Parameters
+    ----------
+    inputs : SHA-256 of every file that it was made from, by name.
+    """
+
+    inputs: Mapping[str, str]
+
+
+class State(Protocol):
+    """What is remembered from run to run."""
+
+    def reported(self, job: str) -> Reported | None:
+        """The newest certificate of a job; ``None`` where it has none."""
+        ...
+
+    def released(self, job: str) -> bool:
+        """Whether a person has released the newest certificate of a job, so that it must not be replaced."""
+        ...
+
+    def sent(self, key: str) -> bool:
+        """Whether a message was sent."""
+        ...
+
+    def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
+        """Remember that a message was sent.
+
+        Raises
+        ------
+        OutputError : it cannot be remembered now.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class InFolder:
+    """State kept with the reports alone.
+
+    Parameters
+    ----------
+    out : folder with a folder for each job.
+    """
+
+    out: Path
+
+    def reported(self, job: str) -> Reported | None:
+        """See :meth:`State.reported`; a certificate that a person has written into since stands all the same."""
+        folder = self.out / job
+        manifest = read_manifest(folder)
+        if manifest is None or (manifest.owner.command, manifest.owner.job) != (COMMAND, job):
+            return None
+        if sha256_of(folder / RESULTS) != manifest.files.get(RESULTS):
+            return None
+        if not all(os.path.lexists(folder / name) for name in manifest.files):
+            return None
+        inputs = inputs_in(folder)
+        return None if inputs is None else Reported(inputs)
+
+    def released(self, job: str) -> bool:
+        """See :meth:`State.released`; without records nobody releases anything."""
+        return False
+
+    def sent(self, key: str) -> bool:
+        """See :meth:`State.sent`."""
+        return self._marker(key).exists()
+
+    def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
+        """See :meth:`State.add_sent`."""
+        marker = self._marker(key)
+        try:
+            marker.parent.mkdir(parents=True, exist_ok=True)
+            marker.write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
+        except OSError as error:
+            raise OutputError(f"cannot be written: {error.strerror}", where=str(marker),
+                              fix="Free the disk, or mend the permissions") from error  # fmt: skip
+
+    def _marker(self, key: str) -> Path:
+        return self.out / PRIVATE / "sent" / f"{key}.json"
+
+
+class InRecords:
+    """State kept in the records; the folder of the reports says what they need not be asked for.
+
+    Parameters
+    ----------
+    records : opened.
+    out : folder with a folder for each job.
+    """
+
+    def __init__(self, records: Records, out: Path) -> None:
+        self.records, self.folder = records, InFolder(out)
+        self._sent: set[str] = set()
+        self._read = 0
+
+    def reported(self, job: str) -> Reported | None:
+        """See :meth:`State.reported`; a report that was taken away from its folder is one all the same."""
+        here = self.folder.reported(job)
+        if here is not None and self._recorded(job):
+            return here
+        newest = self._newest(job)
+        if newest is None:
+            return None
+        inputs = next(self.records.entries(newest.entry)).data.get("inputs") or {}
+        return Reported({str(name): str(digest) for name, digest in inputs.items()}) if inputs else None
+
+    def released(self, job: str) -> bool:
+        """See :meth:`State.released`."""
+        newest = self._newest(job)
+        return newest is not None and newest.state == "released"
+
+    def sent(self, key: str) -> bool:
+        """See :meth:`State.sent`; what another run has recorded meanwhile counts."""
+        for entry in self.records.entries(self._read + 1, kind="sent"):
+            self._sent.add(str(entry.data.get("key")))
+            self._read = entry.number
+        return key in self._sent
+
+    def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
+        """See :meth:`State.add_sent`."""
+        self.records.append("sent", {**content, "key": key})
+
+    def _recorded(self, job: str) -> bool:
+        digest = sha256_of(self.folder.out / job / RESULTS)
+        return digest is not None and self.records.has_results(digest) is not None
+
+    def _newest(self, job: str) -> Certificate | None:
+        found = self.records.certificates(job=job, origin=None, values=False)
+        return max(found, key=lambda one: one.entry, default=None)
+
+
+def inputs_in(folder: Path) -> dict[str, str] | None:
+    """SHA-256 of every file that a report was made from, by name, as its results.json says; ``None`` where it does not."""
+    try:
+        data = json.loads(content_of(folder / RESULTS, TABLE_BYTES, ""))
+        return {str(name): str(digest) for name, digest in data["job"]["inputs_sha256"].items()}
+    except (CmmUqError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None

@@ -1,0 +1,220 @@
+"""What an artefact is: how points become observations, and what it leaves undetermined.
+
+An artefact of known sizes, placed somewhere on the table, says where its points truly are up to that placing. Hence three
+questions, asked of every kind: where would its points lie, placed as well as the recording allows (:meth:`~Artefact.fit`)?
+Along which directions does a recording speak about errors (:meth:`~Artefact.project`)? What remains free
+(:meth:`~Artefact.placing`, and sizes without a certificate)?
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, foreign, say
+from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.units import Unit, unit
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.doubt import Cause
+from cmm_uq.maths.inference.freedoms import Freedoms
+
+
+@dataclass(frozen=True, eq=False)
+class Indications:
+    """Measured lengths against calibrated ones.
+
+    Parameters
+    ----------
+    errors : (m,) measured minus calibrated, mm.
+    lengths : (m,) calibrated lengths, mm.
+    u : (m,) standard uncertainty of the calibrated lengths, mm.
+    rows : (m, 2) the points between which each length was measured, as rows of the recording.
+    u_beside : (m,) what of ``u`` comes from a further gauge that is shared by all that have it, mm; ``None``: nothing.
+    """
+
+    errors: Floats
+    lengths: Floats
+    u: Floats
+    rows: Ints
+    u_beside: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Form errors of what was probed all around, one for each (measurement, repeat).
+
+    Parameters
+    ----------
+    measurement, repeat : (q,).
+    count : (q,) points of each.
+    form : (q,) range of the distances from the least-squares feature, mm.
+    certified : form deviation of the artefact by its certificate, mm; 0 when it is not given.
+    directions : (n, 3) outward direction of each point from the middle of its feature.
+    size : (q,) measured minus certified size at 20 °C, mm; ``None`` without a certificate.
+    centres : (q, 3) middles of the features, mm; ``None`` where they say nothing.
+    """
+
+    measurement: Ints
+    repeat: Ints
+    count: Ints
+    form: Floats
+    certified: float
+    directions: Floats
+    size: Floats | None = None
+    centres: Floats | None = None
+
+
+Role = Literal["dimension", "sought", "set-up"]
+
+
+@dataclass(frozen=True)
+class Size:
+    """A dimension of the artefact at 20 °C, itself to be estimated.
+
+    Parameters
+    ----------
+    name, title : in results.json, and in words.
+    unit : as printed.
+    nominal : where to start, in mm.
+    sd : standard uncertainty of the certificate, mm; infinite without a certificate.
+    what : it is, in words without whose: "length"; its title where left out.
+    role : a dimension of the artefact; a size that the measurement is made for; or what is known of how it was set up
+        (``nominal`` and ``sd`` are then in ``unit``).
+    """
+
+    name: str
+    title: Text
+    unit: Unit
+    nominal: float
+    sd: float
+    what: Text = NOTHING
+    role: Role = "dimension"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "title", foreign(self.title))
+        object.__setattr__(self, "unit", unit(self.unit))
+
+    @property
+    def certified(self) -> bool:
+        """Whether a certificate gives this size."""
+        return bool(np.isfinite(self.sd))
+
+
+class Artefact(ABC):
+    """One artefact as recorded: m observations of n points.
+
+    Attributes
+    ----------
+    kind : as in ``[artefact] kind``.
+    title : in words.
+    points : the recording.
+    sizes : dimensions that enter the model.
+    noise_scale : (m,) standard uncertainty of each observation, per unit of that of one coordinate.
+    measurement, repeat : (m,) what each observation belongs to.
+    rows : (m, j) the points that each observation speaks of, as rows of the recording.
+    """
+
+    kind: str
+    title: Text
+    points: Points
+    sizes: tuple[Size, ...]
+    noise_scale: Floats
+    measurement: Ints
+    repeat: Ints
+    rows: Ints
+
+    @property
+    def set_up(self) -> Text:
+        """What a measurement is one of, in words, as under a picture."""
+        return say("Set-up of the {artefact:small}", artefact=self.title)
+
+    @abstractmethod
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """Points (n, 3) of an artefact with these sizes (s,), placed as near to ``true_xyz`` (n, 3) as it goes, mm."""
+
+    @abstractmethod
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """Change of the observations, (m, k) in mm, when the points at ``xyz`` (n, 3) move by ``displacement`` (n, 3, k)."""
+
+    @abstractmethod
+    def size_change(self) -> Floats:
+        """Change of the observations, (m, s), for one mm of each size."""
+
+    def own_faults(self) -> Iterable[Effect]:
+        """What may be wrong with the artefact itself: effects of the catalogue, made for this one."""
+        return ()
+
+    @cached_property
+    def faults(self) -> Mapping[str, Effect]:
+        """The same by name."""
+        return {effect.name: effect for effect in self.own_faults()}
+
+    def acting(self, effect: Effect) -> Effect:
+        """An effect as it acts here: a fault of the artefact is that of this one.
+
+        Raises
+        ------
+        CmmUqError : this kind of artefact has no such fault.
+        """
+        if not effect.of_artefact or effect.belongs_to(self.points):
+            return effect
+        if effect.name not in self.faults:
+            raise CmmUqError(
+                f"a recording of kind {self.kind!r} has no {effect.name}",
+                where="job.toml [model] effects",
+                fix="Leave it out" + (f"; it has {', '.join(self.faults)}" if self.faults else ""),
+            )
+        return self.faults[effect.name]
+
+    def words_of(self, observation: int) -> Text:
+        """What an observation is of: a whole (measurement, repeat), or a point of one."""
+        points, rows = self.points, self.rows[observation]
+        run = say(
+            "measurement {measurement}, repeat {repeat}",
+            measurement=int(self.measurement[observation]), repeat=int(self.repeat[observation]),
+        )  # fmt: skip
+        whole = np.all(np.isin(np.flatnonzero(points.group == points.group[rows[0]]), rows))
+        return run if whole else say("point {point} of {run}", point=int(points.point[rows[0]]), run=run)
+
+    def unread(self) -> NDArray[np.bool_]:
+        """Observations (m,) along a coordinate that stood still to the last digit: nobody read it, and it has no noise."""
+        return np.zeros(len(self.noise_scale), dtype=bool)
+
+    def lengths(self) -> Floats | None:
+        """Lengths (m,), mm at 20 °C, whose scatter is a figure of performance; ``None`` when it has no meaning here."""
+        return None
+
+    def indications(self) -> Indications | None:
+        """Errors of indication of calibrated lengths; ``None`` without a calibration."""
+        return None
+
+    def calibration(self) -> Cause | None:
+        """What its certificate leaves open of several lengths beyond its sizes; ``None`` of an artefact of one length."""
+        return None
+
+    def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
+        """A point on the line of each length between two points, and the line's direction, (m, 3) each."""
+        first, last = self.points.xyz[rows[:, 0]], self.points.xyz[rows[:, 1]]
+        return 0.5 * (first + last), last - first
+
+    def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
+        """Whether the ends of each length between two points were reached from opposite sides, (m,); ``None``: not known."""
+        return None
+
+    def forms(self) -> Forms | None:
+        """Form errors of a test sphere; ``None`` when they have no meaning here."""
+        return None
+
+    def placing(self, xyz: Floats) -> Floats | Freedoms:
+        """Change of the observations, (m, q), for each freedom of the artefact's placing that they do not cancel.
+
+        As :class:`Freedoms` where every placing has its own, which keeps many placings small.
+        """
+        return np.zeros((len(self.noise_scale), 0))

@@ -1,0 +1,348 @@
+"""Effects, an artefact and a recording, joined into one model.
+
+Forward: an artefact of given sizes stands where the recording says, and the machine's errors turn its true points into
+indicated ones. Inverse: the difference between the indicated points of the recording and of that forward model, seen along
+the directions in which the artefact speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton).
+
+The design is taken at the points of the *artefact*, not at the recorded ones. With recorded lengths the columns of the
+three scale errors would add up to the observation itself, a careless fit would be perfect and wrong; with the artefact's
+own length they add up to the column of that length, and an uncalibrated bar shows its free scale as an exact null space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import ARCSECOND, Unit
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.drawn_noise import Noise
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.superposition import About, Superposition
+from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.least_squares import LeastSquares, likeliest, solve
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+
+ARTEFACT = "artefact"
+"""First part of the key of a size of the artefact."""
+
+_NO_MACHINE = 1000.0
+"""mm."""
+
+_SMALLEST_NOISE = 1e-6
+"""mm."""
+
+SMALL_LEAN = 100 * ARCSECOND
+"""rad: squares and products of angles up to this are 0.25 ppm."""
+
+_NO_LEAN = 1.0
+"""rad: an axis that leans so is another one; least squares gets there where a recording does not show the angle."""
+
+_MOVED = 10 * ARCSECOND
+"""rad: about an angle this far away a model is as linear."""
+
+_NO_SQUARENESS = 0.1
+"""rad: a squareness of which no more is known than this, six degrees, is not determined."""
+
+_ILL_CONDITIONED = 1e3
+"""Condition up to which a design, in typical sizes of the parameters, is not made of the noise of the placings."""
+
+_ROUNDS = 20
+
+_SIZE_SCALE = 0.1
+"""mm, a typical deviation of an artefact from its nominal size; only scales columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Least squares at convergence, and the linear model about it.
+
+    Attributes
+    ----------
+    least_squares : the estimate.
+    linear : the model, linear about ``about``, whose posterior may be sampled.
+    about : (k,) the estimate; or, where the recording leaves an angle to its prior, the likeliest parameters.
+    """
+
+    least_squares: LeastSquares
+    linear: LinearModel
+    about: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementModel:
+    """Effects acting on the points of an artefact.
+
+    Parameters
+    ----------
+    artefact : with its recording.
+    effects : what acts; a fault of the artefact is taken as that of this one.
+    sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
+    used : (m,) which observations to use; all by default.
+    shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
+    within : a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear
+        model is then taken about the estimate of that one.
+    least_noise : mm, what is not known of a coordinate however little the residuals scatter, as of a prediction that the
+        recording is compared with.
+
+    Raises
+    ------
+    CmmUqError : the nonlinear parameter of an effect is not given, or the artefact has no such fault.
+    """
+
+    artefact: Artefact
+    effects: tuple[Effect, ...]
+    sigma: float | None = None
+    used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    within: MeasurementModel | None = None
+    least_noise: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "effects", tuple(self.artefact.acting(effect) for effect in self.effects))
+        if not len(self.used):
+            object.__setattr__(self, "used", np.ones(len(self.artefact.noise_scale), dtype=bool))
+        for effect in self.effects:
+            if effect.shape and effect.name not in self.shapes:
+                raise CmmUqError(
+                    f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which a report does not estimate",
+                    where="job.toml [model] effects",
+                    fix="Leave it out",
+                )
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Coefficients of the effects, in order, then the artefact's sizes."""
+        coefficients = tuple(
+            Unknown((effect.name, c.name), c.unit, 0.0, c.prior_sd, c.prior_sd)
+            for effect in self.effects
+            for c in effect.coefficients
+        )
+        sizes = tuple(
+            Unknown((ARTEFACT, size.name), size.unit, size.nominal, size.sd, _SIZE_SCALE, size.certified)
+            for size in self.artefact.sizes
+        )
+        return coefficients + sizes
+
+    def reported(
+        self, draws: Floats, owners: Collection[str] | None = None
+    ) -> dict[tuple[str, str], tuple[Floats, Unit]]:
+        """Draws (N,), and unit, of every parameter as it is reported, then of the artefact's sizes, by key.
+
+        Parameters
+        ----------
+        draws : (N, k) of the unknowns.
+        owners : effects that are asked for; by default all, none of which may have a shape, and the artefact.
+        """
+        found, column = {}, 0
+        for effect in self.effects:
+            own = draws[:, column : column + len(effect.coefficients)]
+            column += len(effect.coefficients)
+            if owners is not None and effect.name not in owners:
+                continue
+            units = {parameter.name: parameter.unit for parameter in effect.reported}
+            for name, values in effect.to_reported(own, np.zeros((len(own), 0))).items():
+                found[effect.name, name] = values, units[name]
+        sizes = self.artefact.sizes if owners is None or ARTEFACT in owners else ()
+        for size, values in zip(sizes, draws[:, column : column + len(sizes)].T, strict=True):
+            found[ARTEFACT, size.name] = values, size.unit
+        return found
+
+    def errors(self, xyz: Floats, coefficients: Floats) -> Floats:
+        """Errors e (n, 3), mm, of points indicated at ``xyz``."""
+        return self._acting.errors(self.artefact.points.at(xyz), coefficients)
+
+    def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
+        """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm.
+
+        Raises
+        ------
+        CmmUqError : the errors are so large that no indication belongs to a true point.
+        """
+        indicated = true_xyz.copy()
+        for _ in range(12):
+            change = true_xyz - self.errors(indicated, coefficients) - indicated
+            indicated += change
+            largest = np.abs(change).max(initial=0.0)
+            if largest < 1e-8:
+                break
+            if not largest < _NO_MACHINE:
+                raise CmmUqError(
+                    f"errors that would explain this recording exceed {_NO_MACHINE:g} mm: they are no machine's",
+                    where="the recording", fix="Look for a wrong unit, exchanged columns or points of different places",
+                )  # fmt: skip
+        return indicated
+
+    def predicted(self, values: Floats) -> Floats:
+        """Indicated points (n, 3) that parameters (k,) predict for this recording's placings, without noise."""
+        return self.indicated(self.placed(values), self._split(values)[0])
+
+    def estimate(self) -> Estimate:
+        """Iterate least squares until the estimates stand still.
+
+        Raises
+        ------
+        CmmUqError : the recording has too few observations.
+        """
+        return self._estimate
+
+    @cached_property
+    def _estimate(self) -> Estimate:
+        if self.within is not None:
+            whole, keys = self.within.estimate(), [unknown.key for unknown in self.within.unknowns]
+            own = [keys.index(unknown.key) for unknown in self.unknowns]
+            linear = whole.linear.only(own)
+            return Estimate(self._solved(linear), linear, whole.about[own])
+        most: int | None = None
+        while True:
+            try:
+                return self._iterated(most)
+            except (CmmUqError, np.linalg.LinAlgError):
+                first = self._solved(self.linearised(self._beforehand), most)
+                if first.condition <= _ILL_CONDITIONED or first.rank == 1:
+                    raise
+                most = first.rank - 1  # what the recording hardly shows led the iteration away from all machines
+
+    @property
+    def _beforehand(self) -> Floats:
+        return np.array([u.prior_mean for u in self.unknowns])
+
+    def _iterated(self, most: int | None) -> Estimate:
+        """The estimate with so many combinations taken as determined, at the most."""
+        values = self._beforehand
+        for _ in range(10):
+            linear = self.linearised(values)
+            result = self._solved(linear, most)
+            scale = np.array([u.scale for u in self.unknowns])
+            change = np.abs(result.value - values) / scale
+            values = result.value
+            if change.max(initial=0.0) < 1e-9 or self.leans_beyond(values, np.zeros_like(values), _NO_LEAN):
+                break  # nothing but noise says how an angle stands: another step would go farther still
+        about = self._likeliest(linear, values, result)
+        return Estimate(result, linear if about is values else self.linearised(about), about)
+
+    def _solved(self, linear: LinearModel, most: int | None = None) -> LeastSquares:
+        """Least squares, without angles that the recording would show only if its placings were known without noise.
+
+        The squarenesses YZ and ZX of a plate that lies flat move it along its own plane by what the noise of its attitude
+        makes of them: their estimates would be radians, about which nothing is linear.
+        """
+        found, still = solve(linear, most), np.zeros(len(linear.unknowns))
+        while found.condition > _ILL_CONDITIONED and found.rank > 1:
+            if not self.leans_beyond(still, found.spread, _NO_SQUARENESS):
+                break
+            found = solve(linear, found.rank - 1)
+        return found
+
+    def _likeliest(self, linear: LinearModel, values: Floats, found: LeastSquares) -> Floats:
+        """Where the posterior is to be linear: the estimate, unless priors know angles much better than the recording does."""
+        sigma, still = max(found.sigma_of_residuals, _SMALLEST_NOISE), np.zeros_like(values)
+        if not self.leans_beyond(values, still, SMALL_LEAN):
+            return values
+        for _ in range(_ROUNDS):
+            nearer = likeliest(linear, sigma)
+            if not self.leans_beyond(nearer - values, still, _MOVED):
+                break
+            values, linear = nearer, self.linearised(nearer)
+        return values
+
+    def linearised(self, values: Floats) -> LinearModel:
+        """The model about parameters (k,): ``observed`` is what they leave unexplained plus what they explain."""
+        artefact, used = self.artefact, self.used
+        true, unexplained = self._unexplained(values)
+        change = self._acting.derivatives(self._about(values))
+        design = np.hstack([-artefact.project(true, change), artefact.size_change()])
+        return LinearModel(
+            (unexplained + design @ values)[used], design[used], self.unknowns,
+            Freedoms.of(artefact.placing(true)).at(used), artefact.noise_scale[used], self.sigma,
+        )  # fmt: skip
+
+    def remainder(self, about: Estimate, values: Floats) -> Floats:
+        """What parameters (k,) explain of the used observations, (m,) mm, beyond the linear model of an estimate."""
+        linear = about.linear
+        return linear.observed - linear.design @ values - self._unexplained(values)[1][self.used]
+
+    def _unexplained(self, values: Floats) -> tuple[Floats, Floats]:
+        """Where the artefact's points are, (n, 3), and what parameters (k,) leave unexplained, (m,), mm."""
+        true = self.placed(values)
+        missing = self.artefact.points.xyz - self.indicated(true, self._split(values)[0])
+        return true, self.artefact.project(true, missing[:, :, None])[:, 0]
+
+    def seen(self, displacement: Floats, values: Floats) -> Floats:
+        """What used observations show, (m, k) in mm, of an error e of the points (n, 3, k) that ``values`` do not contain."""
+        return -self.artefact.project(self.where(values), displacement)[self.used]
+
+    def where(self, values: Floats) -> Floats:
+        """Points (n, 3), mm, about which the model is linear at ``values``."""
+        return self.placed(values) if self.within is None else self.within.placed(self.within.estimate().about)
+
+    def columns(self, effect: Effect, shape: Sequence[float], values: Floats) -> Floats:
+        """Errors e of the points, (n, 3, j) in mm, for one unit of each coefficient of one effect beside the model's own."""
+        model, about = (self, values) if self.within is None else (self.within, self.within.estimate().about)
+        return model._about(about).columns(effect, shape)
+
+    def _about(self, values: Floats) -> About:
+        """Where columns are taken that are linear about parameters (k,)."""
+        key = values.tobytes()
+        if key not in self._abouts:
+            self._abouts.clear()
+            self._abouts[key] = self._acting.about(self.artefact.points.at(self.placed(values)), self._split(values)[0])
+        return self._abouts[key]
+
+    @cached_property
+    def _abouts(self) -> dict[bytes, About]:
+        """What :meth:`_about` found last."""
+        return {}
+
+    @cached_property
+    def _placed(self) -> dict[bytes, Floats]:
+        """What :meth:`placed` found last: it is asked for again by every candidate of a diagnosis."""
+        return {}
+
+    def placed(self, values: Floats) -> Floats:
+        """Points (n, 3), mm, of the artefact where parameters (k,) say that the recording found it."""
+        key = values.tobytes()
+        if key not in self._placed:
+            coefficients, sizes = self._split(values)
+            xyz = self.artefact.points.xyz
+            self._placed.clear()
+            self._placed[key] = self.artefact.fit(xyz + self.errors(xyz, coefficients), sizes)
+            self._placed[key].flags.writeable = False
+        return self._placed[key]
+
+    def residuals(self, values: Floats) -> Floats:
+        """Unexplained part of every observation, used or not, (m,) mm."""
+        xyz = self.artefact.points.xyz
+        predicted = self.predicted(values)
+        return self.artefact.project(predicted, (xyz - predicted)[:, :, None])[:, 0]
+
+    def simulate(self, coefficients: Floats, sizes: Floats, noise: Noise, random: np.random.Generator) -> Floats:
+        """Indicated points (n, 3), mm, of a recording with the placings of this one, errors and noise drawn anew.
+
+        Parameters
+        ----------
+        coefficients : (k,) of the effects, in order.
+        sizes : (s,) true sizes of the artefact, mm.
+        noise : sizes of its components.
+        random : their source.
+        """
+        exact = self.predicted(np.concatenate([coefficients, sizes]))
+        return noise.displayed(exact + noise.drawn(self.artefact.points, random))
+
+    def leans_beyond(self, values: Floats, sd: Floats, limit: float) -> bool:
+        """Whether an angle between two axes may differ from 90° by more than ``limit``, rad, within four ``sd`` (k,)."""
+        return self._acting.largest_lean(self.artefact.points, self._split(np.abs(values) + 4 * sd)[0]) > limit
+
+    @property
+    def _acting(self) -> Superposition:
+        return Superposition(self.effects, self.shapes)
+
+    def _split(self, values: Floats) -> tuple[Floats, Floats]:
+        k = len(values) - len(self.artefact.sizes)
+        return values[:k], values[k:]

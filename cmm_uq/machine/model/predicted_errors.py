@@ -1,0 +1,257 @@
+"""A recording less the errors that a simulation predicts for it: what the simulation leaves unexplained, as a recording.
+
+A prediction is where the artefact was taken to stand, plus errors. Where it was taken to stand is no concern: the artefact is
+placed as near to the predicted points as it goes, in the recording's frame, and what remains of them are the predicted errors
+(as indicated, so with the sign opposite to e). Taken from the recorded points they leave
+
+    true = (recorded − predicted errors) + e,   e: what the machine has and the simulation has not
+
+which is a recording like any other: what its placings leave open stays open, and all that is asked of recordings can be asked
+of this one. Predicted errors hold where the artefact was taken to stand; it must therefore be near to where it stood.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.jobs.prediction import Prediction
+from cmm_uq.jobs.simulation import KEY
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.placings import Placings
+
+NEAR = 30.0
+"""mm from where a point was recorded, within which it is taken to be predicted: no hand sets up much worse, and errors change
+by less than their own size over it."""
+
+LARGEST_ERROR = 5.0
+"""mm: beyond, no machine's errors are predicted, but another artefact, or points numbered otherwise."""
+
+_REACH = 0.5
+"""Part of the artefact's size, from its middle, at which errors say by how much they stretch."""
+
+_SAME = 1e-7
+"""mm, by which a prediction differs from a recording that it is a copy of: the digits of a file."""
+
+_ANOTHER_FRAME, _ROUGHLY = 3.0, 0.1
+"""By how many times, and mm, the points must be nearer in a shifted or turned frame for that to be the prediction's."""
+
+_UNITS = ((25.4, "inches"), (1000.0, "metres"), (10.0, "centimetres"), (1e-3, "micrometres"))
+_LIKE_A_UNIT = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """How predicted coordinates become those of the recording: ``turn`` (3, 3) times them, plus ``shift`` (3,), mm."""
+
+    turn: Floats
+    shift: Floats
+
+    def of(self, xyz: Floats) -> Floats:
+        """Predicted coordinates (n, 3), mm, in the recording's frame."""
+        return np.asarray(xyz @ self.turn.T + self.shift, dtype=np.float64)
+
+    @property
+    def angle(self) -> float:
+        """By which the frames are turned, rad."""
+        return float(np.arccos(np.clip(0.5 * (np.trace(self.turn) - 1), -1.0, 1.0)))
+
+    @property
+    def is_the_same(self) -> bool:
+        """Whether both frames are one."""
+        return bool(np.array_equal(self.turn, np.eye(3)) and not np.any(self.shift))
+
+
+SAME = Frame(np.eye(3), np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedErrors:
+    """What a prediction says of the points of a recording.
+
+    Parameters
+    ----------
+    errors : (n, 3) indicated minus true, mm.
+    u : (n,) standard uncertainty of a predicted coordinate, mm, as it is stated.
+    turned : (n,) what there is besides because the artefact was taken to lie in another direction than it did, mm.
+    frame : of the prediction.
+    apart : largest distance of a predicted point from where it was recorded, mm; 0 of lengths.
+    unused : rows of the prediction that the recording has no point for.
+    """
+
+    errors: Floats
+    u: Floats
+    turned: Floats
+    frame: Frame
+    apart: float
+    unused: int
+
+
+def predicted_errors(
+    artefact: Artefact, prediction: Prediction, where: str, *, length_mm: float | None = None
+) -> PredictedErrors:  # fmt: skip
+    """The errors that a prediction contains, at the points of a recording.
+
+    Parameters
+    ----------
+    artefact : with its recording.
+    prediction : of its points, or of its lengths.
+    where : the recording's name, for messages.
+    length_mm : of the artefact, as the simulation took it; that of the artefact by default.
+
+    Raises
+    ------
+    CmmUqError : a point is not predicted, is predicted somewhere else or in another unit, or the recording is predicted to
+        its last digit.
+    """
+    rows, unused = _matched(artefact.points, prediction, where)
+    sizes = _sizes(artefact, length_mm)
+    if prediction.of_lengths:
+        errors, u = _of_lengths(artefact, prediction, rows, sizes)
+        return PredictedErrors(errors, u, np.zeros_like(u), SAME, 0.0, unused)
+    recorded = artefact.points.xyz
+    frame = _frame(prediction, rows, recorded)
+    predicted = frame.of(prediction.xyz[rows])
+    apart = float(np.linalg.norm(predicted - recorded, axis=1).max())
+    seen = artefact.project(recorded, (recorded - predicted)[:, :, None])
+    if np.abs(seen).max() < _SAME:
+        raise _copied(prediction)
+    errors = predicted - artefact.fit(predicted, sizes)
+    _refuse_absurd(errors, prediction, rows)
+    turned = _of_turning(artefact.points, predicted, errors)
+    return PredictedErrors(errors, prediction.u[rows], turned, frame, apart, unused)
+
+
+def _sizes(artefact: Artefact, length_mm: float | None) -> Floats:
+    """Of the artefact, as the simulation took them."""
+    sizes = np.array([size.nominal for size in artefact.sizes])
+    if length_mm is None:
+        return sizes
+    if not sizes.size or artefact.sizes[0].name != "length_mm":
+        raise CmmUqError(f"a {artefact.title.lower()} has no length_mm", where=f"job.toml {KEY} length_mm",
+                         fix="Leave it out")  # fmt: skip
+    sizes[0] = length_mm
+    return sizes
+
+
+def _matched(points: Points, prediction: Prediction, where: str) -> tuple[Ints, int]:
+    """Row (n,) of the prediction for each recorded point, and how many rows are for none."""
+    n, of_lengths = len(points), prediction.of_lengths
+    point = np.zeros(n, dtype=np.int64) if of_lengths else points.point
+    repeat = np.ones(n, dtype=np.int64) if prediction.repeat is None else points.repeat
+    given = np.ones_like(prediction.point) if prediction.repeat is None else prediction.repeat
+    known = {
+        key: i for i, key in enumerate(
+            zip(prediction.measurement.tolist(), prediction.point.tolist(), given.tolist(), strict=True)
+        )
+    }  # fmt: skip
+    wanted = list(zip(points.measurement.tolist(), point.tolist(), repeat.tolist(), strict=True))
+    for i, key in enumerate(wanted):
+        if key not in known:
+            line = f" line {points.lines[i]}" if len(points.lines) else ""
+            which = "" if of_lengths else f", point {key[1]}"
+            times = "" if prediction.repeat is None else f", repeat {key[2]}"
+            raise CmmUqError(f"measurement {key[0]}{which}{times}, {where}{line}, is not predicted",
+                             where=prediction.where,
+                             fix="Number the prediction as the recording, and predict every point")  # fmt: skip
+    rows = np.array([known[key] for key in wanted], dtype=np.int64)
+    return rows, len(known) - len(set(wanted))
+
+
+def _of_lengths(artefact: Artefact, prediction: Prediction, rows: Ints, sizes: Floats) -> tuple[Floats, Floats]:
+    """Errors (n, 3) along each length, half at each end, and their uncertainty (n,)."""
+    ends = artefact.rows
+    if artefact.lengths() is None or ends.shape[1] != 2 or len(np.unique(ends)) < ends.size:
+        raise CmmUqError(f"predicts lengths, and a recording of this {artefact.title.lower()} has more than lengths",
+                         where=prediction.where, fix="Predict coordinates: measurement, point, x_mm, y_mm, z_mm")  # fmt: skip
+    points = artefact.points
+    placed = artefact.fit(points.xyz, sizes)
+    bars = placed[ends[:, 1]] - placed[ends[:, 0]]
+    nominal = np.linalg.norm(bars, axis=1)
+    predicted, u = prediction.length[rows[ends[:, 0]]], prediction.u[rows[ends[:, 0]]]
+    recorded = np.linalg.norm(points.xyz[ends[:, 1]] - points.xyz[ends[:, 0]], axis=1)
+    if np.abs(recorded - predicted).max() < _SAME:
+        raise _copied(prediction)
+    half = 0.5 * (predicted - nominal)[:, None] * bars / nominal[:, None]
+    errors, each = np.zeros_like(points.xyz), np.zeros(len(points))
+    errors[ends[:, 0]], errors[ends[:, 1]] = -half, half
+    each[ends.ravel()] = np.repeat(u / np.sqrt(2.0), 2)
+    _refuse_absurd(errors, prediction, rows)
+    return errors, each
+
+
+def _of_turning(points: Points, predicted: Floats, errors: Floats) -> Floats:
+    """Uncertainty (n,), mm, of errors predicted for an artefact that lay in another direction by up to a degree or so.
+
+    Errors that stretch by e along some direction, turned by θ against it, differ at a distance L by up to 2·e·θ·L; and θ·L is
+    how far a point lies from where it was predicted once the middle of its placing does not.
+    """
+    placings = Placings.of(points.measurement)
+    aside = points.xyz - predicted
+    turned, reach = (np.linalg.norm(v - placings.means(v), axis=1) for v in (aside, points.xyz))
+    own = np.linalg.norm(errors - placings.means(errors), axis=1)
+    far = reach > _REACH * reach.max(initial=0.0)
+    return np.asarray(2 * float((own[far] / reach[far]).max(initial=0.0)) * turned)
+
+
+def _frame(prediction: Prediction, rows: Ints, recorded: Floats) -> Frame:
+    """The frame of the prediction: the recording's own, or one shifted, or shifted and turned, against it.
+
+    Raises
+    ------
+    CmmUqError : in none of them every point is predicted near to where it was recorded.
+    """
+    predicted = prediction.xyz[rows]
+    frames = (SAME, Frame(np.eye(3), np.median(recorded - predicted, axis=0)), _turned(predicted, recorded))
+    far = [np.linalg.norm(frame.of(predicted) - recorded, axis=1) for frame in frames]
+    usual = min(float(np.sqrt(np.mean(distance**2))) for distance in far)
+    for frame, distance in zip(frames, far, strict=True):
+        if distance.max() <= NEAR and np.sqrt(np.mean(distance**2)) <= _ANOTHER_FRAME * usual + _ROUGHLY:
+            return frame
+    spread = float(np.linalg.norm(predicted - predicted.mean(axis=0)))
+    ratio = float(np.linalg.norm(recorded - recorded.mean(axis=0))) / spread if spread else 0.0
+    for factor, unit in _UNITS:
+        if abs(ratio / factor - 1) < _LIKE_A_UNIT:
+            raise CmmUqError(f"the coordinates look like {unit}, not mm", where=prediction.where,
+                             fix=f"Convert them (times {factor:g}), or give unit in job.toml {KEY}")  # fmt: skip
+    best = min(far, key=lambda distance: float(np.median(distance)))
+    i = int(np.argmax(best))
+    mirrored = _turned(predicted * [1, 1, -1], recorded)
+    if np.linalg.norm(mirrored.of(predicted * [1, 1, -1]) - recorded, axis=1).max() <= NEAR:
+        raise CmmUqError("its frame is mirrored against the recording's: one axis has the other sign, or two are exchanged",
+                         where=prediction.where,
+                         fix="Name each column rightly, or turn the sign of one round, in both alike")  # fmt: skip
+    raise CmmUqError(
+        f"measurement {prediction.measurement[rows[i]]}, point {prediction.point[rows[i]]} is predicted {best[i]:.4g} mm "
+        "from where it was recorded", where=f"{prediction.where} line {prediction.lines[rows[i]]}",
+        fix=f"Number it as the recording, and predict places within {NEAR:g} mm, all in one frame",
+    )  # fmt: skip
+
+
+def _turned(predicted: Floats, recorded: Floats) -> Frame:
+    """The frame by least squares over all points (Kabsch 1976)."""
+    middle, other = predicted.mean(axis=0), recorded.mean(axis=0)
+    U, _, Vt = np.linalg.svd((recorded - other).T @ (predicted - middle))
+    U[:, 2] *= np.sign(np.linalg.det(U @ Vt))
+    turn = U @ Vt
+    return Frame(turn, other - turn @ middle)
+
+
+def _copied(prediction: Prediction) -> CmmUqError:
+    return CmmUqError("agrees with the recording to below 0.1 nm throughout: it is a copy, for nothing predicts the noise",
+                      where=prediction.where, fix="Name the file that the simulation wrote")  # fmt: skip
+
+
+def _refuse_absurd(errors: Floats, prediction: Prediction, rows: Ints) -> None:
+    size = np.linalg.norm(errors, axis=1)
+    i = int(np.argmax(size))
+    if size[i] > LARGEST_ERROR:
+        point = "" if prediction.of_lengths else f", point {prediction.point[rows[i]]},"
+        raise CmmUqError(
+            f"measurement {prediction.measurement[rows[i]]}{point} is predicted {size[i]:.3g} mm off the artefact, more than "
+            "any machine's error", where=f"{prediction.where} line {prediction.lines[rows[i]]}",
+            fix=f"Check its numbering and unit, and the artefact that was simulated (length_mm in {KEY})",
+        )  # fmt: skip

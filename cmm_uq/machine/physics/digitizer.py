@@ -1,0 +1,234 @@
+"""Laser digitizer on the ram: from scan-plane coordinates and scale readings to true coordinates (Harris 2004 ch. 4 and 5).
+
+The digitizer measures u and v in its scan plane, w = 0. Its attitude is three Euler angles 3-1-3; its mount, the end of
+the ram, lies at [U1 V1 W1] in its own frame. So a point lies at q = E·([u v 0] − [U1 V1 W1]) from the mount, the mount's
+own attitude turns q by A, and the mount is at scale readings plus their error:
+
+    X = A·q + D + e(D)                                                                                       (35)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.physics.compensation import BLOCK, Circumstances, Compensation
+from cmm_uq.machine.physics.kinematics import on_leaning_axes
+from cmm_uq.machine.physics.map_interpolation import LookedUp
+from cmm_uq.maths.geometry import fit_plane
+from cmm_uq.maths.geometry.frame import frame_about
+from cmm_uq.maths.geometry.orthogonal_distance import minimise
+
+
+def euler_313(alpha: float | Floats, beta: float | Floats, gamma: float | Floats) -> Floats:
+    """Attitude (3, 3) from angles about Z, X′ and Z″, rad (Harris 2004 eq. 7): columns are u, v, w in machine axes.
+
+    Angles (n,) give attitudes (3, 3, n).
+    """
+    ca, sa, cb, sb, cg, sg = (f(a) for a in (alpha, beta, gamma) for f in (np.cos, np.sin))
+    return np.array(
+        [
+            [ca * cg - sa * cb * sg, -ca * sg - sa * cb * cg, sa * sb],
+            [ca * cb * sg + sa * cg, ca * cb * cg - sa * sg, -ca * sb],
+            [sb * sg, sb * cg, cb],
+        ]
+    )
+
+
+def euler_angles(attitude: Floats) -> tuple[float, float, float]:
+    """Angles α, β, γ in rad of an attitude (3, 3); α = 0 where w is along ±Z and only their sum or difference shows."""
+    u, v, w = attitude.T
+    beta = float(np.arctan2(np.hypot(w[0], w[1]), w[2]))
+    if np.hypot(w[0], w[1]) < 1e-12:
+        return 0.0, beta, float(np.arctan2(-v[0], u[0]))
+    return float(np.arctan2(w[0], -w[1])), beta, float(np.arctan2(u[2], v[2]))
+
+
+@dataclass(frozen=True, eq=False)
+class ScanPlane:
+    """Direction of the scan plane: α, β in rad and their covariance (2, 2) in rad²."""
+
+    alpha: float
+    beta: float
+    covariance: Floats
+
+
+def scan_plane(readings: Floats, towards: Floats, *, u_point: float | None = None) -> ScanPlane:
+    """Euler angles α and β from discrete points of the scan plane (Harris 2004 eq. 6).
+
+    A fixed detector finds the plane; the scale readings at which the light falls on it span a plane parallel to it.
+
+    Parameters
+    ----------
+    readings : (n, 3) scale readings, n ≥ 3, mm.
+    towards : (3,) roughly the way w points, out of the digitizer's back: three points do not tell it from its opposite.
+    u_point : standard uncertainty of a point along w, mm; needed for three points, else estimated when left out.
+
+    Raises
+    ------
+    CmmUqError : points on one line, or ``towards`` in the plane.
+    """
+    if len(readings) == 3 and u_point is None:
+        raise CmmUqError(
+            "three points leave nothing to estimate their uncertainty from", fix="Give u_point, or more points"
+        )
+    plane = fit_plane(readings, u_point=u_point)
+    across = float(plane.normal @ towards / np.linalg.norm(towards))
+    if abs(across) < 0.1:
+        raise CmmUqError(
+            "the direction of w lies in the scan plane", fix="Give roughly the way the digitizer's back points"
+        )
+    w = plane.normal * np.sign(across)
+    level = w[0] ** 2 + w[1] ** 2
+    if level < 1e-12:
+        raise CmmUqError("w points along Z, so that α is not determined", fix="Use γ alone for this attitude")
+    to_angles = np.array([[-w[1] / level, w[0] / level, 0.0], [0.0, 0.0, -1 / np.sqrt(level)]])
+    return ScanPlane(
+        float(np.arctan2(w[0], -w[1])),
+        float(np.arctan2(np.sqrt(level), w[2])),
+        to_angles @ plane.covariance[3:, 3:] @ to_angles.T,
+    )
+
+
+def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float, nominal: float) -> float:
+    """Euler angle γ in rad from the scan of a plane surface: the angle with which its points lie in one plane.
+
+    Parameters
+    ----------
+    scan : (n, 2) u, v, mm.
+    readings : (n, 3) scale readings, mm. They must move in two directions, else γ and the surface's slope are one.
+    alpha, beta : rad.
+    nominal : γ as the wrist is indexed, rad; moves in two directions leave a second solution, half a turn away.
+
+    Raises
+    ------
+    CmmUqError : the motion does not determine γ, or it is far from the nominal one.
+    """
+
+    def placed(gamma: float) -> Floats:
+        return np.asarray(scan @ euler_313(alpha, beta, gamma)[:, :2].T + readings)
+
+    plane = fit_plane(placed(nominal), u_point=1.0)
+    size = float(np.abs(readings - readings.mean(axis=0)).max()) or 1.0
+
+    def linearise(state: Floats) -> Floats:
+        gamma, n, d = state[0], state[1:4] / np.linalg.norm(state[1:4]), state[4]
+        u, v, _ = euler_313(alpha, beta, gamma).T
+        points = placed(gamma) - plane.point
+        turned = scan[:, :1] * v - scan[:, 1:] * u
+        across = frame_about(n)[:2]
+        rows = [turned @ n, *(across @ points.T), np.full(len(points), -size), points @ n - d]
+        return np.array(rows) / size
+
+    def move(state: Floats, step: Floats) -> Floats:
+        n = state[1:4] / np.linalg.norm(state[1:4])
+        n = n + step[1:3] @ frame_about(n)[:2]
+        return np.array([state[0] + step[0], *(n / np.linalg.norm(n)), state[4] + size * step[3]])
+
+    found = minimise(np.array([nominal, *plane.normal, 0.0]), linearise, move, "roll of the scan plane")
+    if found.condition > 1e6:
+        raise CmmUqError(
+            "these motions do not determine γ", fix="Scan the plane while moving in two directions across it"
+        )
+    gamma = float(found.state[0])
+    if abs(gamma - nominal) > np.pi / 12:
+        raise CmmUqError(
+            f"γ = {np.degrees(gamma):.2f}° from the scan, the wrist is indexed at {np.degrees(nominal):.2f}°",
+            fix="Check the index of the wrist, and that every point lies on the plane",
+        )
+    return gamma
+
+
+def mount_axes(rotation: Floats) -> tuple[Floats, Floats, Floats]:
+    """Axes X, Y, Z (each (3, n)) of the mount after its summed rotations (Harris 2004 eq. 29–32).
+
+    Z follows from εX and εY, X from Z and εZ, Y is their cross product. The source prints −tan εZ in (30), which is a
+    left-handed rotation and contradicts its own (11); here every rotation follows the right hand.
+
+    Parameters
+    ----------
+    rotation : (3, n) sums of the carriages' rotations about X, Y, Z, rad (eq. 26–28).
+    """
+    tx, ty, tz = np.tan(rotation)
+    Z = np.array([ty, -tx, np.ones_like(tx)])
+    Z /= np.sqrt(ty * ty + tx * tx + 1)
+    X = np.array([np.ones_like(tz), tz, tx * tz - ty])
+    X /= np.sqrt(1 + tz * tz + X[2] * X[2])
+    Y = np.array([Z[1] * X[2] - Z[2] * X[1], Z[2] * X[0] - Z[0] * X[2], Z[0] * X[1] - Z[1] * X[0]])
+    return X, Y, Z
+
+
+@dataclass(frozen=True, eq=False)
+class Digitizer:
+    """A laser digitizer in one pose on a machine.
+
+    Parameters
+    ----------
+    attitude : (3, 3); see :func:`euler_313`.
+    offset : (3,) [U1 V1 W1], the mount in the digitizer's frame, mm.
+    compensation : of the machine; its origin is that of the scale readings, so usually 0.
+    """
+
+    attitude: Floats
+    offset: Floats
+    compensation: Compensation
+
+    def coordinates(
+        self, scan: Floats, readings: Floats, temperatures: Floats | float | None = None
+    ) -> tuple[Floats, NDArray[np.bool_]]:
+        """True coordinates of digitized points in the machine's home frame (Harris 2004 eq. 35).
+
+        Parameters
+        ----------
+        scan : (n, 2) u, v in the scan plane, mm.
+        readings : (n, 3) scale readings D, E, F, mm.
+        temperatures : of the scales; see :meth:`cmm_uq.machine.physics.map_interpolation.ErrorMaps.at`.
+
+        Returns
+        -------
+        (n, 3) in mm, and (n,) whether a point was extrapolated beyond the error maps.
+        """
+        n, when = len(readings), Circumstances(temperatures=temperatures)
+        xyz, extrapolated = np.empty((n, 3)), np.empty(n, dtype=bool)
+        for start in range(0, n, BLOCK):
+            rows = slice(start, start + BLOCK)
+            here = when.of(rows).temperatures
+            looked_up = self._block(scan[rows], readings[rows], here, start + 1, xyz[rows])
+            extrapolated[rows] = looked_up.extrapolated
+        return xyz, extrapolated
+
+    def transform(
+        self, temperatures_at: Callable[[Floats], Floats] | float | None = None
+    ) -> Callable[[Floats], Floats]:
+        """Function from rows u, v, D, E, F (and a time, where temperatures are a log) to coordinates (n, 3).
+
+        Parameters
+        ----------
+        temperatures_at : temperatures (n, 3) at times (n,), such as :meth:`TemperatureLog.at`; or one temperature.
+        """
+
+        def coordinates(rows: Floats) -> Floats:
+            given = temperatures_at(rows[:, 5]) if callable(temperatures_at) else temperatures_at
+            return self.coordinates(rows[:, :2], rows[:, 2:5], given)[0]
+
+        return coordinates
+
+    def _block(
+        self, scan: Floats, readings: Floats, temperatures: Floats | float | None, first: int, out: Floats
+    ) -> LookedUp:
+        # by components throughout, each of them contiguous
+        D = np.ascontiguousarray((readings + np.asarray(self.compensation.origin)).T)
+        u, v = np.ascontiguousarray(scan.T)
+        looked_up = self.compensation.maps.at(D.T, temperatures, beyond=self.compensation.beyond, first=first)
+        e = on_leaning_axes(D.T, looked_up.errors, looked_up.squareness, chain=self.compensation.chain).T
+        X, Y, Z = mount_axes(looked_up.errors[:, :, 3:].sum(axis=1).T)
+        E, mount = self.attitude, -self.attitude @ self.offset
+        qx, qy, qz = (mount[i] + E[i, 0] * u + E[i, 1] * v for i in range(3))
+        for i in range(3):
+            np.add(readings[:, i] + e[i], X[i] * qx + Y[i] * qy + Z[i] * qz, out=out[:, i])
+        return looked_up

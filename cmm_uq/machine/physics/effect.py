@@ -1,0 +1,268 @@
+"""What an effect is: a named piece of physics that moves points.
+
+The sign rule is *true = indicated + e*. An effect gives e, in mm, for points read on a machine. Almost every parameter
+enters e linearly; such an effect only gives its :meth:`~Effect.basis`, and Jacobian, evidence and marginal posterior are
+exact linear algebra. What is truly nonlinear (a period) is a *shape* of the basis, to be searched or sampled.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.units import Unit, unit
+
+CONTRACT, FURTHER, OWN = "contract", "further", "own"
+"""Tiers: effects that every job file may count on, rarer ones that only some machines and recordings show, and faults of the
+artefact itself."""
+
+PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
+"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it. A fault of the
+artefact has a weight by what is known of that artefact."""
+
+TRIALS = 7
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that describes how large an effect is.
+
+    Parameters
+    ----------
+    name : with its unit, as in results.json: ``angle_arcsec``.
+    unit : as printed: ``″``.
+    prior_sd : standard deviation that physics allows, about zero, in the same unit.
+    what : it is, in words, where an effect has several: ``amplitude``.
+    """
+
+    name: str
+    unit: Unit
+    prior_sd: float
+    what: Text = NOTHING
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", unit(self.unit))
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A nonlinear parameter: it shapes the basis, and lies between two bounds (uniform in its logarithm).
+
+    ``period_along`` is the axis (x, y, z) of whose reading it is a period, if it is one.
+    """
+
+    name: str
+    unit: Unit
+    low: float
+    high: float
+    period_along: str | None = None
+    what: Text = NOTHING
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "unit", unit(self.unit))
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of a parameter, for a sentence: without its sign, with unit and uncertainty, as printed; and the sign."""
+
+    size: Text
+    negative: bool = False
+
+    @property
+    def side(self) -> Text:
+        """Towards which end of an axis the sign points."""
+        return say("minus") if self.negative else say("plus")
+
+    def more(self, more: Text, less: Text) -> Text:
+        """The one word for a positive amount, the other for a negative one."""
+        return less if self.negative else more
+
+
+@dataclass(frozen=True)
+class Nonparametric:
+    """A function of no particular form, as a diagnosis fits one: what it is a function of, and what it changes.
+
+    Parameters
+    ----------
+    of : the covariate: a reading (``x_mm``) or a column (``time_s``).
+    along : axis along which it displaces points; ``None`` for a term of the observations themselves.
+    scale : whether the displacement grows in proportion to the reading of that axis.
+    """
+
+    of: str
+    along: str | None = None
+    scale: bool = False
+
+
+class Effect(ABC):
+    """One physical cause of a difference between true and indicated coordinates.
+
+    Attributes
+    ----------
+    name : as in ``[model] effects``.
+    title : in words, for certificates.
+    formula : e with its sign, for documents; a and b are the axes in the name.
+    mechanism : where the cause lies, in a word: scale, drive, guideway, frame, temperature, probe, controller, artefact, ….
+    points_to : what a service technician should look at, to follow "What it points to:"; without a full stop.
+    coefficients : what enters e linearly, k of them.
+    shape : what shapes the basis, if anything.
+    columns : columns that the recording must have.
+    tier : ``contract`` or ``further``: how readily it is to be thought of.
+    everywhere : whether every machine has it to some degree, or every artefact made on one, so that a diagnosis takes it
+        together with all such.
+    idealised_over : axis, or column, over which its form is the simplest of many that its mechanism can have, if it is that.
+    imitated_by : nonparametric terms that could pass for it.
+    stands_for : nonparametric terms that are nothing else than it.
+    along_motion : carriage along whose motion e goes, however that leans; ``None`` where e keeps to the coordinates.
+    plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
+    of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
+    mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
+    """
+
+    name: str
+    title: Text
+    formula: str
+    mechanism: str
+    points_to: Text
+    coefficients: tuple[Parameter, ...]
+    shape: tuple[Shape, ...] = ()
+    columns: tuple[str, ...] = ()
+    tier: str = CONTRACT
+    everywhere: bool = False
+    idealised_over: str | None = None
+    imitated_by: tuple[Nonparametric, ...] = ()
+    stands_for: tuple[Nonparametric, ...] = ()
+    along_motion: str | None = None
+    plane: str | None = None
+    of_artefact: bool = False
+    mostly: float = 1.0
+
+    @property
+    def prior_weight(self) -> float:
+        """How readily it is thought of in a diagnosis, beside others."""
+        return PRIOR_WEIGHT[self.tier]
+
+    @abstractmethod
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """Displacement e of every point for one unit of each coefficient, (n, 3, k) in mm.
+
+        Raises
+        ------
+        CmmUqError : a column or a machine's figure is missing.
+        """
+
+    def unfit(self, points: Points) -> CmmUqError | None:
+        """Why a job of these points cannot name it, if so."""
+        return None
+
+    def lean(self, points: Points) -> Floats:
+        """Angle between the axes of ``plane`` less 90°, rad, for one unit of the coefficient: () or (n,).
+
+        Raises
+        ------
+        CmmUqError : a column is missing, or it is no squareness.
+        """
+        raise CmmUqError(f"{self.name} is no squareness")
+
+    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
+        """What reported parameters mean at the machine, with their signs, in words; nothing where the figures say it.
+
+        Parameters
+        ----------
+        amounts : of each reported parameter, by name.
+        """
+        return NOTHING
+
+    def belongs_to(self, points: Points) -> bool:
+        """Whether a fault of an artefact is that of the artefact in these points."""
+        return False
+
+    def shown_in(self, points: Points) -> bool:
+        """Whether a recording has the set-ups that it takes to know it from an offset of each set-up."""
+        return True
+
+    def course(self, points: Points) -> Floats | None:
+        """Where each point is on the axis, or in the column, of ``idealised_over``, (n,); ``None`` without one."""
+        over = self.idealised_over
+        if over is None:
+            return None
+        return points.readings[over] if over in points.readings else points.column(over)
+
+    def trials(self) -> Iterator[tuple[float, ...]]:
+        """Values of the shape worth trying, evenly spread in their logarithm; one empty tuple without a shape."""
+        grids = [np.geomspace(s.low, s.high, TRIALS).tolist() for s in self.shape]
+        yield from product(*grids)
+
+    @property
+    def reported(self) -> tuple[Parameter | Shape, ...]:
+        """The parameters as reported, in order; the linear ones first unless an effect says otherwise."""
+        return (*self.coefficients, *self.shape)
+
+    def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
+        """Reported parameters of coefficients (..., k) and shapes (..., s), each (...)."""
+        values = np.concatenate([coefficients, shape], axis=-1)
+        return {parameter.name: values[..., i] for i, parameter in enumerate(self.reported)}
+
+    def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
+        """Coefficients (k,) and shape of reported parameters.
+
+        Raises
+        ------
+        CmmUqError : a parameter is missing or unknown.
+        """
+        names = [parameter.name for parameter in self.reported]
+        for name in parameters:
+            if name not in names:
+                raise CmmUqError(f"{self.name} has no parameter {name!r}", fix=suggestion(name, names))
+        for name in names:
+            if name not in parameters:
+                raise CmmUqError(f"{self.name} needs the parameter {name!r}")
+        return self._coefficients(parameters), tuple(float(parameters[s.name]) for s in self.shape)
+
+    def _coefficients(self, parameters: Mapping[str, float]) -> Floats:
+        return np.array([parameters[c.name] for c in self.coefficients], dtype=np.float64)
+
+    def displacement(self, points: Points, parameters: Mapping[str, float]) -> Floats:
+        """Displacement e of every point for reported parameters, (n, 3) in mm."""
+        coefficients, shape = self.from_reported(parameters)
+        return np.asarray(self.basis(points, shape) @ coefficients, dtype=np.float64)
+
+
+class Harmonic(Effect):
+    """An effect A·sin(… + φ) or A·cos(… + φ): linear in A·cos φ and A·sin φ, reported as amplitude and phase."""
+
+    amplitude: ClassVar[Parameter]
+
+    @property
+    def reported(self) -> tuple[Parameter | Shape, ...]:
+        """Amplitude, shape, phase."""
+        return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi, say("phase")))
+
+    def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
+        """Amplitude ≥ 0, shape, and phase in (−π, π]."""
+        cosine, sine = coefficients[..., 0], coefficients[..., 1]
+        return {
+            self.amplitude.name: np.hypot(cosine, sine),
+            **{s.name: shape[..., i] for i, s in enumerate(self.shape)},
+            "phase_rad": np.arctan2(sine, cosine),
+        }
+
+    def _coefficients(self, parameters: Mapping[str, float]) -> Floats:
+        amplitude, phase = parameters[self.amplitude.name], parameters["phase_rad"]
+        return np.array([amplitude * np.cos(phase), amplitude * np.sin(phase)])
+
+
+def along(axis: str, component: Floats) -> Floats:
+    """A one-column basis (n, 3, 1) that moves points along one axis by ``component`` (n,), mm."""
+    basis = np.zeros((len(component), 3, 1))
+    basis[:, "xyz".index(axis), 0] = component
+    return basis

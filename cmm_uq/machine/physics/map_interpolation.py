@@ -1,0 +1,256 @@
+"""Error maps looked up: linear along each axis, and between the two maps whose temperatures enclose the scale's own.
+
+The 21 errors of the two maps are interpolated by temperature, each carriage at the temperature of its scale, squareness at
+the mean of the three (Harris 2004 sections 5.6 and 6.4). Beyond the mapped range nothing is known: it is refused, or
+extrapolated and marked, as asked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import AXES, Floats, Ints
+from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
+
+Beyond = Literal["refuse", "extrapolate"]
+
+POSITION_MARGIN = 1e-6
+"""A position this far beyond the map, mm, is on its edge: it comes from rounding."""
+
+TEMPERATURE_MARGIN = 1.0
+"""Up to this far beyond the calibrated temperatures, K, the nearest map holds as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class LookedUp:
+    """Errors at n points.
+
+    Parameters
+    ----------
+    errors : (n, 3, 6) of carriages x, y, z, mm and rad.
+    squareness : (3,) or (n, 3), rad.
+    extrapolated : (n,) whether a point lies beyond the mapped positions or temperatures.
+    """
+
+    errors: Floats
+    squareness: Floats
+    extrapolated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class _Stack:
+    """Errors of one carriage in every map, on common positions."""
+
+    positions: Floats
+    values: Floats
+    """(6, k, m) in k maps."""
+    step: float
+    """Of equal positions, mm; 0 where they are not equal."""
+
+    def place(self, readings: Floats) -> tuple[Ints, Floats]:
+        """Interval (n,) of each reading, and how far along it (n,) the reading is; below 0 or above 1 only outside."""
+        last = len(self.positions) - 2
+        if self.step:
+            along = (readings - self.positions[0]) * (1 / self.step)
+            interval = np.clip(along, 0, last).astype(np.intp)
+            along -= interval
+            return interval, along
+        interval = np.clip(np.searchsorted(self.positions, readings, side="right") - 1, 0, last)
+        left = self.positions[interval]
+        return interval, (readings - left) / (self.positions[interval + 1] - left)
+
+    def at(self, readings: Floats, lower: Ints | int, weight: Floats | float, out: Floats) -> None:
+        """Errors (6, n) at readings (n,), between map ``lower`` and the next one."""
+        interval, along = self.place(readings)
+        count = len(self.positions)
+        if isinstance(lower, int):
+            for row, tables in zip(out, self.values, strict=True):
+                table = tables[lower] + weight * (tables[lower + 1] - tables[lower]) if weight else tables[lower]
+                np.add(table.take(interval), along * np.diff(table).take(interval), out=row)
+            return
+        # the tables of all maps one behind another: four corners, between positions and between maps
+        cold = lower * count + interval
+        hot, cold_next, hot_next = cold + count, cold + 1, cold + count + 1
+        for row, tables in zip(out, self.values, strict=True):
+            table = tables.ravel()
+            low, high = table.take(cold), table.take(hot)
+            low += along * (table.take(cold_next) - low)
+            high += along * (table.take(hot_next) - high)
+            high -= low
+            high *= weight
+            np.add(low, high, out=row)
+
+
+class ErrorMaps:
+    """The error maps of one machine, at one or several temperatures.
+
+    Parameters
+    ----------
+    maps : one for each temperature; their axes may have different positions, and the range they share counts.
+
+    Raises
+    ------
+    CmmUqError : no maps, or two at one temperature.
+    """
+
+    def __init__(self, maps: Sequence[ErrorMap]) -> None:
+        if not maps:
+            raise CmmUqError("no error map", fix="Give one or more under [machine] error_map")
+        self.maps = tuple(sorted(maps, key=lambda m: m.temperature))
+        self.temperatures = np.array([m.temperature for m in self.maps])
+        if np.any(np.diff(self.temperatures) == 0):
+            same = self.temperatures[np.flatnonzero(np.diff(self.temperatures) == 0)[0]]
+            raise CmmUqError(
+                f"two error maps at {same:g} °C", where="job.toml [machine] error_map", fix="Remove one of them"
+            )
+        self.squareness = np.array([m.squareness for m in self.maps])
+        self._axes = tuple(self._stack(i) for i in range(3))
+
+    def span(self, axis: str) -> tuple[float, float]:
+        """First and last position of an axis that every map has, mm."""
+        positions = self._axes[AXES.index(axis)].positions
+        return float(positions[0]), float(positions[-1])
+
+    def at(
+        self,
+        readings: Floats,
+        temperatures: Floats | float | None = None,
+        *,
+        beyond: Beyond = "refuse",
+        lines: Ints | None = None,
+        first: int = 1,
+    ) -> LookedUp:
+        """Errors of every carriage at scale readings.
+
+        Parameters
+        ----------
+        readings : (n, 3) mm.
+        temperatures : of the three scales, (n, 3) or (3,), or of all, °C. One map needs none.
+        beyond : what to do beyond the mapped positions and temperatures.
+        lines : (n,) of the points in their file, for messages.
+        first : number of the first point, for messages where there are no lines.
+
+        Raises
+        ------
+        CmmUqError : a reading is no number, or a point lies beyond and ``beyond`` is "refuse".
+        """
+        outside = self._outside(readings)
+        if beyond == "refuse" and outside.any():
+            self._refuse_position(readings, outside, lines, first)
+        weights, hot = self._weights(temperatures, len(readings))
+        if beyond == "refuse" and hot.any():
+            self._refuse_temperature(temperatures, hot, lines, first)
+        errors = np.empty((3, 6, len(readings)))
+        for i, stack in enumerate(self._axes):
+            lower, weight = weights[i]
+            stack.at(np.ascontiguousarray(readings[:, i]), lower, weight, errors[i])
+        return LookedUp(errors.transpose(2, 0, 1), self._squareness(*weights[3]), outside.any(axis=1) | hot)
+
+    def map_at(self, temperature: float, *, beyond: Beyond = "refuse") -> ErrorMap:
+        """The map that all scales at one temperature are looked up in, °C, at the positions of all maps.
+
+        Raises
+        ------
+        CmmUqError : it lies beyond the calibrated temperatures and ``beyond`` is "refuse", or is no number.
+        """
+        low, high = self.temperatures[0], self.temperatures[-1]
+        near = low - TEMPERATURE_MARGIN <= temperature <= high + TEMPERATURE_MARGIN
+        if not near and (beyond == "refuse" or not np.isfinite(temperature)):
+            raise CmmUqError(
+                f"no error map at {temperature:g} °C: the error maps are from {low:g} to {high:g} °C",
+                fix="Ask for a temperature between them, add a map, or allow it to be extrapolated",
+            )
+        lower, weight = self._between(np.asarray(temperature, dtype=np.float64))
+        upper = min(int(lower) + 1, len(self.maps) - 1)
+        x, y, z = (
+            AxisErrors(s.positions, (s.values[:, lower] + weight * (s.values[:, upper] - s.values[:, lower])).T)
+            for s in self._axes
+        )
+        return ErrorMap((x, y, z), self._squareness(lower, weight), float(temperature))
+
+    def _squareness(self, lower: Ints | int, weight: Floats | float) -> Floats:
+        """Between map ``lower`` and the next one, (3,) or (n, 3)."""
+        upper = np.minimum(np.asarray(lower) + 1, len(self.maps) - 1)
+        share = np.asarray(weight)[..., None]
+        return np.asarray((1 - share) * self.squareness[lower] + share * self.squareness[upper])
+
+    def _stack(self, axis: int) -> _Stack:
+        carriages = [m.axes[axis] for m in self.maps]
+        low, high = max(c.span[0] for c in carriages), min(c.span[1] for c in carriages)
+        positions = np.unique(np.concatenate([c.positions for c in carriages]))
+        positions = positions[(positions >= low) & (positions <= high)]
+        if len(positions) < 2:
+            raise CmmUqError(
+                f"the error maps share no range of axis {AXES[axis]}", fix="Map the same travel at each temperature"
+            )
+        values = np.array([[np.interp(positions, c.positions, column) for column in c.errors.T] for c in carriages])
+        steps = np.diff(positions)
+        equal = bool(np.allclose(steps, steps[0], rtol=1e-12))
+        return _Stack(positions, np.ascontiguousarray(values.swapaxes(0, 1)), float(steps[0]) if equal else 0.0)
+
+    def _outside(self, readings: Floats) -> NDArray[np.bool_]:
+        low, high = np.array([self.span(axis) for axis in AXES]).T
+        # written so that what is no number counts as outside
+        inside = (readings >= low - POSITION_MARGIN) & (readings <= high + POSITION_MARGIN)
+        return np.asarray(~inside)
+
+    def _weights(
+        self, temperatures: Floats | float | None, n: int
+    ) -> tuple[list[tuple[Ints | int, Floats | float]], NDArray[np.bool_]]:
+        """Lower map and weight of the next one for carriages x, y, z and squareness; which points are too hot or cold."""
+        if temperatures is None:
+            if len(self.maps) > 1:
+                raise CmmUqError(
+                    f"the error maps are at {len(self.maps)} temperatures, and the scales' temperatures are not known",
+                    fix="Record temp_x_c, temp_y_c and temp_z_c, or give a temperature log, or one map",
+                )
+            return [(0, 0.0)] * 4, np.zeros(n, dtype=bool)
+        given = np.asarray(temperatures, dtype=np.float64)
+        low, high = self.temperatures[0] - TEMPERATURE_MARGIN, self.temperatures[-1] + TEMPERATURE_MARGIN
+        far = ~((given >= low) & (given <= high))
+        hot = np.broadcast_to(far.any(axis=-1) if given.ndim else far, (n,))
+        scales = [given if given.ndim == 0 else given[..., i] for i in range(3)]
+        return [self._between(t) for t in (*scales, given if given.ndim == 0 else given.mean(axis=-1))], hot
+
+    def _between(self, temperature: Floats) -> tuple[Ints | int, Floats | float]:
+        if len(self.maps) == 1:
+            return 0, 0.0
+        known = self.temperatures
+        # within the margin the nearest map holds, beyond it the two outermost go on
+        near = (temperature > known[0] - TEMPERATURE_MARGIN) & (temperature < known[-1] + TEMPERATURE_MARGIN)
+        held = np.where(near, np.clip(temperature, known[0], known[-1]), temperature)
+        lower = np.clip(np.searchsorted(known, held, side="right") - 1, 0, len(known) - 2)
+        weight = (held - known[lower]) / (known[lower + 1] - known[lower])
+        return (int(lower), float(weight)) if np.ndim(temperature) == 0 else (lower, weight)
+
+    def _refuse_position(self, readings: Floats, outside: NDArray[np.bool_], lines: Ints | None, first: int) -> None:
+        row, axis = np.argwhere(outside)[0]
+        low, high = self.span(AXES[axis])
+        raise CmmUqError(
+            f"{AXES[axis]} reads {readings[row, axis]:.6g} mm, the error map reaches from {low:g} to {high:g} mm",
+            where=_point(row, lines, first),
+            fix="Check origin_mm and the map's range, or allow it to be extrapolated",
+        )
+
+    def _refuse_temperature(
+        self, temperatures: Floats | float | None, hot: NDArray[np.bool_], lines: Ints | None, first: int
+    ) -> None:
+        row = int(np.flatnonzero(hot)[0])
+        all_given = np.asarray(temperatures, dtype=np.float64)
+        given = np.broadcast_to(all_given, (len(hot), *all_given.shape[-1:]))[row]
+        raise CmmUqError(
+            f"a scale is at {np.round(given, 3)} °C, the error maps are from {self.temperatures[0]:g} to "
+            f"{self.temperatures[-1]:g} °C",
+            where=_point(row, lines, first),
+            fix="Measure within those temperatures, add a map, or allow it to be extrapolated",
+        )
+
+
+def _point(row: int, lines: Ints | None, first: int) -> str:
+    return f"line {lines[row]}" if lines is not None and len(lines) else f"point {row + first}"

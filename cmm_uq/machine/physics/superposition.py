@@ -1,0 +1,146 @@
+"""Errors of several effects at once: displacements add up, on axes that lean as their squarenesses say.
+
+To first order every effect acts as if the others were not there. Squareness errors of hundreds of seconds are too large for
+that: their squares and products, and theirs with scale errors, are parts per million. So they act together, without
+approximation: each carriage moves along the unit vector of ``axis_directions``, by what its
+scale reads and errs (effects ``along_motion``), and rotations act on what the leaning motions carry. Everything else is added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.kinematics import (
+    SQUARENESSES,
+    along_directions,
+    axis_directions,
+    direction_derivatives,
+    leaning,
+)
+
+_SETTLED = 1e-9
+"""mm."""
+
+_ROUNDS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class About:
+    """Where the columns of effects that act together are taken, found once for all of them.
+
+    Parameters
+    ----------
+    points : as indicated, with the directions of the motions where they lean.
+    change : (3, ..., 3, 3) of those directions by the squarenesses; ``None`` where columns of these are to first order.
+    """
+
+    points: Points
+    change: Floats | None = None
+
+    def columns(self, effect: Effect, shape: Sequence[float] = ()) -> Floats:
+        """Change of e, (n, 3, j) in mm, for one unit of each coefficient of one effect, named in the model or not."""
+        basis = _along_motion(effect, effect.basis(self.points, shape), self.points)
+        if self.change is None or not effect.plane:
+            return basis
+        turned = along_directions(self.points.carriages, self.change[SQUARENESSES.index(str(effect.plane))])
+        found = basis.copy()
+        found[:, :, 0] = (turned.T * effect.lean(self.points)).T
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Superposition:
+    """Effects that act together.
+
+    Parameters
+    ----------
+    effects : in the order of their coefficients.
+    shapes : nonlinear parameters of the effects that have some, by the effect's name.
+    """
+
+    effects: tuple[Effect, ...]
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+
+    def errors(self, points: Points, coefficients: Floats) -> Floats:
+        """Errors e (n, 3), mm, of points as indicated, for coefficients (k,)."""
+        squareness = self._squareness(points, coefficients)
+        if squareness is None:
+            return np.asarray(self.derivatives(About(points)) @ coefficients, dtype=np.float64)
+        directions = axis_directions(squareness)
+        others = np.where(self._leans, 0.0, coefficients)
+        e = self.derivatives(About(replace(points, directions=directions))) @ others
+        return np.asarray(e + leaning(points.carriages, directions), dtype=np.float64)
+
+    def about(self, true: Points, coefficients: Floats) -> About:
+        """Where columns are linear about coefficients (k,).
+
+        Parameters
+        ----------
+        true : points where they truly are; their columns are taken where a machine would indicate them that has these
+            squarenesses and no other error. The columns of three scale errors then add up to the place itself.
+        """
+        squareness = self._squareness(true, coefficients)
+        if squareness is None:
+            return About(true)
+        directions = axis_directions(squareness)
+        indicated = replace(_indicated(true, directions), directions=directions)
+        return About(indicated, direction_derivatives(squareness))
+
+    def derivatives(self, about: About) -> Floats:
+        """Change of e, (n, 3, k) in mm, for one unit of each coefficient."""
+        bases = [about.columns(effect, self.shapes.get(effect.name, ())) for effect in self.effects]
+        return np.concatenate(bases, axis=2) if bases else np.zeros((len(about.points), 3, 0))
+
+    def largest_lean(self, points: Points, sizes: Floats) -> float:
+        """Largest sum of leans in one plane, rad, where each effect may be as large as its coefficient of ``sizes`` (k,)."""
+        total = dict.fromkeys(SQUARENESSES, 0.0)
+        for column, effect in self._leaning:
+            total[str(effect.plane)] += float(sizes[column] * np.abs(effect.lean(points)).max(initial=0.0))
+        return max(total.values())
+
+    def _squareness(self, points: Points, coefficients: Floats) -> Floats | None:
+        """Squarenesses (3,) or (n, 3), rad, of all effects that are some; ``None`` where there are none."""
+        acting = [(effect, coefficients[column]) for column, effect in self._leaning if coefficients[column]]
+        if not acting:
+            return None
+        total: list[Floats] = [np.zeros(()) for _ in SQUARENESSES]
+        for effect, coefficient in acting:
+            plane = SQUARENESSES.index(str(effect.plane))
+            total[plane] = total[plane] + coefficient * effect.lean(points)
+        return np.stack(np.broadcast_arrays(*total), axis=-1)
+
+    @property
+    def _leaning(self) -> list[tuple[int, Effect]]:
+        """The effects that are a squareness, each with the place of its coefficient."""
+        first = np.cumsum([0, *(len(effect.coefficients) for effect in self.effects)])
+        return [(int(i), effect) for i, effect in zip(first, self.effects, strict=False) if effect.plane]
+
+    @property
+    def _leans(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """(k,) which coefficients are of a squareness."""
+        return np.array([bool(effect.plane) for effect in self.effects for _ in effect.coefficients], dtype=bool)
+
+
+def _along_motion(effect: Effect, basis: Floats, points: Points) -> Floats:
+    """What goes along an axis of the coordinates, turned into the motion of that axis where it leans."""
+    if points.directions is None or effect.along_motion is None:
+        return basis
+    axis = AXES.index(effect.along_motion)
+    return np.asarray(points.directions[..., axis, :, None] * basis[:, axis : axis + 1])
+
+
+def _indicated(true: Points, directions: Floats) -> Points:
+    """Where a machine whose motions have these directions, and no other error, indicates true points."""
+    points = true
+    for _ in range(_ROUNDS):
+        xyz = true.xyz - leaning(points.carriages, directions)
+        change = np.abs(xyz - points.xyz).max(initial=0.0)
+        points = true.at(xyz)
+        if not change > _SETTLED:
+            break
+    return points

@@ -1,0 +1,1 @@
+"""Geometry, uncertainty and inference; knows no coordinate measuring machine."""

@@ -1,0 +1,103 @@
+"""Features of measured points: line, plane, circle, sphere, cylinder and cone.
+
+The fits minimise the sum of squared orthogonal distances, as ISO 10360-6 tests it, and return the feature with its
+full covariance, its residuals and its form deviation. :func:`associate` asks for a feature as drawings do, by minimum zone,
+inscribed, circumscribed or tangent too; :class:`Repeated` does least squares and minimum zones of many measurements at
+the same nominal points at once. This room knows points and nothing of machines.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cmm_uq.maths.geometry.association import Associated, Association, associate
+    from cmm_uq.maths.geometry.ball_form import BallForm
+    from cmm_uq.maths.geometry.circle import Circle, fit_circle
+    from cmm_uq.maths.geometry.cone import Cone, fit_cone
+    from cmm_uq.maths.geometry.cylinder import Cylinder, fit_cylinder
+    from cmm_uq.maths.geometry.directions import cap_directions
+    from cmm_uq.maths.geometry.feature import Feature
+    from cmm_uq.maths.geometry.line import Line, fit_line
+    from cmm_uq.maths.geometry.placed import FeatureKind
+    from cmm_uq.maths.geometry.plane import Plane, fit_plane
+    from cmm_uq.maths.geometry.repeated import Drawn, Repeated
+    from cmm_uq.maths.geometry.sphere import Sphere, fit_sphere
+
+__all__ = [
+    "Associated",
+    "Association",
+    "BallForm",
+    "Circle",
+    "Cone",
+    "Cylinder",
+    "Drawn",
+    "Feature",
+    "FeatureKind",
+    "Line",
+    "Plane",
+    "Repeated",
+    "Sphere",
+    "associate",
+    "cap_directions",
+    "fit_circle",
+    "fit_cone",
+    "fit_cylinder",
+    "fit_line",
+    "fit_plane",
+    "fit_sphere",
+]
+
+_PLACES = {
+    "association": (
+        "Associated",
+        "Association",
+        "associate",
+    ),
+    "ball_form": ("BallForm",),
+    "circle": (
+        "Circle",
+        "fit_circle",
+    ),
+    "cone": (
+        "Cone",
+        "fit_cone",
+    ),
+    "cylinder": (
+        "Cylinder",
+        "fit_cylinder",
+    ),
+    "directions": ("cap_directions",),
+    "feature": ("Feature",),
+    "line": (
+        "Line",
+        "fit_line",
+    ),
+    "placed": ("FeatureKind",),
+    "plane": (
+        "Plane",
+        "fit_plane",
+    ),
+    "repeated": (
+        "Drawn",
+        "Repeated",
+    ),
+    "sphere": (
+        "Sphere",
+        "fit_sphere",
+    ),
+}
+
+
+def __getattr__(name: str) -> object:
+    """Loaded when it is first used: whoever needs a rotation needs no fit of a cone."""
+    place = next((module for module, names in _PLACES.items() if name in names), None)
+    if place is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found = getattr(import_module(f"{__name__}.{place}"), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return __all__

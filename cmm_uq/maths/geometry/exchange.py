@@ -1,0 +1,202 @@
+"""Minimum zones of many measurements at once: the exchange method of Stiefel on linearised distances, then Newton steps.
+
+The zone of k parameters is held by k + 1 contact points. For any k + 1 points there is one set of signs and multipliers
+with which they prove a lower bound of the half width; the point that lies farthest outside replaces the one whose leaving
+keeps all multipliers positive, and the bound grows. Where none lies outside, the bound is the half width: the multipliers
+are the proof that no neighbouring zone is narrower (E. Stiefel, Numer. Math. 1 (1959) 1; G. A. Watson, *Approximation
+Theory and Numerical Methods*, 1980). Linearised anew at what was found, this is Newton's method on the contact points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.maths.geometry.shapes import Shape
+
+SETTLED = 1e-11
+"""Steps, mm, below which a zone is where its contact points hold it; Newton's steps before it were their square root."""
+
+MOST_EXCHANGES = 200
+MOST_STEPS = 12
+SCREENED = 1000
+"""Points from which on only those that stand out in their neighbourhood are looked at together."""
+
+RUNS = 64
+"""Parts of these, one after the other, whose highest and lowest points are looked at."""
+
+MOST_ROUNDS = 40
+ROUNDING = 1e-13
+"""Share of the coordinates by which a point may lie outside by rounding."""
+
+
+@dataclass(eq=False)
+class _Basis:
+    """Contact points (N, k + 1) and on which side each lies, ±1."""
+
+    index: Ints
+    sign: Floats
+
+    def rows(self, rows: Ints) -> _Basis:
+        """Of some of the draws."""
+        return _Basis(self.index[rows], self.sign[rows])
+
+
+def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
+    """States (N, k) and widths (N,) of the minimum zones of points (d, N, n), and the draws that did not settle.
+
+    A draw does not settle where fewer contact points than k + 1 hold the zone by its curvature.
+
+    Parameters
+    ----------
+    start : (N, k) the least-squares features.
+    units : (k,) see :meth:`Placed.units`.
+    """
+    if local.shape[2] >= SCREENED:
+        return _screened(shape, start, local, units)
+    state, width = start.copy(), np.empty(len(start))
+    floor = ROUNDING * float(np.abs(local).max())
+    pending, stuck = np.arange(len(start)), np.zeros(len(start), dtype=np.bool_)
+    basis: _Basis | None = None
+    for _ in range(MOST_STEPS):
+        d, J = shape.distances(state[pending], local[:, pending])
+        A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
+        try:
+            basis = _first(A) if basis is None else basis
+            step, half = _exchange(A, d, basis, floor)
+        except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
+            break
+        state[pending] += step / units
+        width[pending] = 2 * half
+        stuck[pending] = ~np.isfinite(half)
+        left = (np.abs(step).max(axis=1) > SETTLED) & ~stuck[pending]
+        pending, basis = pending[left], basis.rows(np.flatnonzero(left))
+        if not len(pending):
+            break
+    stuck[pending] = True
+    return state, width, np.flatnonzero(stuck)
+
+
+def _screened(shape: Shape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
+    """The same of many points: exchanges among those that stand out, which all others then join that lie outside.
+
+    The highest and the lowest of all are among those that stand out. Where these no longer move the zone, no point lies
+    outside, and the proof is that of all points.
+    """
+    k, N = start.shape[1], local.shape[1]
+    state, width = start.copy(), np.empty(N)
+    floor = ROUNDING * float(np.abs(local).max())
+    pending, stuck = np.arange(N), np.zeros(N, dtype=np.bool_)
+    held = np.zeros((N, 0), dtype=np.int64)
+    for _ in range(MOST_ROUNDS):
+        own = local if len(pending) == N else local[:, pending]
+        d = shape.distances(state[pending], own)[0]
+        if not held.shape[1]:
+            J = shape.distances(state[:1], local[:, :1])[1]
+            held = np.tile(_independent((J[:, 0] / units[:, None]).T), (N, 1))
+        index = np.concatenate([_standing_out(d), held], axis=1)
+        d, J = shape.distances(state[pending], np.take_along_axis(own, index[None], axis=2))
+        A = np.ascontiguousarray((J / units[:, None, None]).transpose(1, 2, 0))
+        try:
+            basis = _signed(A, np.tile(np.arange(index.shape[1] - k - 1, index.shape[1]), (len(pending), 1)))
+            step, half = _exchange(A, d, basis, floor)
+        except np.linalg.LinAlgError:  # contact points of one draw that determine nothing
+            break
+        state[pending] += step / units
+        width[pending] = 2 * half
+        stuck[pending] = ~np.isfinite(half)
+        left = (np.abs(step).max(axis=1) > SETTLED) & ~stuck[pending]
+        held = np.take_along_axis(index, basis.index, axis=1)[left]
+        pending = pending[left]
+        if not len(pending):
+            break
+    stuck[pending] = True
+    return state, width, np.flatnonzero(stuck)
+
+
+def _standing_out(d: Floats) -> Ints:
+    """(N, 2c) the highest and the lowest point of each run of neighbours, in the order in which they were probed."""
+    N, n = d.shape
+    length = n // RUNS
+    whole = d[:, : RUNS * length].reshape(N, RUNS, length)
+    first = length * np.arange(RUNS)
+    found = [first + whole.argmax(axis=2), first + whole.argmin(axis=2)]
+    if rest := n - RUNS * length:
+        last = d[:, -rest:]
+        found += [n - rest + last.argmax(axis=1)[:, None], n - rest + last.argmin(axis=1)[:, None]]
+    return np.concatenate(found, axis=1)
+
+
+def _first(A: Floats) -> _Basis:
+    """Contact points to begin with, the same for all draws: as independent as those of the first draw allow."""
+    return _signed(A, np.tile(_independent(A[0]), (len(A), 1)))
+
+
+def _independent(A: Floats) -> Ints:
+    """K + 1 of the rows (n, k), as independent as they allow."""
+    from scipy.linalg import qr
+
+    return np.asarray(qr(A.T, pivoting=True, mode="r")[1][: A.shape[1] + 1], dtype=np.int64)
+
+
+def _signed(A: Floats, index: Ints) -> _Basis:
+    """Signs with which the multipliers of these points are positive."""
+    rows = np.take_along_axis(A, index[:, :, None], axis=1)
+    others = np.linalg.solve(rows[:, :-1].transpose(0, 2, 1), -rows[:, -1, :, None])[:, :, 0]
+    multipliers = np.append(others, np.ones((len(A), 1)), axis=1)
+    return _Basis(index, np.where(multipliers < 0, -1.0, 1.0))
+
+
+def _exchange(A: Floats, b: Floats, basis: _Basis, floor: float) -> tuple[Floats, Floats]:
+    """Exchange until no point lies outside; ``basis`` becomes that of the answer.
+
+    Returns
+    -------
+    x (N, k) and t (N,) with the least t ≥ |b + A·x| for all points; t is ``nan`` where exchanges find no end.
+    """
+    N, _, k = A.shape
+    x, t = np.zeros((N, k)), np.empty(N)
+    live = np.arange(N)
+    for _ in range(MOST_EXCHANGES):
+        index, sign = basis.index[live], basis.sign[live]
+        M = np.concatenate([np.take_along_axis(A[live], index[:, :, None], axis=1), -sign[:, :, None]], axis=2)
+        inverse = np.linalg.inv(M)
+        # y·rows = 0 and y·signs = 1: with new derivatives the signs may have to follow y, and with y those of the width
+        y = -inverse[:, -1, :]
+        turned = np.flatnonzero((y * sign < 0).any(axis=1))
+        if len(turned):
+            basis.sign[live[turned]] = np.where(y[turned] < 0, -1.0, 1.0)
+            sign[turned] = basis.sign[live[turned]]
+            M[turned, :, -1] = -sign[turned]
+            inverse[turned] = np.linalg.inv(M[turned])
+            y = -inverse[:, -1, :]
+        found = -np.einsum("bij,bj->bi", inverse, np.take_along_axis(b[live], index, axis=1))
+        negative = found[:, -1] < 0
+        sign[negative], y[negative], found[negative, -1] = -sign[negative], -y[negative], -found[negative, -1]
+        inverse[negative, -1] *= -1
+        basis.sign[live] = sign
+        x[live], t[live] = found[:, :-1], found[:, -1]
+        outside = b[live] + np.einsum("bnk,bk->bn", A[live], found[:, :-1])
+        entering = np.abs(outside).argmax(axis=1)
+        value = outside[np.arange(len(live)), entering]
+        left = np.abs(value) > found[:, -1] + floor
+        if not left.any():
+            return x, t
+        live = live[left]
+        _swap(A, basis, live, entering[left], np.sign(value[left]), inverse[left], y[left])
+    t[live] = np.nan
+    return x, t
+
+
+def _swap(A: Floats, basis: _Basis, live: Ints, entering: Ints, side: Floats, inverse: Floats, y: Floats) -> None:
+    """Let the entering points replace those whose leaving keeps the other multipliers positive."""
+    row = np.append(A[live, entering], -side[:, None], axis=1)
+    sign = basis.sign[live]
+    weight = np.einsum("bi,bij->bj", row, inverse) * sign * side[:, None]
+    multipliers = np.maximum(y * sign, 0)
+    eligible = weight > 1e-12 * np.abs(weight).max(axis=1, keepdims=True)
+    ratio = np.where(eligible, multipliers / np.where(eligible, weight, 1.0), np.inf)
+    leaving = ratio.argmin(axis=1)
+    basis.index[live, leaving], basis.sign[live, leaving] = entering, side

@@ -1,0 +1,189 @@
+"""What every fitted feature tells: its covariance, its residuals, its form deviation; and what points must bring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypedDict, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry.orthogonal_distance import Minimum, extents
+
+State = TypeVar("State")
+
+DEGENERATE = 1e-9
+"""Ratio of extents below which points count as lying on one line or in one plane."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Feature:
+    """A feature fitted to n points by least squares of the orthogonal distances.
+
+    Parameters
+    ----------
+    names : parameters in the order of the covariance.
+    covariance : (k, k) of the parameters, mm² and rad². It carries redundant parameters (a unit vector has three
+        components and two freedoms), so it may be singular; it propagates as it is.
+    residuals : signed orthogonal distances of the points, mm, positive outside: (n,), or (n, 2) where a distance has
+        two components (a line in space, a circle in space).
+    u_point : standard uncertainty of a point along the normal, mm: given, or estimated from the residuals.
+    u_point_given : whether it was given.
+    degrees_of_freedom : observations less parameters.
+    condition : condition number of the Jacobian with columns of unit length; large where the coverage is poor.
+    iterations : steps of the fit; 0 where it is solved directly.
+    """
+
+    names: tuple[str, ...]
+    covariance: Floats
+    residuals: Floats
+    u_point: float
+    u_point_given: bool
+    degrees_of_freedom: int
+    condition: float
+    iterations: int
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the orthogonal distances, mm."""
+        return float(np.sqrt(np.sum(self.residuals**2) / len(self.residuals)))
+
+    @property
+    def form_deviation(self) -> float:
+        """Peak to valley of the orthogonal distances, mm."""
+        return float(np.ptp(self.residuals))
+
+    def u(self, name: str) -> float:
+        """Standard uncertainty of one parameter."""
+        i = self.names.index(name)
+        return float(np.sqrt(self.covariance[i, i]))
+
+    def correlation(self, one: str, other: str) -> float:
+        """Correlation coefficient of two parameters."""
+        return float(self.covariance[self.names.index(one), self.names.index(other)] / (self.u(one) * self.u(other)))
+
+
+def checked_points(points: ArrayLike, what: str, least: int, dimensions: tuple[int, ...] = (3,)) -> Floats:
+    """Points as an (n, d) array of finite numbers, n ≥ ``least``.
+
+    Raises
+    ------
+    CmmUqError : wrong shape, numbers missing, or too few points.
+    """
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] not in dimensions:
+        wanted = " or ".join(f"(n, {d})" for d in dimensions)
+        raise CmmUqError(f"{what}: points have the shape {array.shape}", fix=f"Give them as {wanted} in mm")
+    if len(array) < least:
+        raise CmmUqError(f"{what}: {len(array)} points are too few", fix=f"Measure at least {least}")
+    if not np.isfinite(array).all():
+        bad = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise CmmUqError(
+            f"{what}: point {bad + 1} has a coordinate that is no finite number", fix="Correct or remove it"
+        )
+    return array
+
+
+def centred(points: Floats) -> tuple[Floats, Floats, float]:
+    """Points (d, n) about their centroid in units of their extent; the centroid (d,); the extent in mm, or 0."""
+    centroid = points.mean(axis=0)
+    # a second pass takes away the rounding of the first far from the origin
+    centroid = centroid + (points - centroid).mean(axis=0)
+    about = np.ascontiguousarray((points - centroid).T)
+    extent = float(np.sqrt(np.mean(np.einsum("ij,ij->j", about, about))))
+    return about / (extent or 1.0), centroid, extent
+
+
+def no_line(about: Floats, what: str) -> None:
+    """Refuse centred points (d, n) that coincide or lie on one line."""
+    s = extents(about)
+    if s[1] <= DEGENERATE * s[0]:
+        raise CmmUqError(f"{what}: the points lie on one line", fix="Measure points that spread across it too")
+
+
+def no_plane(about: Floats, what: str) -> None:
+    """Refuse centred points (3, n) that lie in one plane."""
+    s = extents(about)
+    if s[1] <= DEGENERATE * s[0]:
+        raise CmmUqError(f"{what}: the points lie on one line", fix="Measure points that spread in all directions")
+    if s[2] <= DEGENERATE * s[0]:
+        raise CmmUqError(f"{what}: the points lie in one plane", fix="Measure points out of that plane too")
+
+
+class FitFigures(TypedDict):
+    """The fields of :class:`Feature` that every fit gives alike."""
+
+    names: tuple[str, ...]
+    covariance: Floats
+    residuals: Floats
+    u_point: float
+    u_point_given: bool
+    degrees_of_freedom: int
+    condition: float
+    iterations: int
+
+
+def fit_figures(
+    found: Minimum[State],
+    extent: float,
+    names: tuple[str, ...],
+    natural: Floats,
+    u_point: float | None,
+    what: str,
+    components: int = 1,
+) -> FitFigures:
+    """Fields of a feature from the minimum found in data of unit extent.
+
+    Parameters
+    ----------
+    found : the minimum.
+    extent : unit of its data, mm.
+    natural : (len(names), k) derivatives of the parameters in mm and rad with respect to the step's k parameters.
+    u_point : as the fit was asked.
+    components : of each orthogonal distance; the distances come component by component.
+    """
+    distances = extent * found.distances
+    freedom = len(distances) - natural.shape[1]
+    u = point_uncertainty(distances, freedom, u_point, what)
+    return FitFigures(
+        names=names,
+        covariance=(u / extent) ** 2 * natural @ found.covariance() @ natural.T,
+        residuals=distances if components == 1 else distances.reshape(components, -1).T,
+        u_point=u,
+        u_point_given=u_point is not None,
+        degrees_of_freedom=freedom,
+        condition=found.condition,
+        iterations=found.iterations,
+    )
+
+
+def determined_radius(feature: Feature, radius: float, what: str) -> None:
+    """Refuse a radius known to less than a quarter of itself: within their scatter the points are as good as flat."""
+    if not feature.u("r") < radius / 4:
+        raise CmmUqError(
+            f"{what}: the points do not determine its radius (r = {radius:.6g} mm, u = {feature.u('r'):.2g} mm)",
+            fix=f"Cover more of the {what}",
+        )
+
+
+def point_uncertainty(residuals: Floats, degrees_of_freedom: int, u_point: float | None, what: str) -> float:
+    """Standard uncertainty of a point, mm: given, or from the residuals and their degrees of freedom.
+
+    Raises
+    ------
+    CmmUqError : a given one is not positive, or none is given and the points leave no degree of freedom.
+    """
+    if u_point is not None:
+        if not (np.isfinite(u_point) and u_point > 0):
+            raise CmmUqError(
+                f"{what}: u_point = {u_point} is no standard uncertainty", fix="Give a positive number, mm"
+            )
+        return float(u_point)
+    if degrees_of_freedom < 1:
+        raise CmmUqError(
+            f"{what}: so few points leave nothing to estimate their uncertainty from",
+            fix="Measure more points, or give the standard uncertainty of a point (u_point)",
+        )
+    return float(np.sqrt(np.sum(residuals**2) / degrees_of_freedom))

@@ -1,0 +1,149 @@
+"""A feature's own frame on the part: from measured points to the state of its shape, and back to what ISO calls it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry.circle import fit_circle
+from cmm_uq.maths.geometry.cone import fit_cone
+from cmm_uq.maths.geometry.cylinder import fit_cylinder
+from cmm_uq.maths.geometry.feature import centred
+from cmm_uq.maths.geometry.frame import frame_about
+from cmm_uq.maths.geometry.line import fit_line
+from cmm_uq.maths.geometry.plane import fit_plane
+from cmm_uq.maths.geometry.shapes import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, Shape
+from cmm_uq.maths.geometry.sphere import fit_sphere
+
+FeatureKind = Literal["line", "plane", "circle", "sphere", "cylinder", "cone"]
+KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A shape in a frame near which the points lie.
+
+    Parameters
+    ----------
+    shape : the kind of feature.
+    origin : (d,) of the frame, mm.
+    frame : (m, d) orthonormal rows; the last is the axis or normal, of a line in a plane the direction across it. Of a
+        circle in space there are two, so that its points are projected along the normal.
+    state : (k,) of the least-squares feature.
+    extent : root mean square distance of the points from their centroid, mm: the length that slopes are multiplied by.
+    condition : of the least-squares problem with columns of unit length.
+    """
+
+    shape: Shape
+    origin: Floats
+    frame: Floats
+    state: Floats
+    extent: float
+    condition: float
+
+    def local(self, points: Floats) -> Floats:
+        """(m, …, n) coordinates in the frame of points (…, n, d)."""
+        return np.ascontiguousarray(np.moveaxis((points - self.origin) @ self.frame.T, -1, 0))
+
+    def units(self) -> Floats:
+        """(k,) what one unit of each component of a state moves points by, about: 1 of a length, the extent of a slope."""
+        units = np.ones(len(self.state))
+        units[list(self.shape.slopes)] = self.extent
+        return units
+
+    def position(self, state: Floats) -> Floats:
+        """(N, d) of states (N, k): centre, where the axis pierces z = 0 of the frame, of a plane the point over the origin."""
+        if self.shape in (PLANE, LINE_IN_PLANE):
+            return np.asarray(self.origin + state[:, :1] * self.frame[-1])
+        m = 3 if self.shape is SPHERE else 2
+        return np.asarray(self.origin + state[:, :m] @ self.frame[:m])
+
+    def direction(self, state: Floats) -> Floats | None:
+        """(N, d) unit direction of axis or normal, of a line in a plane along it; None of a circle in it and of a sphere."""
+        if self.shape in (CIRCLE, SPHERE):
+            return None
+        slopes = -state[:, 1:] if self.shape in (PLANE, LINE_IN_PLANE) else state[:, 2:4]
+        w = slopes @ self.frame[: slopes.shape[1]] + self.frame[-1]
+        if self.shape is LINE_IN_PLANE:  # along the line: the direction across it, turned clockwise
+            w = w @ np.array([[0.0, -1.0], [1.0, 0.0]])
+        return np.asarray(w / np.linalg.norm(w, axis=1, keepdims=True))
+
+    def size(self, state: Floats) -> Floats | None:
+        """(N,) diameter, mm; of a cone at its position."""
+        if self.shape.size is None:
+            return None
+        radius = state[:, self.shape.size]
+        return np.asarray(2 * radius / np.cos(state[:, 5]) if self.shape is CONE else 2 * radius)
+
+    def half_angle(self, state: Floats) -> Floats | None:
+        """(N,) of a cone, rad."""
+        return np.asarray(state[:, 5]) if self.shape is CONE else None
+
+
+def placed(kind: FeatureKind, points: ArrayLike) -> Placed:
+    """The least-squares feature of points (n, d), and its frame.
+
+    Raises
+    ------
+    CmmUqError : an unknown kind, or points that do not determine the feature (see the fit of each).
+    """
+    if kind not in KINDS:
+        raise CmmUqError(f"{kind!r} is no feature", fix=f"Features are {', '.join(KINDS)}")
+    return _PLACING[kind](np.asarray(points, dtype=np.float64))
+
+
+def _line(points: Floats) -> Placed:
+    fit = fit_line(points, u_point=1.0)
+    if points.shape[1] == 2:
+        frame = np.array([fit.direction, [-fit.direction[1], fit.direction[0]]])
+        return _about(LINE_IN_PLANE, points, fit.point, frame, np.zeros(2), fit.condition)
+    return _about(LINE, points, fit.point, frame_about(fit.direction), np.zeros(4), fit.condition)
+
+
+def _plane(points: Floats) -> Placed:
+    fit = fit_plane(points, u_point=1.0)
+    return _about(PLANE, points, fit.point, frame_about(fit.normal), np.zeros(3), fit.condition)
+
+
+def _circle(points: Floats) -> Placed:
+    fit = fit_circle(points, u_point=_scatter(points, CIRCLE))
+    frame = np.eye(2) if fit.normal is None else frame_about(fit.normal)[:2]
+    return _about(CIRCLE, points, fit.centre, frame, np.array([0.0, 0, fit.radius]), fit.condition)
+
+
+def _sphere(points: Floats) -> Placed:
+    fit = fit_sphere(points, u_point=_scatter(points, SPHERE))
+    return _about(SPHERE, points, fit.centre, np.eye(3), np.array([0.0, 0, 0, fit.radius]), fit.condition)
+
+
+def _cylinder(points: Floats) -> Placed:
+    fit = fit_cylinder(points, u_point=_scatter(points, CYLINDER))
+    state = np.array([0.0, 0, 0, 0, fit.radius])
+    return _about(CYLINDER, points, fit.point, frame_about(fit.direction), state, fit.condition)
+
+
+def _cone(points: Floats) -> Placed:
+    fit = fit_cone(points, u_point=_scatter(points, CONE))
+    state = np.array([0.0, 0, 0, 0, fit.radius * np.cos(fit.half_angle), fit.half_angle])
+    return _about(CONE, points, fit.point, frame_about(fit.direction), state, fit.condition)
+
+
+_PLACING = {
+    "line": _line, "plane": _plane, "circle": _circle, "sphere": _sphere, "cylinder": _cylinder, "cone": _cone,
+}  # fmt: skip
+
+
+def _scatter(points: Floats, shape: Shape) -> float | None:
+    """Uncertainty of a point to be told to the fit: a millionth where no more points than needed leave it to be told."""
+    if points.ndim != 2 or len(points) != shape.least or not np.isfinite(points).all():
+        return None
+    return 1e-6 * (centred(points)[2] or 1.0)
+
+
+def _about(shape: Shape, points: Floats, origin: Floats, frame: Floats, state: Floats, condition: float) -> Placed:
+    return Placed(shape, np.asarray(origin), frame, state, centred(points)[2], condition)

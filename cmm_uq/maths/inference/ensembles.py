@@ -1,0 +1,202 @@
+"""Several ensembles of emcee on one density, until the autocorrelation time says enough.
+
+The walkers move in coordinates whitened by an approximation of the density (``side_by_side``). Walkers
+of one ensemble are not independent, so the ensembles are compared with each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import special
+
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.inference.proposals import LogDensity, Proposes
+from cmm_uq.maths.inference.side_by_side import SideBySide
+
+ENSEMBLES = 4
+STEPS_AT_ONCE = 300
+MOST_STEPS = 6000
+BURN_IN = 60
+WALKERS = 32
+EFFECTIVE_SAMPLES = 4000
+"""Asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed."""
+
+LEAST_EFFECTIVE_SAMPLES = 1000
+LARGEST_RHAT = 1.01
+
+_WINDOW = 5.0
+"""Autocorrelation times that are summed over."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """Draws from a density, and whether they can be trusted.
+
+    Attributes
+    ----------
+    draws : (N, d) in the density's own parameters: ensembles, steps and walkers in this order.
+    sampler : program and version.
+    ess_min, rhat_max : effective samples and rank-normalised R-hat, worst over all parameters.
+    steps, autocorrelation_time : length of each chain, and the longest time.
+    """
+
+    draws: Floats
+    sampler: str
+    ess_min: float
+    rhat_max: float
+    steps: int
+    autocorrelation_time: float
+
+    @property
+    def converged(self) -> bool:
+        """See :func:`converged`."""
+        return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
+
+    def thinning(self, most: int) -> int:
+        """Of how many steps one is to be kept for at most ``most`` draws (or for those of two steps of each chain)."""
+        return max(1, min(-(-len(self.draws) // most), self.steps // 2))
+
+    def thinned(self, every: int) -> Floats:
+        """Draws of every such step."""
+        by_step = self.draws.reshape(ENSEMBLES, self.steps, -1, self.draws.shape[1])
+        return np.asarray(by_step[:, every - 1 :: every].reshape(-1, self.draws.shape[1]))
+
+
+def converged(ess_min: float, rhat_max: float, steps: int, autocorrelation_time: float) -> bool:
+    """At least 1000 effective samples, R-hat below 1.01, and chains longer than 50 autocorrelation times."""
+    return bool(ess_min >= LEAST_EFFECTIVE_SAMPLES and rhat_max < LARGEST_RHAT and steps > 50 * autocorrelation_time)
+
+
+def run_ensembles(
+    density: LogDensity,
+    proposal: Proposes,
+    seed: int,
+    progress: Progress | None = None,
+    *,
+    effective_samples: int = EFFECTIVE_SAMPLES,
+    steps_at_once: int = STEPS_AT_ONCE,
+    walkers: int | None = None,
+    burn_in: int = BURN_IN,
+) -> Chains:
+    """Sample a density with emcee.
+
+    Parameters
+    ----------
+    density : its logarithm.
+    proposal : roughly the density.
+    seed : the same seed gives the same draws.
+    progress : told the part done, from 0 to 1.
+    effective_samples : to reach in every parameter.
+    steps_at_once : between two looks at how many there are.
+    walkers : in each ensemble; by default 32, or four for each dimension.
+    burn_in : steps that are left out.
+    """
+    import emcee
+
+    d = len(proposal.centre)
+    walkers = walkers or max(WALKERS, 4 * d)
+
+    def whitened(z: Floats) -> Floats:
+        return density(proposal.parameters(z))
+
+    begin = np.vstack([_start(whitened, proposal, walkers, random) for random in _randoms(seed)])
+    move = SideBySide(proposal, _randoms(seed))
+    sampler = emcee.EnsembleSampler(len(begin), d, whitened, vectorize=True, moves=[move])
+    state, steps = sampler.run_mcmc(begin, burn_in, store=False), 0
+    while True:
+        state = sampler.run_mcmc(state, steps_at_once, skip_initial_state_check=True)
+        steps += steps_at_once
+        chains = np.ascontiguousarray(sampler.get_chain().reshape(steps, ENSEMBLES, walkers, d).swapaxes(0, 1))
+        time, effective = _effective_samples(chains)
+        if progress:
+            progress(min(1.0, effective / effective_samples))
+        if (effective >= effective_samples and steps > 50 * time) or steps >= MOST_STEPS:
+            break
+    draws = proposal.parameters(chains.reshape(-1, d))
+    return Chains(draws, f"emcee {emcee.__version__}", effective, rhat(chains.reshape(ENSEMBLES, -1, d)), steps, time)
+
+
+def _randoms(seed: int) -> list[Any]:
+    """Random numbers of each ensemble, from their beginning."""
+    return [np.random.RandomState(np.random.MT19937(child)) for child in np.random.SeedSequence(seed).spawn(ENSEMBLES)]
+
+
+def _start(density: LogDensity, proposal: Proposes, walkers: int, random: Any) -> Floats:
+    """Where the walkers begin: draws that the density does not forbid."""
+    z = proposal.draws(walkers, random)
+    for _ in range(100):
+        forbidden = ~np.isfinite(density(z))
+        if not forbidden.any():
+            break
+        z[forbidden] = proposal.draws(int(forbidden.sum()), random)
+    return z
+
+
+def _effective_samples(chains: Floats) -> tuple[float, float]:
+    """Longest integrated autocorrelation time, and the effective samples that follow, over all parameters."""
+    ensembles, steps, walkers, d = chains.shape
+    merged = chains.transpose(1, 0, 2, 3).reshape(steps, ensembles * walkers, d)
+    if (np.ptp(merged, axis=0) == 0).any():  # a walker that never moved has no autocorrelation time yet
+        return float(steps), float(ensembles * walkers)
+    time = max(1.0, *(autocorrelation_time(values) for values in merged.transpose(2, 1, 0)))
+    return time, steps * ensembles * walkers / time
+
+
+def autocorrelation_time(chains: Floats) -> float:
+    """Integrated autocorrelation time of one parameter in chains (c, n), in steps: emcee's estimate, all chains at once.
+
+    The window is the first that is five times as long as the time up to it (Sokal 1997, section 3; emcee averages the chains).
+    """
+    n = chains.shape[1]
+    waves = np.fft.rfft(chains - chains.mean(axis=1, keepdims=True), 1 << n.bit_length() + 1, axis=1)
+    covariance = np.fft.irfft(waves.real**2 + waves.imag**2, axis=1)[:, :n]
+    times = 2 * np.cumsum(np.mean(covariance / covariance[:, :1], axis=0)) - 1
+    beyond = np.flatnonzero(np.arange(n) >= _WINDOW * times)
+    return float(times[beyond[0] if len(beyond) else -1])
+
+
+def rhat(chains: Floats, scores: Floats | None = None) -> float:
+    """Largest rank-normalised split R-hat of the parameters, bulk or tail (Vehtari et al. 2021, section 4).
+
+    Parameters
+    ----------
+    chains : (c, n, d) independent chains.
+    scores : of the chains' halves, where they are known already.
+    """
+    halves = split(chains)
+    folded = np.abs(halves - np.median(halves, axis=(0, 1)))
+    bulk = normal_scores(halves) if scores is None else scores
+    return max(float(_split_rhat(values).max()) for values in (bulk, normal_scores(folded)))
+
+
+def split(chains: Floats) -> Floats:
+    """The first and the last half of each chain as chains (2c, n // 2, d)."""
+    half = chains.shape[1] // 2
+    return np.concatenate([chains[:, :half], chains[:, -half:]])
+
+
+def normal_scores(values: Floats) -> Floats:
+    """Normal quantiles of the ranks of (c, n, d) values, for each parameter over all chains; ties share their rank."""
+    flat = values.reshape(-1, values.shape[2])
+    ranks = np.empty_like(flat)
+    for rank, column in zip(ranks.T, flat.T, strict=True):
+        _, place, count = np.unique(column, return_inverse=True, return_counts=True)
+        rank[:] = (np.cumsum(count) - 0.5 * (count - 1))[place]
+    return np.asarray(special.ndtri((ranks - 0.375) / (len(flat) + 0.25)), dtype=np.float64).reshape(values.shape)
+
+
+def _split_rhat(values: Floats) -> Floats:
+    """√((n − 1)/n + B/(n·W)) with the variances between and within chains, (d,)."""
+    n = values.shape[1]
+    within = values.var(axis=1, ddof=1).mean(axis=0)
+    between = values.mean(axis=1).var(axis=0, ddof=1)
+    with np.errstate(
+        divide="ignore", invalid="ignore"
+    ):  # chains that never moved: infinite or not a number, not converged
+        return np.asarray(np.sqrt((n - 1) / n + between / within), dtype=np.float64)

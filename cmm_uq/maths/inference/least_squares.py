@@ -1,0 +1,175 @@
+"""Least squares by singular values: what a recording determines, and what it leaves free.
+
+Normal equations and pseudo-inverses hide a rank deficiency; the singular value decomposition of the scaled design shows
+it, so that the combination of parameters that remains free can be named.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import linalg
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+
+RANK_TOLERANCE = 1e-7
+"""Singular values below this part of the largest are zero: rounding leaves about 1e-13, fitted placings of spheres 1e-8."""
+
+_NOTHING = 1e-8
+"""Part of a parameter in a free combination, over its typical size, that is rounding."""
+
+_ROUGHLY = 100.0
+"""Up to how many times its singular value over the largest noise turns a combination that only noise shows."""
+
+
+@dataclass(frozen=True, eq=False)
+class LeastSquares:
+    """A least-squares estimate.
+
+    Attributes
+    ----------
+    unknowns : k parameters; certified ones keep their certified value.
+    value : (k,) estimates; for an undetermined parameter the one nearest to its prior mean of many that fit equally well.
+    covariance : (k, k), with the certificates' uncertainty propagated (JCGM 100, 5.1.2); infinite variance where
+        undetermined.
+    determined : (k,) whether the observations (or a certificate) determine the parameter by itself.
+    null_space : (k, f) combinations, one a column and in the parameters' units, that leave every observation as it is.
+    rank, condition : of the design in units of the parameters' typical sizes; condition of its determined part.
+    residuals : (m,) mm, observed minus explained.
+    degrees_of_freedom : observations minus what was fitted to them.
+    residual_sd : mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom.
+    sigma : mm, standard uncertainty of one coordinate that the covariance uses.
+    sigma_of_residuals : mm, the same from the residuals alone; that in use where no degrees of freedom are left.
+    spread : (k,) standard deviation that the noise gives to ``value``, of undetermined parameters too.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    value: Floats
+    covariance: Floats
+    determined: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    null_space: Floats
+    rank: int
+    condition: float
+    residuals: Floats
+    degrees_of_freedom: int
+    residual_sd: float | None
+    sigma: float
+    sigma_of_residuals: float
+    spread: Floats
+
+
+def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
+    """Least-squares estimate; certified parameters are held, physical priors are not used.
+
+    Parameters
+    ----------
+    model : linear in its parameters.
+    most : combinations to take as determined; fewer than the design's rank where the design itself is not known well enough
+        for the last of them, as where it follows the noise of fitted placings.
+
+    Raises
+    ------
+    CmmUqError : fewer observations than parameters, or none left to estimate the noise from.
+    """
+    unknowns, reduced = model.unknowns, model.reduced
+    held = np.array([u.known for u in unknowns], dtype=bool)
+    free = np.flatnonzero(~held)
+    _enough(reduced.count, len(free), stated=model.sigma is not None)
+    value = model.prior_mean.copy()
+    scale = np.array([unknowns[i].scale for i in free])
+    target = reduced.observed - reduced.design @ value
+    U, s, Vt = linalg.svd(reduced.design[:, free] * scale, full_matrices=False)
+    rank = int(np.sum(s > RANK_TOLERANCE * s[0])) if s.size and s[0] > 0 else 0
+    nothing = _NOTHING
+    if most is not None and most < rank:
+        nothing, rank = _ROUGHLY * float(s[most] / s[0]), most
+    forward = (Vt[:rank].T / s[:rank]) @ U[:, :rank].T * scale[:, None]
+    value[free] += forward @ target
+    whitened = reduced.observed - reduced.design @ value
+    dof = reduced.count - rank
+    sum_of_squares = float(whitened @ whitened)
+    stated = model.sigma if model.sigma is not None else 0.0
+    from_residuals = float(np.sqrt(sum_of_squares / dof)) if dof > 0 else stated
+    sigma = stated or from_residuals
+    null_space = np.zeros((len(unknowns), len(free) - rank))
+    null_space[free] = _simplest(Vt[rank:].T, nothing) * scale[:, None]
+    for column in null_space.T:
+        column /= column[np.flatnonzero(column)[0]]
+    determined = np.ones(len(unknowns), dtype=bool)
+    determined[free] = np.all(null_space[free] == 0, axis=1)
+    return LeastSquares(
+        unknowns, value, _covariance(model, forward, free, held, sigma, determined), determined, null_space,
+        rank, float(s[0] / s[rank - 1]) if rank else float("inf"), whitened * model.noise_scale, dof,
+        _residual_sd(whitened * model.noise_scale, dof), sigma, from_residuals,
+        _spread(forward, free, sigma, len(unknowns)),
+    )  # fmt: skip
+
+
+def likeliest(model: LinearModel, sigma: float) -> Floats:
+    """The parameters (k,) that observations with noise ``sigma``, mm, and all priors together make likeliest."""
+    rows, given = model.priors
+    scale = np.array([u.scale for u in model.unknowns])
+    whole = np.vstack([model.reduced.design / sigma, rows]) * scale
+    return np.asarray(scale * np.linalg.lstsq(whole, np.append(model.reduced.observed / sigma, given), rcond=None)[0])
+
+
+def _enough(observations: int, parameters: int, *, stated: bool) -> None:
+    if observations < parameters:
+        raise CmmUqError(
+            f"{observations} observations cannot determine {parameters} parameters",
+            where="recording",
+            fix="Record more placings, or name fewer effects in job.toml [model] effects",
+        )
+    if observations == parameters and not stated:
+        raise CmmUqError(
+            f"{observations} observations for {parameters} parameters leave nothing to estimate the noise from",
+            where="recording",
+            fix="Record more placings, or state u_coordinate_um in job.toml [recording]",
+        )
+
+
+def _residual_sd(residuals: Floats, dof: int) -> float | None:
+    return float(np.sqrt(residuals @ residuals / dof)) if dof > 0 else None
+
+
+def _spread(forward: Floats, free: np.ndarray[tuple[int], np.dtype[np.int64]], sigma: float, count: int) -> Floats:
+    spread = np.zeros(count)
+    spread[free] = sigma * np.sqrt(np.sum(forward**2, axis=1))
+    return spread
+
+
+def _covariance(
+    model: LinearModel,
+    forward: Floats,
+    free: np.ndarray[tuple[int], np.dtype[np.int64]],
+    held: np.ndarray[tuple[int], np.dtype[np.bool_]],
+    sigma: float,
+    determined: np.ndarray[tuple[int], np.dtype[np.bool_]],
+) -> Floats:
+    """σ² from the noise, plus what the certificates' uncertainty does to the estimates."""
+    k = len(model.unknowns)
+    covariance = np.zeros((k, k))
+    sensitivity = np.zeros((k, int(held.sum())))
+    sensitivity[free] = -forward @ model.reduced.design[:, held]
+    sensitivity[held] = np.eye(int(held.sum()))
+    covariance[np.ix_(free, free)] = sigma**2 * forward @ forward.T
+    covariance += (sensitivity * model.prior_sd[held] ** 2) @ sensitivity.T
+    for i in np.flatnonzero(~determined):
+        covariance[i, i] = np.inf
+    return covariance
+
+
+def _simplest(null_space: Floats, nothing: float) -> Floats:
+    """The same space, each column with a one where no other has anything: reads as few parameters as possible.
+
+    Parts up to ``nothing`` are zero.
+    """
+    if null_space.shape[1] == 0:
+        return null_space
+    _, _, order = linalg.qr(null_space.T, mode="economic", pivoting=True)
+    pivots = order[: null_space.shape[1]]
+    columns = null_space @ linalg.inv(null_space[pivots])
+    return np.where(np.abs(columns) < nothing, 0.0, columns)

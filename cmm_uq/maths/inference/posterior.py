@@ -1,0 +1,195 @@
+"""The posterior of a linear model, sampled by emcee from its Laplace approximation (``ensembles``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg
+
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.inference.ensembles import Progress, converged, run_ensembles
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.noise import Sizes
+from cmm_uq.maths.inference.proposals import Proposal
+
+__all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
+
+SIGMA_BOUNDS = (1e-6, 10.0)
+"""mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
+
+_EDGE, _STEP = 0.01, 0.5
+"""Of ln σ: how near to the end of the range searched is at its end, and the step through the whole range."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws from a posterior, and whether they can be trusted.
+
+    Attributes
+    ----------
+    unknowns : k parameters.
+    draws : (N, k) in the parameters' units.
+    sigma : (N,) standard uncertainty of one coordinate, mm; constant when it was stated.
+    seed : of the random numbers.
+    sampler : program and version.
+    ess_min, rhat_max : worst over all parameters and the noise.
+    steps, autocorrelation_time : length of each chain, and the longest time.
+    every : of how many steps one was kept as a draw.
+    shapes : (N, q) of what shapes columns, if anything does.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    draws: Floats
+    sigma: Floats
+    seed: int
+    sampler: str
+    ess_min: float
+    rhat_max: float
+    steps: int
+    autocorrelation_time: float
+    shapes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    every: int = 1
+
+    @property
+    def converged(self) -> bool:
+        """Enough effective samples, ensembles that agree, chains long against their autocorrelation time."""
+        return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(k, k) of the draws."""
+        return np.atleast_2d(np.cov(self.draws, rowvar=False))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoisyPosterior(Posterior):
+    """A posterior with the sizes of the noise's components in each draw."""
+
+    sizes: Sizes
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """Log posterior density of the parameters and, unless it is stated, ln σ.
+
+    The observations enter only through the triangular factor of the design, so one evaluation costs k² operations.
+    """
+
+    model: LinearModel
+
+    @cached_property
+    def _factor(self) -> tuple[Floats, Floats, float, int]:
+        reduced = self.model.reduced
+        Q, R = linalg.qr(reduced.design, mode="economic")
+        explained = Q.T @ reduced.observed
+        rest = reduced.observed - Q @ explained
+        return np.asarray(R, dtype=np.float64), explained, float(rest @ rest), reduced.count
+
+    @property
+    def dimension(self) -> int:
+        """Parameters, and one more when the noise is to be estimated."""
+        return len(self.model.unknowns) + (self.model.sigma is None)
+
+    @cached_property
+    def _weight(self) -> Floats:
+        """Inverse prior variances, (k,); a certificate without uncertainty is taken as good to a nanometre."""
+        sd = self.model.prior_sd
+        scale = np.array([u.scale for u in self.model.unknowns])
+        return np.asarray(1 / np.maximum(sd, 1e-6 * scale) ** 2, dtype=np.float64)
+
+    def __call__(self, theta: Floats) -> Floats:
+        """Log density, up to a constant, of (w, dimension) → (w,)."""
+        R, explained, rest, count = self._factor
+        k = len(self.model.unknowns)
+        misfit = theta[:, :k] @ R.T - explained
+        squares = np.einsum("wi,wi->w", misfit, misfit) + rest
+        prior = ((theta[:, :k] - self.model.prior_mean) ** 2) @ self._weight
+        if self.model.sigma is not None:
+            return np.asarray(-0.5 * (squares / self.model.sigma**2 + prior))
+        log_sigma = theta[:, k]
+        inside = (log_sigma > np.log(SIGMA_BOUNDS[0])) & (log_sigma < np.log(SIGMA_BOUNDS[1]))
+        precision = np.exp(-2 * np.maximum(log_sigma, np.log(SIGMA_BOUNDS[0])))
+        value = -0.5 * (squares * precision + prior) - count * log_sigma
+        return np.where(inside, value, -np.inf)
+
+    def conditional(self, log_sigma: float) -> tuple[Floats, Floats, float]:
+        """Exact Gaussian of the parameters for a given noise: mean, covariance, and ln p(observations, ln σ)."""
+        R, explained, rest, count = self._factor
+        sigma2 = np.exp(2 * log_sigma)
+        precision = R.T @ R / sigma2 + np.diag(self._weight)
+        scale = 1 / np.sqrt(np.diag(precision))
+        factor = linalg.cholesky(precision * np.outer(scale, scale), lower=True)
+        right = (R.T @ explained / sigma2 + self._weight * self.model.prior_mean) * scale
+        mean = scale * linalg.cho_solve((factor, True), right)
+        covariance = np.outer(scale, scale) * linalg.cho_solve((factor, True), np.eye(len(scale)))
+        misfit = explained - R @ mean
+        deviation = mean - self.model.prior_mean
+        log_evidence = (
+            -0.5 * ((misfit @ misfit + rest) / sigma2 + deviation @ (self._weight * deviation))
+            - count * log_sigma + float(np.log(scale).sum() - np.log(np.diag(factor)).sum())
+        )  # fmt: skip
+        return mean, covariance, float(log_evidence)
+
+    def laplace(self) -> tuple[Floats, Floats]:
+        """Centre (dimension,) and lower triangular factor of the covariance about it."""
+        if self.model.sigma is not None:
+            mean, covariance, _ = self.conditional(float(np.log(self.model.sigma)))
+            return mean, _lower(covariance)
+        _, _, rest, count = self._factor
+        start = 0.5 * np.log(max(rest / max(count, 1), SIGMA_BOUNDS[0] ** 2 * 4))
+        mode = self._likeliest_noise(float(start))
+        mean, covariance, at_mode = self.conditional(mode)
+        step = 0.1
+        curvature = (2 * at_mode - self.conditional(mode - step)[2] - self.conditional(mode + step)[2]) / step**2
+        k = len(mean)
+        factor = np.zeros((k + 1, k + 1))
+        factor[:k, :k] = _lower(covariance)
+        factor[k, k] = 1 / np.sqrt(max(curvature, 1e-3))
+        return np.append(mean, mode), factor
+
+    def _likeliest_noise(self, start: float) -> float:
+        """Ln σ at which the evidence is largest, near to ``start``.
+
+        Where parameters with priors could explain every residual, nothing is left of them to start from; the largest
+        evidence then lies further up than it is looked for, and the whole range is gone through.
+        """
+        low, high = max(start - 4, np.log(SIGMA_BOUNDS[0])), min(start + 4, np.log(SIGMA_BOUNDS[1]))
+        found = float(self._largest_evidence(low, high))
+        if found < high - _EDGE:
+            return found
+        places = np.arange(low, np.log(SIGMA_BOUNDS[1]), _STEP)
+        best = float(places[np.argmax([self.conditional(float(place))[2] for place in places])])
+        return float(self._largest_evidence(best - _STEP, min(best + _STEP, np.log(SIGMA_BOUNDS[1]))))
+
+    def _largest_evidence(self, low: float, high: float) -> float:
+        from scipy import optimize  # takes longer to import than most commands run
+
+        found = optimize.minimize_scalar(lambda t: -self.conditional(t)[2], bounds=(low, high), method="bounded")
+        return float(found.x)
+
+
+def _lower(covariance: Floats) -> Floats:
+    scale = np.sqrt(np.diag(covariance))
+    return np.asarray(scale[:, None] * linalg.cholesky(covariance / np.outer(scale, scale), lower=True))
+
+
+def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> Posterior:
+    """Sample the posterior of a linear model with emcee.
+
+    Parameters
+    ----------
+    model : with proper priors or data on every parameter.
+    seed : the same seed gives the same draws.
+    progress : told the part done, from 0 to 1.
+    """
+    density = Density(model)
+    centre, factor = density.laplace()
+    chains = run_ensembles(density, Proposal.single(centre, factor), seed, progress)
+    k = len(model.unknowns)
+    sigma = np.full(len(chains.draws), model.sigma) if model.sigma is not None else np.exp(chains.draws[:, k])
+    return Posterior(
+        model.unknowns, chains.draws[:, :k], sigma, seed, chains.sampler, chains.ess_min, chains.rhat_max, chains.steps,
+        chains.autocorrelation_time,
+    )  # fmt: skip

@@ -1,0 +1,318 @@
+"""What a sampler proposes: Student's t distributions that together are nearly the density, found by importance sampling.
+
+One of them does where the density has one rounded mode. Where components of noise may be present or absent, it has several of
+different widths, and a mixture is fitted to weighted draws (Cappé et al. 2008, Statistics and Computing 18(4)).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from cmm_uq.base.points import Floats
+
+Numbers = tuple[NDArray[Any], ...]
+"""Random numbers, of which the first axis are draws."""
+
+LogDensity = Callable[[Floats], Floats]
+"""Of (w, d) parameters, up to a constant: (w,)."""
+
+_DOF = 6.0
+_WIDER = 2.0
+"""Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
+
+_LOOKS = 3
+_ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
+"""Letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with."""
+
+_STUCK = 1.01
+"""Times the power from round to round below which one distribution does not do."""
+
+_PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
+"""Distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with."""
+_REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
+_FITS = 8
+"""Mixtures fitted to the density itself from which the best is taken."""
+
+
+class Proposes(Protocol):
+    """What a sampler takes its steps from: draws in coordinates z, their density, and the parameters that they mean."""
+
+    @property
+    def centre(self) -> Floats:
+        """(d,) the parameters where z is zero."""
+
+    def parameters(self, z: Floats) -> Floats:
+        """(w, d) for coordinates z."""
+
+    def draws(self, count: int, random: Any) -> Floats:
+        """Coordinates (count, d)."""
+
+    def numbers_of(self, count: int, random: Any) -> Numbers:
+        """What draws are made of: arrays (count, …) of random numbers, taken in a fixed order."""
+
+    def made(self, numbers: Numbers) -> Floats:
+        """Coordinates (w, d) from such numbers, also of several draws one after another."""
+
+    def log_density(self, z: Floats) -> Floats:
+        """(w,) up to a constant."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """Student's t distributions with six degrees of freedom in whitened coordinates z; x = centre + factor @ z.
+
+    Parameters
+    ----------
+    centre, factor : (d,) and (d, d).
+    weights, centres, factors : (K,), (K, d) and (K, d, d) in z.
+    """
+
+    centre: Floats
+    factor: Floats
+    weights: Floats
+    centres: Floats
+    factors: Floats
+
+    @classmethod
+    def single(cls, centre: Floats, factor: Floats) -> Proposal:
+        """One distribution, about ``centre``."""
+        d = len(centre)
+        return cls(centre, factor, np.ones(1), np.zeros((1, d)), np.eye(d)[None])
+
+    def parameters(self, z: Floats) -> Floats:
+        """(w, d) for whitened coordinates z."""
+        return np.asarray(self.centre + z @ self.factor.T)
+
+    def draws(self, count: int, random: Any) -> Floats:
+        """Whitened coordinates (count, d)."""
+        return self.made(self.numbers_of(count, random))
+
+    def numbers_of(self, count: int, random: Any) -> Numbers:
+        """Normal numbers (count, d), χ² (count, 1), and which distribution (count,)."""
+        normal = random.standard_normal((count, len(self.centre)))
+        squares = random.chisquare(_DOF, size=(count, 1))
+        return normal, squares, chosen(self._cumulative, count, random)
+
+    def made(self, numbers: Numbers) -> Floats:
+        """Whitened coordinates (w, d) from these."""
+        normal, squares, part = numbers
+        t = np.asarray(normal / np.sqrt(squares / _DOF))
+        if len(self.weights) == 1:
+            return t
+        return np.asarray(self.centres[part] + np.einsum("wij,wj->wi", self.factors[part], t))
+
+    def log_density(self, z: Floats) -> Floats:
+        """(w,) up to a constant."""
+        log, _ = self.log_each(z)
+        return log[:, 0] if len(self.weights) == 1 else np.asarray(np.logaddexp.reduce(log, axis=1))
+
+    def log_probability(self, parameters: Floats) -> Floats:
+        """Logarithm of the density (w,) of parameters (w, d), with its constant."""
+        return np.asarray(self.log_density((parameters - self.centre) @ self._whitening) + self._constant)
+
+    def log_each(self, z: Floats) -> tuple[Floats, Floats]:
+        """Weighted log density of each distribution, and squared distance from its centre, (w, K)."""
+        if len(self.weights) == 1:
+            squares = np.einsum("wi,wi->w", z, z)[:, None]
+        else:
+            own = (z @ self._inverse.reshape(-1, z.shape[1]).T).reshape(len(z), *self.centres.shape) - self._centre
+            squares = np.einsum("wki,wki->wk", own, own)
+        log = -0.5 * (_DOF + z.shape[1]) * np.log1p(squares / _DOF)
+        return log + self._log_weight, squares
+
+    @cached_property
+    def _whitening(self) -> Floats:
+        return np.asarray(np.linalg.inv(self.factor).T)
+
+    @cached_property
+    def _constant(self) -> float:
+        d = len(self.centre)
+        constant = special.gammaln(0.5 * (_DOF + d)) - special.gammaln(0.5 * _DOF) - 0.5 * d * np.log(np.pi * _DOF)
+        return float(constant - np.linalg.slogdet(self.factor)[1])
+
+    @cached_property
+    def _cumulative(self) -> Floats:
+        return cumulative(self.weights)
+
+    @cached_property
+    def _inverse(self) -> Floats:
+        return np.asarray(np.linalg.inv(self.factors))
+
+    @cached_property
+    def _centre(self) -> Floats:
+        """(K, d) of each distribution in its own coordinates."""
+        return np.asarray(np.einsum("kij,kj->ki", self._inverse, self.centres))
+
+    @cached_property
+    def _log_weight(self) -> Floats:
+        return np.asarray(np.log(self.weights) - np.linalg.slogdet(self.factors)[1])
+
+
+def cumulative(probability: Floats) -> Floats:
+    """(K,) of which :func:`chosen` chooses."""
+    found = np.cumsum(probability)
+    return np.asarray(found / found[-1])
+
+
+def chosen(cumulated: Floats, count: int, random: Any) -> NDArray[np.int64]:
+    """(count,) as ``random.choice`` does, which looks through its probabilities each time; of a single one, with no number."""
+    if len(cumulated) == 1:
+        return np.zeros(count, dtype=np.int64)
+    return np.asarray(cumulated.searchsorted(random.random_sample(count), side="right"), dtype=np.int64)
+
+
+def refined(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> Proposal:
+    """A better approximation of a skewed density: its moments by importance sampling from a t distribution, thrice."""
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
+    width, looks = _WIDER, 0
+    while looks < _LOOKS:
+        proposal = Proposal.single(centre, width * factor)
+        z = proposal.draws(500 * len(centre), random)
+        theta = proposal.parameters(z)
+        weight = weights(density(theta) - proposal.log_density(z))
+        # too few draws that count would make it degenerate: the approximation is then better than its correction
+        if 1 / np.sum(weight**2) < 5 * len(centre):
+            if width == 1.0:
+                break
+            width = max(1.0, width / 2**0.25)  # in many dimensions most of what is so much wider lies where nothing is
+            continue
+        looks += 1
+        mean, covariance = moments(theta, weight)
+        centre, factor, width = mean, _root(covariance), 1.0
+    return Proposal.single(centre, factor)
+
+
+def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> Proposal:
+    """An approximation of a density that may lie far from where it was looked for: importance sampling, let in by degrees.
+
+    What is looked for goes from where the search begins to the density, in each round as far as enough draws count.
+
+    Parameters
+    ----------
+    density : to be approximated.
+    centre, factor : where to begin, (d,) and (d, d), wide enough for the density to be somewhere within.
+    seed : of the draws.
+    """
+    random, d = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))), len(centre)
+    begin, back = centre, np.linalg.inv(factor)
+    first = factor
+    count, power, left = 100 * (d + 1), 0.0, _LOOKS
+    for _ in range(_MOST_LOOKS):
+        proposal = Proposal.single(centre, factor)
+        z = proposal.draws(count, random)
+        theta = proposal.parameters(z)
+        from_begin = -0.5 * np.sum(((theta - begin) @ back.T) ** 2, axis=1)
+        gain = np.maximum(density(theta) - from_begin, _NEVER)
+        known = from_begin - proposal.log_density(z)
+        before, power = power, highest_power(gain, known, power, _ENOUGH * count)
+        if power < min(1.0, _STUCK * before):
+            return _mixture(density, begin, first, random)
+        mean, covariance = moments(theta, weights(power * gain + known))
+        centre, factor = mean, np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(d))
+        left -= power == 1.0
+        if not left:
+            single = worth(gain + known) > 0.5 * _ENOUGH * count
+            return Proposal.single(centre, factor) if single else _mixture(density, begin, first, random)
+    return _mixture(density, begin, first, random)
+
+
+def _mixture(density: LogDensity, centre: Floats, factor: Floats, random: Any) -> Proposal:
+    """Several distributions, let in by degrees, and in the end those of several fits of whose draws most count.
+
+    The draws of some rounds count together, as if each came from the mean of what drew them.
+    """
+    d = len(centre)
+    proposals = [Proposal.single(centre, factor)]
+    draws: list[Floats] = []
+    gains: list[Floats] = []
+    count, power, enough = 100 * (d + 1), 0.0, _ENOUGH
+    tried: list[tuple[float, int]] = []
+    while len(proposals) <= _MOST_LOOKS or (power == 1.0 and len(tried) < _FITS):
+        z = proposals[-1].draws(count, random)
+        draws = [*draws, z][-_RECALLED:]
+        gain = np.maximum(density(proposals[-1].parameters(z)) + 0.5 * np.sum(z**2, axis=1), _NEVER)
+        gains = [*gains, gain][-_RECALLED:]
+        if power == 1.0:
+            own = -0.5 * np.sum(z**2, axis=1) - proposals[-1].log_density(z)
+            tried.append((worth(gain + own), len(proposals) - 1))
+            if len(tried) == _FITS or tried[-1][0] > _ENOUGH * count:
+                break
+        every, gain = np.vstack(draws), np.concatenate(gains)
+        from_any = np.stack([proposal.log_density(every) for proposal in proposals[-_RECALLED:]])
+        known = -0.5 * np.sum(every**2, axis=1) - special.logsumexp(from_any, axis=0)
+        before, power = power, highest_power(gain, known, power, enough * len(every))
+        enough = max(0.5 * enough, _LEAST_ENOUGH) if power < min(1.0, _STUCK * before) else enough
+        proposals.append(_fitted(proposals[-1], every, weights(power * gain + known), random))
+    return proposals[max(tried)[1]] if tried else proposals[-1]
+
+
+def _fitted(proposal: Proposal, z: Floats, weight: Floats, random: Any) -> Proposal:
+    """A mixture for weighted draws z, by expectation and maximisation from centres drawn among them."""
+    d = z.shape[1]
+    mean, covariance = moments(z, weight)
+    covariance = covariance + 1e-9 * np.trace(covariance) * np.eye(d)
+    many = 1 / np.sum(weight**2)
+    narrow = np.linalg.cholesky(_NARROWER * covariance)
+    found = Proposal(
+        proposal.centre, proposal.factor, np.full(_PARTS, 1 / _PARTS), z[random.choice(len(z), _PARTS, p=weight)],
+        np.repeat(narrow[None], _PARTS, axis=0),
+    )  # fmt: skip
+    for _ in range(_REFITS):
+        log, squares = found.log_each(z)
+        share = weight[:, None] * np.exp(log - special.logsumexp(log, axis=1, keepdims=True))
+        part = share.sum(axis=0)
+        pull = share * (_DOF + d) / (_DOF + squares)
+        kept = part * many > min(
+            d / 2, 0.5 * part.max() * many
+        )  # fewer draws say nothing about a distribution of its own
+        share, pull, part = share[:, kept], pull[:, kept], part[kept]
+        centres = (pull.T @ z) / pull.sum(axis=0)[:, None]
+        about = z[:, None] - centres
+        own = np.einsum("wk,wki,wkj->kij", pull, about, about) / part[:, None, None]
+        prior = (2 * d / (2 * d + part * many))[:, None, None]
+        factors = np.linalg.cholesky((1 - prior) * own + prior * _NARROWER * covariance)
+        found = Proposal(proposal.centre, proposal.factor, part / part.sum(), centres, factors)
+    return Proposal(
+        proposal.centre, proposal.factor, np.append((1 - _WIDE) * found.weights, _WIDE),
+        np.vstack([found.centres, mean]), np.concatenate([found.factors, np.linalg.cholesky(covariance)[None]]),
+    )  # fmt: skip
+
+
+def _root(covariance: Floats) -> Floats:
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def moments(values: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """Mean and covariance of weighted draws (w, d)."""
+    mean = weight @ values
+    about = values - mean
+    return mean, (about * weight[:, None]).T @ about
+
+
+def highest_power(gain: Floats, known: Floats, least: float, enough: float) -> float:
+    """Largest power of a gain in density, not below ``least``, at which the draws are worth enough, by bisection."""
+    low, high = least, 1.0
+    if worth(gain + known) >= enough:
+        return 1.0
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if worth(middle * gain + known) >= enough else (low, middle)
+    return low
+
+
+def weights(log: Floats) -> Floats:
+    """Of draws whose density over that proposed has the logarithm (w,): their sum is one."""
+    weight = np.exp(log - log.max())
+    return np.asarray(weight / weight.sum())
+
+
+def worth(log: Floats) -> float:
+    """How many draws those are worth whose density over that proposed has the logarithm (w,)."""
+    return float(1 / np.sum(weights(log) ** 2))

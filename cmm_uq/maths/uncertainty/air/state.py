@@ -1,0 +1,212 @@
+"""The state of the air as it was measured, what stands in for what was not, and the refractive index that follows.
+
+What is not measured gets a default with the uncertainty of not knowing it, and the budget says so: weather moves the
+pressure by some ± 3 kPa about its mean at an altitude, the humidity of a room lies between 10 % and 90 %, its carbon
+dioxide between 300 and 600 ppm, and a helium-neon laser that nobody calibrated at (632.9908 ± 0.0019) nm (relative
+standard uncertainty 1.5·10⁻⁶, CIPM recommendation 2007).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import Floats
+from cmm_uq.maths.uncertainty.air.ciddor import ciddor
+from cmm_uq.maths.uncertainty.air.edlen import birch_downs_1994, edlen_1966, harris_2004, modified_edlen
+from cmm_uq.maths.uncertainty.air.water_vapour import relative_humidity
+from cmm_uq.maths.uncertainty.budget import Labels
+from cmm_uq.maths.uncertainty.distributions import Distribution, Number, constant, normal, rectangular
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.propagation import first_order
+
+Range = tuple[float, float]
+
+HELIUM_NEON_NM = 632.9908
+
+
+@dataclass(frozen=True)
+class AirEquation:
+    """An equation for the refractivity of air.
+
+    Parameters
+    ----------
+    name : as budgets cite it.
+    refractivity : n − 1 of temperature (°C), pressure (Pa), relative humidity (%), CO2 (ppm), vacuum wavelength (nm).
+    u : standard uncertainty of the equation itself, as its source or NIST's comparison states it.
+    wavelength_nm : range of vacuum wavelengths.
+    temperature_c : range of temperatures.
+    """
+
+    name: str
+    refractivity: Callable[..., Any]
+    u: float
+    wavelength_nm: Range = (300.0, 1700.0)
+    temperature_c: Range = (-40.0, 100.0)
+
+
+EQUATIONS: Mapping[str, AirEquation] = {
+    "ciddor": AirEquation("Ciddor 1996", ciddor, 1.0e-8),
+    "modified_edlen": AirEquation("modified Edlén (NIST)", modified_edlen, 1.5e-8),
+    "birch_downs_1994": AirEquation("Birch and Downs 1994", birch_downs_1994, 1.5e-8, (350.0, 1064.0), (0.0, 40.0)),
+    "edlen_1966": AirEquation("Edlén 1966", edlen_1966, 5.0e-8, (230.0, 2060.0), (0.0, 40.0)),
+    "harris_2004": AirEquation("Harris 2004", harris_2004, 5.0e-8, (632.0, 634.0), (0.0, 40.0)),
+}
+
+_PRESSURE_PA: Range = (10e3, 140e3)
+_HUMIDITY_PCT: Range = (0.0, 100.0)
+_CO2_PPM: Range = (0.0, 2000.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Air:
+    """What is known of the air on the way of a beam; ``None`` where it was not measured.
+
+    Parameters
+    ----------
+    temperature_c : °C.
+    pressure_pa : Pa.
+    humidity_pct : relative humidity, %.
+    dew_point_c : instead of the relative humidity, °C.
+    co2_ppm : carbon dioxide, parts per million by volume.
+    wavelength_nm : vacuum wavelength, nm.
+    altitude_m : of the place; the mean pressure there stands in for one that was not measured.
+    """
+
+    temperature_c: Distribution
+    pressure_pa: Distribution | None = None
+    humidity_pct: Distribution | None = None
+    dew_point_c: Distribution | None = None
+    co2_ppm: Distribution | None = None
+    wavelength_nm: Distribution | None = None
+    altitude_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.humidity_pct is not None and self.dew_point_c is not None:
+            raise CmmUqError("both relative humidity and dew point are given", fix="Give one of them")
+
+    @property
+    def assumed(self) -> dict[str, Distribution]:
+        """Defaults of what was not measured."""
+        mean = standard_pressure(self.altitude_m)
+        defaults = {
+            "pressure_pa": (self.pressure_pa, rectangular(mean - 3e3, mean + 3e3)),
+            "humidity_pct": (self.humidity_pct or self.dew_point_c, rectangular(10.0, 90.0)),
+            "co2_ppm": (self.co2_ppm, rectangular(300.0, 600.0)),
+            "wavelength_nm": (self.wavelength_nm, normal(HELIUM_NEON_NM, 1.5e-6 * HELIUM_NEON_NM)),
+        }
+        return {name: default for name, (measured, default) in defaults.items() if measured is None}
+
+    @property
+    def inputs(self) -> dict[str, Distribution]:
+        """All inputs of an equation, measured or assumed."""
+        measured = {
+            "temperature_c": self.temperature_c,
+            "pressure_pa": self.pressure_pa,
+            "humidity_pct": self.humidity_pct,
+            "dew_point_c": self.dew_point_c,
+            "co2_ppm": self.co2_ppm,
+            "wavelength_nm": self.wavelength_nm,
+        }
+        return {name: given for name, given in measured.items() if given is not None} | self.assumed
+
+    @property
+    def labels(self) -> Labels:
+        """Units, and where each figure comes from."""
+        origins = dict.fromkeys(self.inputs, say("measured")) | dict.fromkeys(
+            self.assumed, say("judgement: not measured")
+        )
+        return Labels(_UNITS, {**origins, "equation": say("literature")})
+
+
+_UNITS: Mapping[str, str] = {
+    "temperature_c": "degC",
+    "pressure_pa": "Pa",
+    "humidity_pct": "percent",
+    "dew_point_c": "degC",
+    "co2_ppm": "ppm",
+    "wavelength_nm": "nm",
+    "equation": "1",
+}
+
+
+def standard_pressure(altitude_m: Number) -> Any:
+    """Mean pressure at an altitude below 11 km, Pa (ISO 2533 standard atmosphere)."""
+    return 101325.0 * (1.0 - 2.25577e-5 * np.asarray(altitude_m)) ** 5.25588
+
+
+def equation_by_name(name: str) -> AirEquation:
+    """Equation of :data:`EQUATIONS`.
+
+    Raises
+    ------
+    CmmUqError : no such equation.
+    """
+    if name not in EQUATIONS:
+        raise CmmUqError(
+            f"there is no equation {name!r} for the refractive index of air", fix=suggestion(name, EQUATIONS)
+        )
+    return EQUATIONS[name]
+
+
+def refractivity_of(equation: AirEquation, values: Mapping[str, Any]) -> Any:
+    """Refractivity n − 1 from the inputs of :class:`Air` and the error of the equation, floats, arrays or jets."""
+    humidity = values.get("humidity_pct")
+    if humidity is None:
+        humidity = relative_humidity(values["temperature_c"], values["dew_point_c"])
+    found = equation.refractivity(
+        values["temperature_c"], values["pressure_pa"], humidity, values["co2_ppm"], values["wavelength_nm"]
+    )
+    return found + values.get("equation", 0.0)
+
+
+def air_model(air: Air, equation: str = "ciddor") -> MeasurementModel:
+    """Measurement model of the refractivity n − 1; the equation's own error is an input of it.
+
+    Raises
+    ------
+    CmmUqError : an unknown equation, or an estimate out of its range.
+    """
+    chosen = equation_by_name(equation)
+    check_range(air, chosen)
+    inputs = {**air.inputs, "equation": normal(0.0, chosen.u)}
+    return MeasurementModel(lambda **values: refractivity_of(chosen, values), inputs, ("refractivity",))
+
+
+def refractive_index(air: Air, equation: str = "ciddor") -> tuple[Floats, Floats]:
+    """Refractive index n and its standard uncertainty, for one state of the air or for arrays of them."""
+    found = first_order(air_model(air, equation))
+    return 1.0 + found.value[0], found.u[0]
+
+
+def check_range(air: Air, equation: AirEquation) -> None:
+    """Refuse estimates out of the range of an equation.
+
+    Raises
+    ------
+    CmmUqError : names the quantity, its value, and the range.
+    """
+    ranges = {
+        "temperature_c": equation.temperature_c,
+        "pressure_pa": _PRESSURE_PA,
+        "humidity_pct": _HUMIDITY_PCT,
+        "co2_ppm": _CO2_PPM,
+        "wavelength_nm": equation.wavelength_nm,
+    }
+    inputs = air.inputs
+    if "dew_point_c" in inputs:
+        dew = relative_humidity(np.asarray(air.temperature_c.mean), np.asarray(inputs["dew_point_c"].mean))
+        inputs["humidity_pct"] = constant(dew)
+    for name, (low, high) in ranges.items():
+        means = np.atleast_1d(inputs[name].mean)
+        outside = means[(means < low) | (means > high)]
+        if len(outside):
+            raise CmmUqError(
+                f"{name} = {outside[0]:g} is out of the range {low:g} to {high:g} of {equation.name}",
+                fix="Check its unit, or choose another equation",
+            )

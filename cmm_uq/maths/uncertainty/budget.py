@@ -1,0 +1,315 @@
+"""Uncertainty budgets: what contributes, how much, and where each figure comes from.
+
+A budget is a list of lines; a line may itself be the result of a budget (nested). Correlations and terms of second order
+are lines of their own, so that the shares always add up to one; a share is negative where a correlation takes away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import copysign, inf, isfinite, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, foreign, say, signed
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import unit_as_written
+from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
+from cmm_uq.maths.uncertainty.rounding import figure, rounded, significant
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from cmm_uq.maths.uncertainty.distributions import Distribution
+    from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+    from cmm_uq.maths.uncertainty.propagation import Propagated
+
+CERTIFICATE, SPECIFICATION = say("certificate"), say("specification")
+REPEATS, JUDGEMENT = say("repeats"), say("judgement")
+"""Where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)."""
+
+
+_ROUNDING = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One source of uncertainty.
+
+    Parameters
+    ----------
+    name : the quantity.
+    u : its standard uncertainty, in ``unit``; None for a line that is no quantity (a correlation).
+    origin : where the figure comes from.
+    value : its estimate, where it has one.
+    unit : of value and u, as text.
+    distribution : by its name in JCGM 101 table 1.
+    dof : degrees of freedom of u.
+    sensitivity : change of the measurand by a change of the quantity; None where there is no single one.
+    variance : what the line adds to the variance of the measurand, where that is not (sensitivity × u)².
+    parts : the budget that ``u`` comes from.
+    shared : whether repetitions share it, so that it does not average out.
+    """
+
+    name: Text
+    u: float | None
+    origin: Text
+    value: float | None = None
+    unit: Text = NOTHING
+    distribution: str = "normal"
+    dof: float = inf
+    sensitivity: float | None = 1.0
+    variance: float | None = None
+    parts: Budget | None = None
+    shared: bool = False
+
+    def __post_init__(self) -> None:
+        if self.u is not None and not (isfinite(self.u) and self.u >= 0):
+            raise CmmUqError(f"a standard uncertainty of {self.u}", where=f"budget line {self.name!r}")
+        if not self.dof >= 1:
+            raise CmmUqError(f"{self.dof} degrees of freedom", where=f"budget line {self.name!r}", fix="At least 1")
+
+    @property
+    def part(self) -> float:
+        """What the line adds to the variance of the measurand; negative for some correlations."""
+        return self.variance if self.variance is not None else ((self.sensitivity or 0.0) * (self.u or 0.0)) ** 2
+
+    @property
+    def contribution(self) -> float:
+        """Square root of :attr:`part`, with its sign."""
+        return copysign(sqrt(abs(self.part)), self.part)
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Units of inputs and outputs, and origins of the inputs' figures, as a budget shows them."""
+
+    units: Mapping[str, str] = field(default_factory=dict)
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+
+def line_of(name: str, given: Distribution, labels: Labels | None = None, sensitivity: float = 1.0) -> Line:
+    """Line of an input by its distribution."""
+    told = labels or Labels()
+    origin, unit = told.origins.get(name, say("not stated")), unit_as_written(told.units.get(name, ""))
+    return Line(
+        Verbatim(name),
+        float(given.u),
+        foreign(origin),
+        float(given.mean),
+        unit,
+        given.kind,
+        float(given.dof),
+        sensitivity,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Budget:
+    """What is known of a measurand, line by line.
+
+    Parameters
+    ----------
+    measurand : what is measured.
+    lines : its sources of uncertainty.
+    value : estimate; None where the budget is of an uncertainty alone.
+    unit : of the measurand, as text.
+    coverage : probability of the expanded uncertainty.
+    effective_dof : where the lines alone do not tell them (correlated inputs).
+    factor : coverage factor where a standard prescribes one; None takes that of the degrees of freedom.
+    statement : what kind of uncertainty this is and what it is not, for the reader.
+    """
+
+    measurand: Text
+    lines: Sequence[Line]
+    value: float | None = None
+    unit: Text = NOTHING
+    coverage: float = 0.95
+    effective_dof: float | None = None
+    factor: float | None = None
+    statement: Text = NOTHING
+
+    @property
+    def variance(self) -> float:
+        """Combined variance."""
+        total = sum(line.part for line in self.lines)
+        # correlations can cancel the rest completely; what rounding leaves then is nothing
+        return total if total > 1e-14 * sum(abs(line.part) for line in self.lines) else 0.0
+
+    @property
+    def u(self) -> float:
+        """Combined standard uncertainty."""
+        return sqrt(self.variance)
+
+    @property
+    def dof(self) -> float:
+        """Effective degrees of freedom (JCGM 100:2008 G.4.1)."""
+        if self.effective_dof is not None:
+            return self.effective_dof
+        denominator = sum(line.part**2 / line.dof for line in self.lines)
+        return self.variance**2 / denominator if denominator else inf
+
+    @property
+    def k(self) -> float:
+        """Coverage factor."""
+        return self.factor if self.factor is not None else float(coverage_factor(self.dof, self.coverage))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty U = k u."""
+        return self.k * self.u
+
+    @property
+    def shares(self) -> list[float]:
+        """Part of each line in the variance; they add up to one (all zero where nothing contributes)."""
+        variance = self.variance
+        return [line.part / variance if variance else 0.0 for line in self.lines]
+
+    def of(self, value: float) -> Budget:
+        """The same with an estimate of the measurand."""
+        return replace(self, value=value)
+
+    def as_line(self, name: Text, sensitivity: float = 1.0) -> Line:
+        """Its result as one line of another budget."""
+        return Line(name, self.u, say("budget"), self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
+
+    def mean_of(self, repetitions: int, measurand: Text) -> Budget:
+        """Budget of the mean of repetitions: what they do not share is divided by √n."""
+        lines = [line if line.shared else replace(line, variance=line.part / repetitions) for line in self.lines]
+        return replace(self, measurand=measurand, lines=lines)
+
+    def flat(self, depth: int = 0, weight: float = 1.0) -> Iterator[tuple[int, Line, float]]:
+        """Every line with its depth and its share in this budget, nested lines after the line they make up."""
+        for line, share in zip(self.lines, self.shares, strict=True):
+            yield depth, line, weight * share
+            if line.parts is not None:
+                yield from line.parts.flat(depth + 1, weight * share)
+
+    def as_rows(self) -> list[dict[str, Any]]:
+        """One plain dict a line, nested lines included."""
+        return [
+            {
+                "quantity": line.name,
+                "depth": depth,
+                "value": line.value,
+                "u": line.u,
+                "unit": line.unit,
+                "distribution": line.distribution,
+                "dof": line.dof,
+                "sensitivity": line.sensitivity,
+                "contribution": line.contribution,
+                "share": share,
+                "origin": line.origin,
+            }
+            for depth, line, share in self.flat()
+        ]
+
+    def as_dataframe(self) -> pd.DataFrame:
+        """The same as a table of pandas."""
+        import pandas as pd
+
+        return pd.DataFrame(self.as_rows())
+
+    def as_text(self) -> list[tuple[Text, ...]]:
+        """The same as rows of text under :data:`HEADINGS`, for a page."""
+        return [_text(depth, line, share) for depth, line, share in self.flat()]
+
+
+HEADINGS = (
+    say("Quantity"), say("Estimate"), say("Standard uncertainty"), say("Unit"), say("Distribution"), say("ν"),
+    say("Sensitivity"), say("Contribution"), say("Share"), say("Origin"),
+)  # fmt: skip
+
+
+def _text(depth: int, line: Line, share: float) -> tuple[Text, ...]:
+    value, u = NOTHING, (NOTHING if line.u is None else significant(line.u))
+    if line.value is not None and line.u is not None:
+        value, u = rounded(line.value, line.u)
+    return (
+        say("{indent}{name}", indent=Verbatim("\u2003" * depth), name=line.name),
+        value,
+        u,
+        NOTHING if line.unit == "1" else line.unit,
+        _DISTRIBUTIONS.get(line.distribution, NOTHING),
+        NOTHING if line.u is None else figure(line.dof, 3) if isfinite(line.dof) else Number("∞"),
+        NOTHING if line.sensitivity is None else figure(line.sensitivity),
+        _signed(line.contribution),
+        say("{share} %", share=signed(100 * share, ".1f")),
+        line.origin,
+    )
+
+
+_DISTRIBUTIONS = {
+    "normal": say("normal"),
+    "t": say("t"),
+    "rectangular": say("rectangular"),
+    "rectangular_uncertain": say("rectangular uncertain"),
+    "trapezoidal": say("trapezoidal"),
+    "triangular": say("triangular"),
+    "arcsine": say("arcsine"),
+    "exponential": say("exponential"),
+    "gamma": say("gamma"),
+}
+"""By the names of JCGM 101 table 1 as model files write them."""
+
+
+def _signed(contribution: float) -> Text:
+    return Number(("−" if contribution < 0 else "") + significant(abs(contribution)))
+
+
+def budget_of(
+    model: MeasurementModel,
+    propagated: Propagated,
+    output: int = 0,
+    *,
+    labels: Labels | None = None,
+    coverage: float = 0.95,
+) -> Budget:
+    """Budget of one output of a model propagated at a single point: inputs, correlations, terms of second order."""
+    names, contribution = list(propagated.inputs), propagated.contribution[output]
+    slopes = dict(zip(names, propagated.sensitivity[output].tolist(), strict=True))
+    told, name = labels or Labels(), propagated.outputs[output]
+    lines = [line_of(key, given, told, slopes[key]) for key, given in model.inputs.items()]
+    joint = 2 * np.triu(np.outer(contribution, contribution) * propagated.correlation, 1)
+    lines += _joint_lines(_of_pairs, names, joint)
+    rounding = _ROUNDING * float(propagated.covariance[output, output])
+    bending = propagated.bending[output]
+    lines += _joint_lines(_of_squares, names, np.where(np.abs(bending) > rounding, bending, 0.0))
+    cubic = float(propagated.cubic[output])
+    if abs(cubic) > rounding:
+        lines.append(joint_line(say("third derivatives"), cubic))
+    return Budget(
+        Verbatim(name),
+        lines,
+        float(propagated.value[output]),
+        unit_as_written(told.units.get(name, "")),
+        coverage,
+        float(propagated.dof[output]),
+    )
+
+
+def joint_line(name: Text, variance: float) -> Line:
+    """Line that is no quantity but what several of them add to, or take from, the variance together."""
+    return Line(name, None, say("model"), distribution="", sensitivity=None, variance=variance)
+
+
+def _of_squares(one: Text, other: Text) -> Text:
+    return (
+        say("second order: {one} squared", one=one)
+        if one == other
+        else say("second order: {one}, {other}", one=one, other=other)
+    )
+
+
+def _of_pairs(one: Text, other: Text) -> Text:
+    return say("correlation of {one}, {other}", one=one, other=other)
+
+
+def _joint_lines(words: Callable[[Text, Text], Text], names: Sequence[str], variance: Floats) -> list[Line]:
+    return [
+        joint_line(words(Verbatim(names[i]), Verbatim(names[j])), float(variance[i, j]))
+        for i, j in zip(*np.nonzero(variance), strict=True)
+    ]

@@ -1,0 +1,217 @@
+"""Two different uncertainties of a coordinate measuring machine: that of its test, and that of using it.
+
+The test uncertainty (ISO/TS 23165, ISO 14253-5) says how well a test value is known: what the calibrated artefact, its
+temperature and its mounting leave open. The machine's own errors are what is tested, so they are not in it. The
+uncertainty of a measurement made with the machine (ISO 15530) contains them. Neither stands in for the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
+from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, Line
+
+FACTOR = 2.0
+"""Coverage factor that ISO/TS 23165 and ISO 15530-3 prescribe."""
+
+SIMULATION = say("simulation")
+
+FEWEST_READINGS = 20
+"""Of the calibrated workpiece, in ten cycles or more (ISO 15530-3:2011)."""
+
+TEST = say(
+    "Test uncertainty (ISO/TS 23165): of the test value. The machine's own errors are what is "
+    "tested and are not in it; it is not the uncertainty of a measurement made with the machine."
+)
+
+
+def _use(source: Text) -> Text:
+    return say(
+        "Uncertainty of measurements made with the machine ({source}): valid for the same task, machine, strategy and "
+        "conditions. It is not the test uncertainty of an acceptance or verification test.",
+        source=source,
+    )
+
+
+def length_test_uncertainty(
+    length_mm: float,
+    u_calibration_mm: float,
+    *,
+    temperature_c: float = REFERENCE_TEMPERATURE,
+    cte_per_k: float = 0.0,
+    u_cte_per_k: float = 0.0,
+    u_temperature_k: float = 0.0,
+    u_alignment_mm: float = 0.0,
+    u_fixturing_mm: float = 0.0,
+    u_beside_mm: float = 0.0,
+    calibration_dof: float = inf,
+) -> Budget:
+    """Test uncertainty of an error of length measurement E (ISO/TS 23165:2006), mm.
+
+    Parameters
+    ----------
+    u_calibration_mm : of the artefact's calibrated length.
+    temperature_c, cte_per_k : of the artefact during the test.
+    u_alignment_mm, u_fixturing_mm : by misalignment and by what the clamping does to the length.
+    u_beside_mm : of the short gauge measured beside lengths that are not bidirectional by themselves; no line where 0.
+    calibration_dof : degrees of freedom that the artefact's certificate states.
+    """
+    return Budget(
+        say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm),
+        [
+            Line(
+                say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=unit("mm"), dof=calibration_dof
+            ),
+            _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
+            Line(
+                say("temperature of the artefact"),
+                u_temperature_k,
+                JUDGEMENT,
+                temperature_c,
+                unit("K"),
+                sensitivity=length_mm * cte_per_k,
+            ),
+            Line(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=unit("mm")),
+            Line(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=unit("mm")),
+            *(
+                [Line(say("calibration of the short gauge"), u_beside_mm, CERTIFICATE, unit=unit("mm"))]
+                if u_beside_mm
+                else []
+            ),
+        ],
+        unit=unit("mm"),
+        factor=FACTOR,
+        statement=TEST,
+    )
+
+
+def probing_test_uncertainty(form_mm: float, u_form_mm: float) -> Budget:
+    """Test uncertainty of a probing error P from the test sphere's form F (ISO/TS 23165:2006), mm."""
+    return Budget(
+        say("test value of the probing error"),
+        [
+            Line(say("form of the test sphere, F/2"), form_mm / 2, CERTIFICATE, unit=unit("mm")),
+            Line(say("calibration of the form"), u_form_mm, CERTIFICATE, unit=unit("mm")),
+        ],
+        unit=unit("mm"),
+        factor=FACTOR,
+        statement=TEST,
+    )
+
+
+def use_by_calibrated_workpiece(
+    readings_mm: Sequence[float] | Floats,
+    calibrated_mm: float,
+    u_calibration_mm: float,
+    *,
+    temperature_c: float = REFERENCE_TEMPERATURE,
+    u_cte_calibrated_per_k: float = 0.0,
+    u_cte_workpieces_per_k: float = 0.0,
+    u_form_mm: float = 0.0,
+    expanding_mm: float | None = None,
+    angle: bool = False,
+) -> Budget:
+    """Uncertainty of using the machine, from readings of a calibrated workpiece (ISO 15530-3:2011), mm.
+
+    The value is the systematic error b = mean reading − calibrated value, by which results are corrected; where they
+    are not, :func:`expanded_without_correction` says what to state.
+
+    Parameters
+    ----------
+    readings_mm : of the calibrated workpiece, as workpieces are measured; 20 or more.
+    temperature_c : mean temperature while reading.
+    u_cte_calibrated_per_k, u_cte_workpieces_per_k : of the expansion coefficients of the calibrated one and of the
+        others.
+    u_form_mm : by what differs between workpieces: form, roughness, elasticity.
+    expanding_mm : length whose expansion counts, where it is not the calibrated value.
+    angle : whether values and uncertainties are in rad.
+
+    Raises
+    ------
+    CmmUqError : fewer readings than the standard asks for.
+    """
+    readings = np.asarray(readings_mm, dtype=np.float64)
+    if len(readings) < FEWEST_READINGS:
+        raise CmmUqError(
+            f"{len(readings)} readings of the calibrated workpiece",
+            fix=f"ISO 15530-3 asks for {FEWEST_READINGS} in ten cycles or more",
+        )
+    own = unit("rad" if angle else "mm")
+    length = calibrated_mm if expanding_mm is None else abs(expanding_mm)
+    return Budget(
+        say("systematic error of the measurement process"),
+        [
+            Line(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=own),
+            Line(
+                say("scatter of the process"),
+                float(readings.std(ddof=1)),
+                REPEATS,
+                unit=own,
+                dof=len(readings) - 1.0,
+            ),
+            _expansion(
+                say("expansion coefficient of the calibrated workpiece"),
+                u_cte_calibrated_per_k,
+                length,
+                temperature_c,
+            ),
+            _expansion(say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, length, temperature_c),
+            Line(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=own),
+        ],
+        float(readings.mean()) - calibrated_mm,
+        own,
+        factor=FACTOR,
+        statement=_use(say("ISO 15530-3, by a calibrated workpiece")),
+    )
+
+
+def expanded_without_correction(budget: Budget) -> float:
+    """Expanded uncertainty U + |b| of results that are not corrected for the systematic error b."""
+    return budget.expanded + abs(budget.value or 0.0)
+
+
+def use_by_simulation(
+    simulated_errors_mm: Sequence[float] | Floats, not_simulated: Sequence[Line] = (), coverage: float = 0.95
+) -> Budget:
+    """Uncertainty of using the machine, from simulated measurements of the task (ISO 15530-4:2008), mm.
+
+    The value is the systematic error that the simulation found; see :func:`expanded_without_correction`.
+
+    Parameters
+    ----------
+    simulated_errors_mm : simulated minus true value, one a simulated measurement.
+    not_simulated : lines of what the simulation leaves out; the standard asks that they be stated.
+
+    Raises
+    ------
+    CmmUqError : fewer than a hundred simulated measurements.
+    """
+    errors = np.asarray(simulated_errors_mm, dtype=np.float64)
+    if len(errors) < 100:
+        raise CmmUqError(f"{len(errors)} simulated measurements", fix="Simulate a hundred or more")
+    return Budget(
+        say("error of the measurement task"),
+        [
+            Line(
+                say("simulated scatter"), float(errors.std(ddof=1)), SIMULATION, unit=unit("mm"), dof=len(errors) - 1.0
+            ),
+            *not_simulated,
+        ],
+        float(errors.mean()),
+        unit("mm"),
+        coverage=coverage,
+        statement=_use(say("ISO 15530-4, by simulation")),
+    )
+
+
+def _expansion(name: Text, u_cte_per_k: float, length_mm: float, temperature_c: float) -> Line:
+    """L |t − 20 °C| u(α)."""
+    slope = length_mm * abs(temperature_c - REFERENCE_TEMPERATURE)
+    return Line(name, u_cte_per_k, JUDGEMENT, unit=unit("1/K"), sensitivity=slope)

@@ -1,0 +1,183 @@
+"""Which method states the result: the simplest one that Monte Carlo confirms, and the reason in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, after, foreign, say, semicolons
+from cmm_uq.maths.uncertainty.heavy_tails import NO_VARIANCE
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.monte_carlo import Simulated, numerical_tolerance
+from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second_order
+from cmm_uq.maths.uncertainty.rounding import figure
+from cmm_uq.maths.uncertainty.validation import compare
+
+Method = Literal["first", "second", "monte_carlo"]
+_ROUNDING = 4e-16
+
+PROPAGATION: tuple[Method, ...] = ("first", "second")
+NAMES: Mapping[Method, Text] = {
+    "first": say("first order"),
+    "second": say("second order"),
+    "monte_carlo": say("Monte Carlo"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """What each method gave; None where it was not asked for or is impossible, and then ``problems`` may say why."""
+
+    first: Propagated | None = None
+    second: Propagated | None = None
+    simulated: Simulated | None = None
+    problems: Mapping[Method, Text] = field(default_factory=dict)
+
+    def propagated(self, method: Method) -> Propagated | None:
+        """Result by the law of propagation."""
+        return self.first if method == "first" else self.second
+
+
+def by_propagation(model: MeasurementModel) -> Ways:
+    """First and second order, as far as they are possible."""
+    found: dict[Method, Propagated] = {}
+    problems: dict[Method, Text] = {}
+    for method, propagate in zip(PROPAGATION, (first_order, second_order), strict=True):
+        try:
+            found[method] = propagate(model)
+        except CmmUqError as error:
+            problems[method] = foreign(error.problem)
+    return Ways(found.get("first"), found.get("second"), None, problems)
+
+
+def must_be_possible(model: MeasurementModel, ways: Ways, method: Method) -> None:
+    """Refuse a method that was asked for by name and does not give an uncertainty.
+
+    Raises
+    ------
+    CmmUqError : the derivatives are not finite, or an output has u = 0 although inputs are uncertain.
+    """
+    found = ways.propagated(method)
+    if found is None:
+        raise CmmUqError(ways.problems[method], where=f"method = {method!r}", fix="Use method 'auto' or 'monte_carlo'")
+    for row, output in enumerate(found.outputs):
+        if is_flat(model, found, row):
+            raise CmmUqError(
+                f"{NAMES[method]} gives u = 0 for {output} although its inputs are uncertain: "
+                "the derivatives vanish at the estimates, or correlations cancel",
+                where=f"method = {method!r}",
+                fix="Use method 'auto' or 'monte_carlo'",
+            )
+
+
+def beside(ways: Ways, method: Method, row: int, digits: int) -> Text:
+    """What the other order says, where it says something else."""
+    if ways.first is None or ways.second is None:
+        return NOTHING
+    other = ways.second if method == "first" else ways.first
+    name = NAMES["second" if method == "first" else "first"]
+    differs = _differ(ways.first, ways.second, row, digits)
+    return say("{name:capital} gives u = {u}.", name=name, u=figure(other.u[row], digits)) if differs else NOTHING
+
+
+def _differ(first: Propagated, second: Propagated, row: int, digits: int) -> bool:
+    """Whether the terms of second order change estimate or uncertainty beyond the numerical tolerance."""
+    tolerance = numerical_tolerance(second.u, digits)[row]
+    return bool(max(abs(second.u[row] - first.u[row]), abs(second.value[row] - first.value[row])) > tolerance)
+
+
+def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
+    """Whether the law of propagation gives no uncertainty, beyond rounding, although inputs have some."""
+    uncertain = any(np.any(np.asarray(given.u) > 0) for given in model.inputs.values())
+    return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
+
+
+def stability(ways: Ways, row: int, digits: int) -> Text:
+    """Sentences where Monte Carlo gave up before its figures were stable, and why it had to, else nothing."""
+    found = ways.simulated
+    if found is None or found.stable:
+        return NOTHING
+    told = say(
+        "Monte Carlo is not stable to {digits} digits after {trials} trials.", digits=digits, trials=found.trials
+    )
+    name, shape, unseen = foreign(found.outputs[row]), float(found.shape[row]), float(found.unseen[row])
+    if shape >= NO_VARIANCE:
+        heavy = say(
+            "The tail of {name} is so heavy (Pareto shape {shape:.2f}; from 0.5 on there is no standard deviation) that u "
+            "is of these trials alone and grows with their number; the coverage interval stands.",
+            name=name,
+            shape=shape,
+        )
+        return after(told, heavy)
+    if unseen > numerical_tolerance(found.u, digits)[row]:
+        heavy = say(
+            "The tail of {name} is so heavy (Pareto shape {shape:.2f}) that rare draws rule u.", name=name, shape=shape
+        )
+        return after(told, heavy)
+    return told
+
+
+def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
+    """Method for one output, and why."""
+    if ways.simulated is None:
+        return _without_monte_carlo(ways, row, digits)
+    findings: list[Text] = []
+    told = stability(ways, row, digits)
+    for method in PROPAGATION:
+        confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
+        findings.append(say("{names} {finding}", names=NAMES[method], finding=finding))
+        if confirmed:
+            return method, after(_sentence(findings), told)
+    return ("monte_carlo", after(_sentence(findings), told))
+
+
+def _finding(
+    model: MeasurementModel, ways: Ways, simulated: Simulated, method: Method, row: int, digits: int
+) -> tuple[bool, Text]:
+    """Whether Monte Carlo confirms the method for one output, and what to say of it."""
+    found = ways.propagated(method)
+    if found is None:
+        return (False, say("is impossible ({problems})", problems=ways.problems[method]))
+    if is_flat(model, found, row):
+        return (False, say("gives u = 0, since the model is flat at the estimates"))
+    if found.dof[row] < 1:
+        return (False, say("has no interval, with {dof:.2g} effective degrees of freedom", dof=found.dof[row]))
+    comparison = compare(found, simulated, row, digits)
+    if not comparison.clear:
+        error = figure(comparison.error, 2)
+        return (
+            max(comparison.low, comparison.high) <= comparison.tolerance + 2 * comparison.error,
+            say(
+                "is neither confirmed nor refuted: {words}, but Monte Carlo's own error is {error}",
+                words=comparison.words,
+                error=error,
+            ),
+        )
+    words = comparison.words
+    return comparison.agrees, (
+        say("is confirmed: {words}", words=words) if comparison.agrees else say("is not enough: {words}", words=words)
+    )
+
+
+def _sentence(findings: Sequence[Text]) -> Text:
+    said = semicolons(findings)
+    return say("{said:capital} (JCGM 101 clause 8).", said=said)
+
+
+def _without_monte_carlo(ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
+    first, second = ways.first, ways.second
+    unchecked = say(
+        "Not confirmed by Monte Carlo, which is impossible here: {problems}.", problems=ways.problems["monte_carlo"]
+    )
+    if first is None or first.u[row] == 0:
+        raise CmmUqError(
+            f"no method gives an uncertainty of {first.outputs[row] if first else 'the outputs'}: "
+            f"{ways.problems.get('first', 'the derivatives vanish')}; {ways.problems['monte_carlo']}"
+        )
+    if second is not None and _differ(first, second, row, digits):
+        return ("second", say("The terms of second order are not negligible. {unchecked}", unchecked=unchecked))
+    return ("first", unchecked)

@@ -1,0 +1,256 @@
+"""From a measurement model to a stated result: first order, second order or Monte Carlo, with its budget.
+
+``auto`` takes the simplest way that Monte Carlo confirms (JCGM 101:2008 clause 8).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from html import escape
+from math import inf
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, names, say
+from cmm_uq.base.overflow import must_be_finite, refusing_overflow
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import unit_as_written
+from cmm_uq.maths.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
+from cmm_uq.maths.uncertainty.choice import Method, Ways, beside, by_propagation, choose, must_be_possible, stability
+from cmm_uq.maths.uncertainty.correlation import correlation_of
+from cmm_uq.maths.uncertainty.degrees_of_freedom import check_coverage, coverage_factor
+from cmm_uq.maths.uncertainty.distributions import constant
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, simulate, simulate_adaptively
+from cmm_uq.maths.uncertainty.propagation import Propagated
+from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.validation import simulate_to_validate
+
+METHODS = ("first", "second", "monte_carlo", "auto")
+
+_TRIALS_FOR_SENSITIVITY = 100_000
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of an evaluation.
+
+    Parameters
+    ----------
+    method : ``first``, ``second``, ``monte_carlo`` or ``auto``.
+    coverage : probability of the intervals.
+    digits : significant digits of u that Monte Carlo must support, and to which clause 8 compares.
+    seed : of the random numbers.
+    largest : trials that the adaptive Monte Carlo makes at most.
+    """
+
+    method: str = "auto"
+    coverage: float = 0.95
+    digits: int = 2
+    seed: int = 0
+    largest: int = LARGEST
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise CmmUqError(f"there is no method {self.method!r}", fix=suggestion(self.method, METHODS))
+        if self.digits not in range(1, 5):
+            raise CmmUqError(f"{self.digits} significant digits of u", fix="1 or 2 are usual, 4 the most")
+        if self.seed < 0:
+            raise CmmUqError(f"a seed of {self.seed}", fix="It is an integer that is not negative")
+        check_coverage(self.coverage)
+
+
+@dataclass(frozen=True, eq=False)
+class Stated:
+    """One output: its result by the method chosen.
+
+    Parameters
+    ----------
+    method, reason : how the result was obtained, and why so.
+    value, u : estimate and standard uncertainty.
+    dof : effective degrees of freedom; infinite for Monte Carlo, whose intervals need none.
+    interval : coverage interval; the shortest one for Monte Carlo.
+    coverage_factor : half the interval's length over u.
+    budget : what contributes.
+    """
+
+    method: Method
+    reason: Text
+    value: float
+    u: float
+    dof: float
+    interval: tuple[float, float]
+    coverage_factor: float
+    budget: Budget
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation:
+    """All outputs of a model.
+
+    Parameters
+    ----------
+    stated : result of each output by name.
+    correlation : (p, p) of the outputs; ``nan`` where one has no uncertainty.
+    ways : results of every method that was asked for and possible.
+    """
+
+    request: Request
+    stated: Mapping[str, Stated]
+    correlation: Floats
+    ways: Ways
+
+    @property
+    def stable(self) -> bool:
+        """Whether Monte Carlo, where it was run, is stable to the digits asked for."""
+        return self.ways.simulated is None or bool(self.ways.simulated.stable)
+
+    def __repr__(self) -> str:
+        said = [(name, *rounded(found.value, found.u), found.budget.unit) for name, found in self.stated.items()]
+        told = (
+            f"{name} = {value}, u = {u}{f' {unit}' if unit not in ('', '1') else ''}" for name, value, u, unit in said
+        )
+        return f"<Evaluation: {'; '.join(told)}>"
+
+    def _repr_html_(self) -> str:
+        from cmm_uq.maths.uncertainty.budget_results import SUMMARY, summary_rows
+
+        rows = (SUMMARY, *summary_rows(self))
+        return f"<table>{''.join(f'<tr>{_cells(row)}</tr>' for row in rows)}</table>"
+
+
+def _cells(row: Sequence[str]) -> str:
+    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
+
+
+def evaluate(model: MeasurementModel, request: Request | None = None, labels: Labels | None = None) -> Evaluation:
+    """Evaluate a measurement model at one point.
+
+    Raises
+    ------
+    CmmUqError : the method asked for is impossible here, or the input is.
+    """
+    asked, told = request or Request(), labels or Labels()
+    model.must_be_at_one_point()
+    fix = "State the inputs in units in which their numbers are neither huge nor tiny"
+    with refusing_overflow("[inputs]", fix):
+        evaluation = _evaluated(model, asked, told)
+    for name, stated in evaluation.stated.items():
+        must_be_finite((stated.value, stated.u, *stated.interval), f"[model] outputs.{name}", fix)
+    return evaluation
+
+
+def _evaluated(model: MeasurementModel, asked: Request, told: Labels) -> Evaluation:
+    ways = _ways(model, asked)
+    chosen = [_chosen(model, ways, row, asked) for row in range(len(model.outputs))]
+    methods = {method for method, _ in chosen}
+    alone = one_at_a_time(model, asked.seed) if "monte_carlo" in methods else np.zeros(0)
+    stated: dict[str, Stated] = {}
+    for row, (name, (method, reason)) in enumerate(zip(model.outputs, chosen, strict=True)):
+        found = ways.propagated(method)
+        if method == "monte_carlo" and ways.simulated is not None:
+            stated[name] = _simulated(model, ways.simulated, row, reason, alone[row], told)
+        elif found is not None:
+            stated[name] = _propagated(model, found, row, method, reason, asked.coverage, told)
+    return Evaluation(asked, stated, correlation_of(_covariance(ways, methods)), ways)
+
+
+def _ways(model: MeasurementModel, asked: Request) -> Ways:
+    ways = by_propagation(model)
+    if asked.method == "auto":
+        return _with_validation(model, ways, asked)
+    if asked.method == "monte_carlo":
+        simulated = simulate_adaptively(model, asked.coverage, asked.digits, asked.seed, asked.largest)
+        return replace(ways, simulated=simulated)
+    must_be_possible(model, ways, "first" if asked.method == "first" else "second")
+    return ways
+
+
+def _with_validation(model: MeasurementModel, ways: Ways, asked: Request) -> Ways:
+    problem = NOTHING
+    without = [name for name, given in model.inputs.items() if not np.isfinite(given.standard_deviation)]
+    if without:
+        problem = say(
+            "{inputs} has too few degrees of freedom for a standard deviation (ν ≤ 2)", inputs=commas(names(without))
+        )
+    elif asked.coverage > HIGHEST_COVERAGE:
+        problem = say(
+            "a coverage probability above {highest_coverage} needs too many trials", highest_coverage=HIGHEST_COVERAGE
+        )
+    if problem:
+        return replace(ways, problems={**ways.problems, "monte_carlo": problem})
+    candidates = [found for found in (ways.first, ways.second) if found is not None]
+    simulated = simulate_to_validate(model, candidates, asked.coverage, asked.digits, asked.seed, asked.largest)
+    return replace(ways, simulated=simulated)
+
+
+def _chosen(model: MeasurementModel, ways: Ways, row: int, asked: Request) -> tuple[Method, Text]:
+    if asked.method == "auto":
+        return choose(model, ways, row, asked.digits)
+    if asked.method == "monte_carlo":
+        return ("monte_carlo", after(say("Asked for."), stability(ways, row, asked.digits)))
+    method: Method = "first" if asked.method == "first" else "second"
+    return method, after(say("Asked for; not confirmed by Monte Carlo."), beside(ways, method, row, asked.digits))
+
+
+def _covariance(ways: Ways, methods: Collection[Method]) -> Floats:
+    """Covariance of the outputs by the most general of the methods that state them."""
+    if "monte_carlo" in methods and ways.simulated is not None:
+        return ways.simulated.covariance
+    found = ways.second if "second" in methods or ways.first is None else ways.first
+    return found.covariance if found is not None else np.zeros((0, 0))
+
+
+def _propagated(
+    model: MeasurementModel,
+    found: Propagated,
+    row: int,
+    method: Method,
+    reason: Text,
+    coverage: float,
+    labels: Labels,
+) -> Stated:
+    dof, u, value = float(found.dof[row]), float(found.u[row]), float(found.value[row])
+    factor = float(coverage_factor(dof, coverage))
+    budget = budget_of(model, found, row, labels=labels, coverage=coverage)
+    return Stated(method, reason, value, u, dof, (value - factor * u, value + factor * u), factor, budget)
+
+
+def _simulated(
+    model: MeasurementModel, simulated: Simulated, row: int, reason: Text, alone: Floats, labels: Labels
+) -> Stated:
+    name, value, u = simulated.outputs[row], float(simulated.value[row]), float(simulated.u[row])
+    lines = []
+    for (quantity, given), variance in zip(model.inputs.items(), alone.tolist(), strict=True):
+        line = line_of(quantity, given, labels)
+        lines.append(replace(line, variance=variance, sensitivity=variance**0.5 / line.u if line.u else 0.0))
+    lines.append(joint_line(say("together"), u**2 - float(np.sum(alone))))
+    statement = say(
+        "Each quantity's contribution is what it does alone, the others held at their estimates "
+        "(JCGM 101 annex B); “together” is what they add or take away jointly, by correlation or "
+        "nonlinearity."
+    )
+    unit = unit_as_written(labels.units.get(name, ""))
+    budget = Budget(Verbatim(name), lines, value, unit, simulated.coverage, effective_dof=inf, statement=statement)
+    low, high = map(float, simulated.interval[row])
+    return Stated("monte_carlo", reason, value, u, inf, (low, high), (high - low) / (2 * u) if u else 0.0, budget)
+
+
+def one_at_a_time(model: MeasurementModel, seed: int = 0) -> Floats:
+    """Variance (p, m) of each output when one input alone varies (JCGM 101 annex B).
+
+    Zero where the model gives no finite value that way.
+    """
+    found = np.zeros((len(model.outputs), len(model.inputs)))
+    held = {name: constant(given.mean) for name, given in model.inputs.items()}
+    for k, (name, given) in enumerate(model.inputs.items()):
+        if not np.any(np.asarray(given.u) > 0):
+            continue
+        try:
+            alone = MeasurementModel(model.function, {**held, name: given}, model.outputs)
+            found[:, k] = simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
+        except CmmUqError:
+            continue
+    return found

@@ -1,0 +1,184 @@
+"""Distributions from the keys of a model file: what each one needs, what contradicts, what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.maths.uncertainty import distributions as make
+from cmm_uq.maths.uncertainty.distributions import Distribution
+from cmm_uq.maths.uncertainty.type_a import repeated_readings
+
+Keys = Mapping[str, Any]
+
+ABSOLUTE = frozenset({"value", "low", "high", "samples"})
+DIFFERENCES = frozenset({"u", "half_width", "limit", "expanded"})
+PLAIN = frozenset({"dof", "beta", "coverage_factor"})
+NUMERIC = ABSOLUTE | DIFFERENCES | PLAIN
+
+_AGREEMENT = 1e-9
+
+
+def distribution_from(kind: str, keys: Keys) -> Distribution:
+    """Distribution of an input.
+
+    Parameters
+    ----------
+    kind : name in JCGM 101:2008 table 1, ``sampled`` or ``constant``.
+    keys : the numbers given for it, any of :data:`NUMERIC`.
+
+    Raises
+    ------
+    CmmUqError : an unknown distribution, a key missing, superfluous or contradicting another.
+    """
+    if kind not in KINDS:
+        raise CmmUqError(f"there is no distribution {kind!r}", fix=suggestion(kind, KINDS))
+    allowed, build = KINDS[kind]
+    for key in keys:
+        if key not in allowed:
+            raise CmmUqError(f"{key!r} does not belong to a {kind} distribution", fix=f"It takes {', '.join(allowed)}")
+    return build(keys)
+
+
+def _need(keys: Keys, *names: str) -> list[Any]:
+    for name in names:
+        if name not in keys:
+            raise CmmUqError(f"{name!r} is missing", fix=f"Give {' and '.join(names)}")
+    return [keys[name] for name in names]
+
+
+def _exclude(keys: Keys, given: str, *others: str) -> None:
+    for other in others:
+        if other in keys:
+            raise CmmUqError(f"{given!r} and {other!r} contradict each other", fix=f"Leave out {other}")
+
+
+def _must_agree(what: str, a: float, b: float, scale: float) -> None:
+    if abs(a - b) > _AGREEMENT * abs(scale):
+        raise CmmUqError(f"{what}: {a} and {b}", fix="Leave one of the contradicting keys out")
+
+
+def _standard_uncertainty(keys: Keys) -> float:
+    """Standard uncertainty as given, or from a certificate's expanded uncertainty."""
+    if "expanded" not in keys:
+        return float(_need(keys, "u")[0])
+    _exclude(keys, "expanded", "u")
+    expanded, factor = _need(keys, "expanded", "coverage_factor")
+    if not factor > 0:
+        raise CmmUqError(f"a coverage factor of {factor}", fix="It is positive, often 2")
+    return float(expanded / factor)
+
+
+def _normal(keys: Keys) -> Distribution:
+    if "samples" in keys:
+        found = _readings(keys)
+        return make.normal(found.mean, found.u, found.dof)
+    (value,) = _need(keys, "value")
+    return make.normal(value, _standard_uncertainty(keys), keys.get("dof", np.inf))
+
+
+def _student_t(keys: Keys) -> Distribution:
+    if "samples" in keys:
+        return _readings(keys)
+    value, dof = _need(keys, "value", "dof")
+    return make.student_t(value, _standard_uncertainty(keys), dof)
+
+
+def _readings(keys: Keys) -> Distribution:
+    _exclude(keys, "samples", "value", "u", "expanded", "coverage_factor")
+    found = repeated_readings(keys["samples"])
+    if "dof" in keys:
+        _must_agree("dof and the number of readings", keys["dof"], float(found.dof), 1.0)
+    return found
+
+
+def _limits(keys: Keys, ratio: float) -> tuple[float, float]:
+    """Limits from ``low, high``, ``value, half_width`` or ``value, u``; ``ratio`` = half-width over u."""
+    if "low" in keys or "high" in keys:
+        low, high = _need(keys, "low", "high")
+        middle, half_width = (low + high) / 2, (high - low) / 2
+    elif "half_width" in keys:
+        middle, half_width = _need(keys, "value", "half_width")
+    else:
+        middle, half_width = _need(keys, "value", "u")
+        half_width = half_width * ratio
+    _must_agree("value and the middle of the limits", keys.get("value", middle), middle, half_width)
+    _must_agree("half_width and the limits", keys.get("half_width", half_width), half_width, half_width)
+    _must_agree("u and the limits", keys.get("u", half_width / ratio), half_width / ratio, half_width)
+    return (keys["low"], keys["high"]) if "low" in keys else (middle - half_width, middle + half_width)
+
+
+def _bounded(build: Callable[..., Distribution], variance: float) -> Callable[[Keys], Distribution]:
+    def from_keys(keys: Keys) -> Distribution:
+        low, high = _limits(keys, 1 / sqrt(variance))
+        return build(low, high, dof=keys.get("dof", np.inf))
+
+    return from_keys
+
+
+def _trapezoidal(keys: Keys) -> Distribution:
+    (beta,) = _need(keys, "beta")
+    if not 0 <= beta <= 1:
+        raise CmmUqError(f"beta is {beta}", fix="The ratio of top to base lies between 0 and 1")
+    low, high = _limits(keys, sqrt(6 / (1 + beta**2)))
+    return make.trapezoidal(low, high, beta, keys.get("dof", np.inf))
+
+
+def _rectangular_uncertain(keys: Keys) -> Distribution:
+    """The doubt of the limits as ``limit``, as ``beta`` (of the half-width), or as ``dof`` (JCGM 100 G.4.2).
+
+    Beside ``low`` and ``high``, a ``half_width`` smaller than half their distance is that of the limits' own interval.
+    """
+    given = dict(keys)
+    if {"low", "high", "half_width"} <= set(given) and given["half_width"] < (given["high"] - given["low"]) / 2:
+        _exclude(given, "half_width", "limit")
+        given["limit"] = given.pop("half_width")
+    low, high = _limits(given, sqrt(3))
+    half_width = (high - low) / 2
+    if "limit" in given:
+        _exclude(given, "limit", "beta")
+        return make.rectangular_uncertain(low, high, given["limit"], given.get("dof"))
+    if "beta" in given:
+        return make.rectangular_uncertain(low, high, given["beta"] * half_width, given.get("dof"))
+    (dof,) = _need(given, "dof")
+    if not dof >= 1:
+        raise CmmUqError(f"{dof} degrees of freedom", fix="One is the least that an uncertainty can have")
+    return make.rectangular_uncertain(low, high, half_width / sqrt(2 * dof), dof)
+
+
+def _exponential(keys: Keys) -> Distribution:
+    (value,) = _need(keys, "value")
+    _must_agree("an exponential distribution has u = value", keys.get("u", value), value, value)
+    return make.exponential(value)
+
+
+def _gamma(keys: Keys) -> Distribution:
+    if "samples" in keys:
+        _exclude(keys, "samples", "value")
+        counts = np.asarray(keys["samples"], dtype=np.float64)
+        if np.any(counts < 0):
+            raise CmmUqError("a count is negative", fix="Give the numbers of events seen")
+        return make.gamma(float(counts.sum()), len(counts))
+    (count,) = _need(keys, "value")
+    return make.gamma(count)
+
+
+_LIMITS = ("value", "low", "high", "half_width", "u")
+
+KINDS: Mapping[str, tuple[tuple[str, ...], Callable[[Keys], Distribution]]] = {
+    "normal": (("value", "u", "dof", "expanded", "coverage_factor", "samples"), _normal),
+    "t": (("value", "u", "dof", "expanded", "coverage_factor", "samples"), _student_t),
+    "rectangular": ((*_LIMITS, "dof"), _bounded(make.rectangular, 1 / 3)),
+    "rectangular_uncertain": ((*_LIMITS, "limit", "beta", "dof"), _rectangular_uncertain),
+    "trapezoidal": ((*_LIMITS, "beta", "dof"), _trapezoidal),
+    "triangular": ((*_LIMITS, "dof"), _bounded(make.triangular, 1 / 6)),
+    "arcsine": ((*_LIMITS, "dof"), _bounded(make.arcsine, 1 / 2)),
+    "exponential": (("value", "u"), _exponential),
+    "gamma": (("value", "samples"), _gamma),
+    "sampled": (("samples",), lambda keys: make.sampled(_need(keys, "samples")[0])),
+    "constant": (("value",), lambda keys: make.constant(_need(keys, "value")[0])),
+}

@@ -1,0 +1,306 @@
+"""A measurement model of one's own in a TOML file: read, checked, evaluated, and given back as results and rows.
+
+The file names the outputs as expressions, the inputs with what is known of each, and their correlations. Every mistake is
+an error that names file and key.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.content import content_of, text_of
+from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
+from cmm_uq.base.files.toml import toml_of
+from cmm_uq.base.messages import Text, say
+from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
+from cmm_uq.maths.uncertainty.distributions import Distribution
+from cmm_uq.maths.uncertainty.evaluation import Evaluation, Request, evaluate
+from cmm_uq.maths.uncertainty.expression import Expression, name_problem, parse
+from cmm_uq.maths.uncertainty.input_keys import DIFFERENCES, NUMERIC, distribution_from
+from cmm_uq.maths.uncertainty.located import Located
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.model_tables import MODEL, TEXTS, TOP
+from cmm_uq.maths.uncertainty.ready_budget import KEY, ReadyBudget, read_ready_budget
+from cmm_uq.maths.uncertainty.ready_model import READY, ready_model
+from cmm_uq.maths.uncertainty.stated_units import derived_unit, number_in, unit_of
+from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
+
+_SMALLEST, _LARGEST = 1e-70, 1e70
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFile:
+    """What a model file says.
+
+    Parameters
+    ----------
+    title : of the page; the file's name when the file has none.
+    expressions : the outputs as written.
+    model : inputs, outputs and correlations.
+    request : method, coverage, digits and seed asked for.
+    labels : units and origins.
+    descriptions : of the inputs, where given.
+    content : the file's bytes.
+    """
+
+    title: str
+    expressions: Mapping[str, Expression]
+    model: MeasurementModel
+    request: Request
+    labels: Labels
+    descriptions: Mapping[str, str]
+    content: bytes
+
+    @property
+    def how(self) -> Text:
+        """In words, to follow "Evaluated"."""
+        return say("by the law of propagation of uncertainty and by Monte Carlo")
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes."""
+        return hashlib.sha256(self.content).hexdigest()
+
+    def evaluate(self, seed: int | None = None) -> Evaluation:
+        """Evaluate it, with another seed where one is given."""
+        request = self.request if seed is None else replace(self.request, seed=seed)
+        return evaluate(self.model, request, self.labels)
+
+    def further(self) -> dict[str, Any]:
+        """Keys of results.json beside those of every budget: none."""
+        return {}
+
+
+def read_model_file(path: Path) -> ModelFile | ReadyBudget:
+    """Read and check a model file, or one with a ready budget.
+
+    Raises
+    ------
+    CmmUqError : the file cannot be read, is no TOML, or a key is unknown, missing, of the wrong kind or contradicting.
+    """
+    content = content_of(path, MODEL_BYTES, "Name the TOML file of the measurement model")
+    text = text_of(content, str(path))
+    try:
+        data = toml_of(text, str(path), most_word=TEXT.most, most_listed=DRAWS.most)
+    except tomllib.TOMLDecodeError as error:
+        raise CmmUqError(f"is not TOML: {error}", where=str(path), fix="Mend the line that it names") from error
+    if KEY in data:
+        return read_ready_budget(content, path)
+    return _Reader(str(path)).model_file(data, path.stem, content)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """The checks, each of which says file and key."""
+
+    file: str
+
+    def model_file(self, data: Mapping[str, Any], stem: str, content: bytes) -> ModelFile:
+        self._known(data, TOP, "")
+        model, given = self._table(data, "model", ""), self._table(data, "inputs", "")
+        correlation = self._correlation(data)
+        if not given:
+            raise CmmUqError("there are no inputs", where=self.file, fix="Describe each in a table [inputs.<name>]")
+        self._known(model, MODEL, "[model]")
+        inputs = {name: self._input(name, keys) for name, keys in given.items()}
+        inputs, within = self._simultaneous(inputs, given)
+        for a, b in within:
+            if (a, b) in correlation or (b, a) in correlation:
+                raise CmmUqError(
+                    f"the correlation of {a} and {b} follows from their simultaneous readings",
+                    where=self._where("[correlation]"),
+                    fix="Leave the line out",
+                )
+        joint = {**within, **correlation}
+        if "ready" in model:
+            expressions: dict[str, Expression] = {}
+            with self._located(""):
+                whole, own = ready_model(
+                    model, inputs, {name: keys.get("unit", "") for name, keys in given.items()}, joint
+                )
+            labels = replace(own, origins={**own.origins, **_origins(given)})
+        else:
+            expressions = self._outputs(model, inputs)
+            whole = MeasurementModel(
+                lambda **values: {name: expression(values) for name, expression in expressions.items()},
+                inputs,
+                list(expressions),
+                joint,
+            )
+            labels = self._labels(given, model, expressions)
+        with self._located(""):
+            _ = whole.correlation_matrix
+        return ModelFile(
+            self._text(model, "title", "[model]") or stem,
+            expressions,
+            whole,
+            self._request(model),
+            labels,
+            ({say("Ready model"): READY[model["ready"]].title} if "ready" in model else {})
+            | {name: keys["description"] for name, keys in given.items() if "description" in keys},
+            content,
+        )
+
+    def _where(self, key: str) -> str:
+        return f"{self.file} {key}".strip()
+
+    def _located(self, key: str) -> Located:
+        return Located(self._where(key))
+
+    def _known(self, table: Mapping[str, Any], allowed: tuple[str, ...], key: str) -> None:
+        for name in table:
+            if name not in allowed:
+                raise CmmUqError(f"there is no key {name!r}", where=self._where(key), fix=suggestion(name, allowed))
+
+    def _table(self, data: Mapping[str, Any], name: str, within: str) -> Mapping[str, Any]:
+        if name not in data:
+            raise CmmUqError(f"[{name}] is missing", where=self._where(within), fix=f"Add a table [{name}]")
+        if not isinstance(data[name], dict):
+            raise CmmUqError(f"{name} is not a table", where=self._where(within), fix=f"Write it as [{name}]")
+        found: Mapping[str, Any] = data[name]
+        if len(found) > INPUTS.most:
+            raise CmmUqError(
+                f"{name} has {len(found)} entries", where=self._where(within), fix=f"{INPUTS.most} are the most"
+            )
+        return found
+
+    def _text(self, table: Mapping[str, Any], name: str, key: str) -> str:
+        if not isinstance(table.get(name, ""), str):
+            raise CmmUqError(f"{name} is not text", where=self._where(key), fix='Put it in quotes: "…"')
+        return str(table.get(name, ""))
+
+    def _number(self, number: Any, key: str) -> float:
+        if isinstance(number, bool) or not isinstance(number, (int, float)) or not isfinite(number):
+            raise CmmUqError(f"{number!r} is not a finite number", where=self._where(key), fix="Write it as in 0.05")
+        if number and not _SMALLEST < abs(number) < _LARGEST:
+            problem = f"{number:g} is too {'large' if abs(number) > 1 else 'small'} to be squared and added up"
+            raise CmmUqError(problem, where=self._where(key), fix="State it in another unit")
+        return float(number)
+
+    def _input(self, name: str, keys: Any) -> Distribution:
+        key = f"[inputs.{name}]"
+        if problem := name_problem(name):
+            raise CmmUqError(problem, where=self._where(key), fix="Choose another name")
+        if not isinstance(keys, dict):
+            raise CmmUqError(f"{name} is not a table", where=self._where("[inputs]"), fix=f"Write it as {key}")
+        self._known(keys, (*TEXTS, *sorted(NUMERIC)), key)
+        for text in TEXTS:
+            self._text(keys, text, key)
+        if keys.get("unit"):
+            unit_of(keys["unit"], self._where(f"{key} unit"))
+        numbers = {k: self._numbers(keys, k, f"{key} {k}") for k in keys if k in NUMERIC}
+        kind = keys.get("distribution") or ("t" if "samples" in numbers else None)
+        with self._located(key):
+            if kind is None:
+                raise CmmUqError("'distribution' is missing", fix="Give one, such as 'normal' or 'rectangular'")
+            return distribution_from(kind, numbers)
+
+    def _numbers(self, keys: Mapping[str, Any], name: str, key: str) -> Any:
+        given = keys[name]
+        if name == "samples":
+            if not isinstance(given, list):
+                raise CmmUqError("samples is not a list", where=self._where(key), fix="Write it as in [1.2, 1.3]")
+            return np.array([self._number(sample, key) for sample in given])
+        if isinstance(given, str):
+            return number_in(given, keys.get("unit", ""), difference=name in DIFFERENCES, where=self._where(key))
+        return self._number(given, key)
+
+    def _simultaneous(
+        self, inputs: Mapping[str, Distribution], given: Mapping[str, Any]
+    ) -> tuple[dict[str, Distribution], dict[tuple[str, str], float]]:
+        """Inputs read together, marked by the same ``simultaneous``, with the correlations of their readings."""
+        found = dict(inputs)
+        correlations: dict[tuple[str, str], float] = {}
+        sets: dict[str, list[str]] = {}
+        for name, keys in given.items():
+            if keys.get("simultaneous"):
+                sets.setdefault(keys["simultaneous"], []).append(name)
+        for label, names in sets.items():
+            key = f"[inputs.{names[0]}] simultaneous"
+            for name in names:
+                if "samples" not in given[name]:
+                    raise CmmUqError(f"{name} has no samples", where=self._where(key), fix="Give its readings")
+            kinds = {inputs[name].kind for name in names}
+            if kinds == {"sampled"}:
+                lengths = {len(given[name]["samples"]) for name in names}
+                if len(lengths) != 1:
+                    raise CmmUqError("the numbers of draws differ", where=self._where(key), fix="Give whole rows")
+                found.update({name: replace(inputs[name], together=label) for name in names})
+            elif kinds <= {"normal", "t"}:
+                with self._located(key):
+                    joint = simultaneous_readings({name: given[name]["samples"] for name in names})
+                correlations.update(joint.correlation)
+            else:
+                raise CmmUqError("readings and draws are mixed", where=self._where(key), fix="Use one distribution")
+        return found, correlations
+
+    def _outputs(self, model: Mapping[str, Any], inputs: Mapping[str, Distribution]) -> dict[str, Expression]:
+        outputs = self._table(model, "outputs", "[model]")
+        if not outputs:
+            raise CmmUqError("there are no outputs", where=self._where("[model]"), fix='outputs = { y = "…" }')
+        parsed = {}
+        for name in outputs:
+            where = self._where(f"[model] outputs.{name}")
+            problem = name_problem(name) or (f"{name!r} is also an input" if name in inputs else None)
+            if problem:
+                raise CmmUqError(problem, where=where, fix="Choose another name")
+            parsed[name] = parse(self._text(outputs, name, f"[model] outputs.{name}"), inputs.keys(), where)
+        return parsed
+
+    def _correlation(self, data: Mapping[str, Any]) -> dict[tuple[str, str], float]:
+        pairs: dict[tuple[str, str], float] = {}
+        for key, number in self._table({"correlation": {}, **data}, "correlation", "").items():
+            names = [name.strip() for name in key.split(",")]
+            if len(names) != 2:
+                raise CmmUqError(
+                    f"{key!r} is not a pair of inputs", where=self._where("[correlation]"), fix='Write "x1,x2" = 0.9'
+                )
+            pairs[names[0], names[1]] = self._number(number, f"[correlation] {key}")
+        return pairs
+
+    def _request(self, model: Mapping[str, Any]) -> Request:
+        asked: dict[str, Any] = {}
+        if "method" in model:
+            asked["method"] = self._text(model, "method", "[model] method")
+        if "coverage" in model:
+            asked["coverage"] = self._number(model["coverage"], "[model] coverage")
+        for name in ("digits", "seed"):
+            if name in model:
+                number = self._number(model[name], f"[model] {name}")
+                if number != int(number):
+                    raise CmmUqError(f"{number} is not an integer", where=self._where(f"[model] {name}"))
+                asked[name] = int(number)
+        with self._located("[model]"):
+            return Request(**asked)
+
+    def _labels(
+        self, given: Mapping[str, Any], model: Mapping[str, Any], expressions: Mapping[str, Expression]
+    ) -> Labels:
+        units = {name: keys.get("unit", "") for name, keys in given.items()}
+        stated = self._table({"units": {}, **model}, "units", "[model]")
+        self._known(stated, tuple(expressions), "[model] units")
+        for name, expression in expressions.items():
+            unit = self._text(stated, name, "[model] units")
+            if unit:
+                unit_of(unit, self._where(f"[model] units.{name}"))
+            elif any(units[used] not in ("", "1") for used in expression.names):
+                unit = derived_unit(expression, units) or ""
+            units[name] = unit
+        return Labels(units, _origins(given))
+
+
+def _origins(given: Mapping[str, Any]) -> dict[str, str]:
+    """Where the figures of each input come from."""
+    return {
+        name: keys.get("source") or (REPEATS if "samples" in keys else say("not stated"))
+        for name, keys in given.items()
+    }

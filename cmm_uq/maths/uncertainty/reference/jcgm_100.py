@@ -1,0 +1,181 @@
+"""Reference cases of JCGM 100:2008 (GUM), annex H."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.maths.uncertainty.correlation import correlation_of
+from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
+from cmm_uq.maths.uncertainty.distributions import (
+    arcsine,
+    normal,
+    rectangular,
+)
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.propagation import first_order, second_order
+from cmm_uq.maths.uncertainty.reference.case import Figures, ReferenceCase
+from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.type_a import simultaneous_readings, straight_line
+
+READINGS = {
+    "V": [5.007, 4.994, 5.005, 4.990, 4.999],
+    "I": [19.663e-3, 19.639e-3, 19.640e-3, 19.685e-3, 19.678e-3],
+    "phi": [1.0456, 1.0438, 1.0468, 1.0428, 1.0433],
+}
+"""Table H.2: five simultaneous readings of voltage (V), current (A) and phase (rad)."""
+
+
+def end_gauge() -> MeasurementModel:
+    """JCGM 100:2008 annex H.1, nm and °C."""
+    return MeasurementModel(
+        comparison,
+        {
+            "ls": normal(50_000_623.0, 25.0, 18),
+            "d": normal(215.0, 5.8, 24),
+            "d1": normal(0.0, 3.9, 5),
+            "d2": normal(0.0, 6.7, 8),
+            "a": rectangular(9.5e-6, 13.5e-6),
+            "t": normal(-0.1, 0.2),
+            "swing": arcsine(-0.5, 0.5),
+            "da": rectangular(-1e-6, 1e-6, dof=50),
+            "dt": rectangular(-0.05, 0.05, dof=2),
+        },
+    )
+
+
+def comparison(ls: Any, d: Any, d1: Any, d2: Any, a: Any, t: Any, swing: Any, da: Any, dt: Any) -> Any:
+    """Length at 20 °C of a gauge from that of the standard, their difference, and what warmth makes of it (equation H.2)."""
+    return ls + d + d1 + d2 - ls * (da * (t + swing) + a * dt)
+
+
+def _end_gauge() -> Figures:
+    first, second = first_order(end_gauge()), second_order(end_gauge())
+    part = dict(zip(first.inputs, np.abs(first.contribution[0]).tolist(), strict=True))
+    k = float(coverage_factor(first.dof, 0.99)[0])
+    name = list(first.inputs).index
+    bent = second.bending[0]
+    return {
+        "length, nm": float(first.value[0]),
+        "u, nm": float(first.u[0]),
+        "ν": float(first.dof[0]),
+        "t99": k,
+        "U99, nm": k * float(first.u[0]),
+        "u(ls)": part["ls"],
+        "u(d)": float(np.sqrt(part["d"] ** 2 + part["d1"] ** 2 + part["d2"] ** 2)),
+        "u(δα)": part["da"],
+        "u(δθ)": part["dt"],
+        "second order, δα and θ": float(np.sqrt(bent[name("t"), name("da")] + bent[name("swing"), name("da")])),
+        "u with second order, nm": float(second.u[0]),
+    }
+
+
+def _impedance() -> Figures:
+    joint = simultaneous_readings(READINGS)
+    outputs = ("R", "X", "Z")
+
+    def model(**q: Any) -> dict[str, Any]:
+        z = q["V"] / q["I"]
+        return {"R": z * np.cos(q["phi"]), "X": z * np.sin(q["phi"]), "Z": z}
+
+    found = first_order(MeasurementModel(model, joint.inputs, outputs, joint.correlation))
+    r = correlation_of(found.covariance)
+    low, high = found.interval(0.95)
+    figures: dict[str, float] = {}
+    for k, name in enumerate(outputs):
+        figures |= {
+            name: float(found.value[k]),
+            f"u({name})": float(found.u[k]),
+            f"ν({name})": float(found.dof[k]),
+            f"U95({name})": float(high[k] - low[k]) / 2,
+        }
+    return figures | {"r(R,X)": float(r[0, 1]), "r(R,Z)": float(r[0, 2]), "r(X,Z)": float(r[1, 2])}
+
+
+def _thermometer() -> Figures:
+    t = [21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511]
+    b = [-0.171, -0.169, -0.166, -0.159, -0.164, -0.165, -0.156, -0.157, -0.159, -0.161, -0.160]
+    line = straight_line(t, b, reference=20.0)
+    at_30, u_30 = line.at(30.0)
+    return {
+        "intercept": line.intercept,
+        "slope": line.slope,
+        "u(intercept)": float(np.sqrt(line.covariance[0, 0])),
+        "u(slope)": float(np.sqrt(line.covariance[1, 1])),
+        "r": float(correlation_of(line.covariance)[0, 1]),
+        "s": line.residual_sd,
+        "b(30 °C)": float(at_30),
+        "u(b(30 °C))": float(u_30),
+    }
+
+
+def _rounding() -> Figures:
+    value, u = rounded(10.05762, 0.02712)
+    return {"value": float(value), "u": float(u)}
+
+
+CASES: Sequence[ReferenceCase] = (
+    ReferenceCase(
+        "End gauge by comparison",
+        "JCGM 100:2008 annex H.1",
+        {
+            "length, nm": (50_000_838, 0.5),
+            "u, nm": (31.66, 0.005),
+            "ν": (16.75, 0.005),
+            "t99": (2.92, 0.005),
+            "U99, nm": (92.5, 0.05),
+            "u(ls)": (25, 0.05),
+            "u(d)": (9.682, 0.005),
+            "u(δα)": (2.887, 0.0005),
+            "u(δθ)": (16.599, 0.0005),
+            "second order, δα and θ": (11.73, 0.05),
+            "u with second order, nm": (33.8, 0.05),
+        },
+        _end_gauge,
+    ),
+    ReferenceCase(
+        "Resistance, reactance and impedance from simultaneous readings",
+        "JCGM 100:2008 annex H.2",
+        {
+            "R": (127.7322, 5e-5),
+            "X": (219.8465, 5e-5),
+            "Z": (254.2597, 5e-5),
+            "u(R)": (0.07107, 5e-6),
+            "u(X)": (0.29558, 5e-6),
+            "u(Z)": (0.23634, 5e-6),
+            "r(R,X)": (-0.588, 5e-4),
+            "r(R,Z)": (-0.485, 5e-4),
+            "r(X,Z)": (0.9925, 5e-5),
+            "ν(R)": (4, 1e-6),
+            "ν(X)": (4, 1e-6),
+            "ν(Z)": (4, 1e-6),
+            "U95(R)": (0.197, 5e-4),
+            "U95(X)": (0.821, 5e-4),
+            "U95(Z)": (0.656, 5e-4),
+        },
+        _impedance,
+    ),
+    ReferenceCase(
+        "Thermometer calibration line",
+        "JCGM 100:2008 annex H.3",
+        {
+            "intercept": (-0.17120, 5e-6),
+            "slope": (0.0021827, 5e-6),
+            "u(intercept)": (0.00288, 5e-6),
+            "u(slope)": (0.000668, 1e-6),
+            "r": (-0.9304, 1e-4),
+            "s": (0.0035, 5e-5),
+            "b(30 °C)": (-0.1494, 5e-5),
+            "u(b(30 °C))": (0.0041, 5e-5),
+        },
+        _thermometer,
+    ),
+    ReferenceCase(
+        "Rounding of a result",
+        "JCGM 100:2008 7.2.6, ILAC-P14:09/2020",
+        {"value": (10.058, 0), "u": (0.027, 0)},
+        _rounding,
+    ),
+)

@@ -1,8 +1,0 @@
-"""One model of a measurement, forward and inverse: the simulator draws from exactly what the estimator fits."""
-
-from __future__ import annotations
-
-from cmm_uq.model.drawn_noise import Noise
-from cmm_uq.model.measurement import Estimate, MeasurementModel
-
-__all__ = ["Estimate", "MeasurementModel", "Noise"]

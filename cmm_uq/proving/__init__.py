@@ -1,7 +1,0 @@
-"""Proof of the diagnosis on a laboratory's own set-ups: sealed cases, what was found of them, and how it is judged.
-
-Cases are drawn by the forward model of the job itself (:mod:`~cmm_uq.proving.design`), their truth is sealed by a hash
-before the first of them is diagnosed (:mod:`~cmm_uq.proving.sealed`), processes diagnose them
-(:mod:`~cmm_uq.proving.running`), and what they say is compared with the truth (:mod:`~cmm_uq.proving.judged`). Knows no
-kind of measurement, and not how a job is diagnosed.
-"""

@@ -1,1 +1,0 @@
-"""Reference cases: published figures that the engine reproduces, run by :mod:`cmm_uq.uncertainty.selftest`."""

@@ -1,0 +1,203 @@
+"""A complete test of each characteristic, with one value that is known; also incomplete, copied, or without u."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from cmm_uq.artefacts import artefact_facts
+from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.gauge_lines.observe import StepGauge
+from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.base.points import Floats, Points
+from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, TestUncertainty
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.maths.uncertainty.quantity import Quantity
+from tests.analysis.conformity.recorded import BAR_U, DIAGONALS, MACHINE, NEGLIGIBLE, SEVEN, STATED, bars, gauge, sphere
+from tests.recordings import bar_facts, with_columns
+
+X, Y, Z = np.eye(3)
+
+
+def changing(u_um: float) -> Circumstances:
+    """With so much that changes between repeated readings."""
+    return replace(STATED, uncertainty=TestUncertainty(negligible=NEGLIGIBLE, u_repeat_um=u_um))
+
+
+FACES = [np.array(d, dtype=float) for d in ((900, 550, 0), (900, -550, 0), (0, 550, 500), (0, 550, -500), (900, 0, 500),
+                                            (900, 0, -500))]  # fmt: skip
+ERROR = 5.0
+"""µm, of the one length that is off."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A test and the one value that decides it.
+
+    Parameters
+    ----------
+    artefact, circumstances, accuracy : of the test.
+    value, u : of that value, µm.
+    signed : whether its limit has two sides.
+    """
+
+    artefact: Artefact
+    circumstances: Circumstances
+    accuracy: Mapping[str, Quantity]
+    value: float
+    u: float
+    signed: bool
+
+
+def lengths(
+    directions: list[Floats], count: int = 5, offset: Floats | None = None, longest: float = 0.7
+) -> Callable[..., Hand]:
+    """Errors of lengths: 5 µm of the second, where the gauge of 0.4 µm in 800 mm has u = 0.1 µm in 200 mm."""
+
+    def made(how: str) -> Hand:
+        chosen = directions[:-1] if how == "incomplete" else directions
+        every = [list(equally_spaced(direction, count, longest)) for direction in chosen]
+        off = (1, 2) if how != "one repeat out" else (2,)
+        artefact = gauge(chosen, every, errors={(1, repeat, every[0][1]): -ERROR for repeat in off},
+                         u_um=None if how == "no u" else "L/2000")  # fmt: skip
+        points = artefact.points
+        if how == "copied":
+            xyz = points.xyz.copy()
+            last = points.measurement == len(chosen)
+            xyz[last & (points.repeat == 3)] = xyz[last & (points.repeat == 1)]
+            points = points.at(xyz)
+        if offset is not None:
+            points = with_columns(
+                points, **{f"tip_{a}_mm": np.full(len(points), offset[i]) for i, a in enumerate("xyz")}
+            )
+        facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=None if how == "no u" else "L/2000")
+        return Hand(StepGauge(facts, points), STATED, {}, ERROR, 0.1 * every[0][1] / 200.0, True)
+
+    return made
+
+
+def equally_spaced(direction: Floats, count: int, longest: float) -> Floats:
+    """20 mm, and others equally spaced up to so much of the travel along a line; for one length 20 mm alone."""
+    u = np.abs(direction) / np.linalg.norm(direction)
+    travel = min(size / part for size, part in zip((900.0, 550.0, 500.0), u, strict=True) if part > 1e-9)
+    if count == 1:
+        return np.array([20.0, 40.0])
+    return np.round(np.linspace(20.0, longest * travel, count))
+
+
+def ranges(how: str) -> Hand:
+    """The range of three repeats, one of which is 5 µm off; u = 0.2 µm is stated."""
+    lines = SEVEN[:-1] if how == "incomplete" else SEVEN
+    every = [list(equally_spaced(direction, 5, 0.7)) for direction in lines]
+    artefact = gauge(lines, every, errors={(1, 2, every[0][1]): ERROR})
+    points = artefact.points
+    if how == "copied":
+        xyz = points.xyz.copy()
+        xyz[(points.measurement == 7) & (points.repeat == 3)] = xyz[(points.measurement == 7) & (points.repeat == 1)]
+        points = points.at(xyz)
+    facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000")
+    stated = changing(0.0 if how == "no u" else 0.2)
+    return Hand(StepGauge(facts, points), stated, {}, ERROR, 0.2, False)
+
+
+def volumetric(how: str) -> Hand:
+    """A range of 15 µm; u = 0.5 µm is stated."""
+    made = bars(lengths=[300.0] * 20)
+    if how == "incomplete":
+        made = bars([(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    if how == "copied":
+        xyz = made.points.xyz.copy()
+        xyz[made.points.measurement == 18] = xyz[made.points.measurement == 14]
+        made = Ballbar(bar_facts(300.0, BAR_U), made.points.at(xyz))
+    under = changing(0.0 if how == "no u" else 0.5)
+    return Hand(made, under, {"b89_range_um": Quantity(15.0, 3.0, (9.0, 21.0), "µm")}, 15.0, 0.5, False)
+
+
+def opposite_tips(how: str) -> Hand:
+    """Four diagonals, tips to both sides; on one the bar is 10 µm longer one way."""
+    directions = [(0, 1, 1), (0, -1, 1), (1, 0, 1), (-1, 0, 1)][: 3 if how == "incomplete" else 4]
+    made = bars([d for d in directions for _ in (0, 1)], lengths=[300.01, 300.0, *[300.0] * (2 * len(directions) - 2)])
+    points = made.points
+    tips = np.zeros((len(points), 3))
+    for i, direction in enumerate(directions):
+        axis = int(np.flatnonzero(np.array(direction) == 0)[0])
+        for side in (0, 1):
+            tips[points.measurement == 2 * i + side + 1, axis] = 200.0 * (1 - 2 * side)
+    points = with_columns(points, **{f"tip_{a}_mm": tips[:, i] for i, a in enumerate("xyz")})
+    if how == "copied":
+        xyz = points.xyz.copy()
+        xyz[points.measurement == 8] = xyz[points.measurement == 7]
+        points = points.at(xyz)
+    stated = changing(0.0 if how == "no u" else 0.2)
+    return Hand(Ballbar(bar_facts(300.0, BAR_U), points), stated, {}, 10.0, 0.2, True)
+
+
+def fixed_ball(how: str) -> Hand:
+    """One sphere ten times in its place, once 5 µm to the side."""
+    one = sphere(height_um=0.0).points
+    count = 9 if how == "incomplete" else 10
+    moved = np.array([[1e-6 * i, 0.0, ERROR * 1e-3 * (i == 3)] for i in range(count)])
+    if how == "copied":
+        moved[5] = moved[4]
+    xyz = np.vstack([one.xyz + shift for shift in moved])
+    repeat = np.repeat(np.arange(1, count + 1), len(one))
+    points = Points(xyz, np.ones_like(repeat), np.tile(one.point, count), repeat, MACHINE)
+    facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.2)
+    stated = changing(0.0 if how == "no u" else 0.2)
+    return Hand(Sphere(facts, points), stated, {}, ERROR, 0.2, False)
+
+
+def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
+    """A sphere of 25 points. Form: 0.1 µm for half of 0.2 µm; size: 0.1 µm of its diameter, which is 4 µm too large."""
+
+    def made(how: str) -> Hand:
+        artefact = sphere(points=24 if how == "incomplete" else 25, copied=1 if how == "copied" else 0, height_um=6.0,
+                          form_um=None if how == "no u" and not size else 0.2)  # fmt: skip
+        facts = artefact_facts(kind="sphere", length_mm=24.99, u_um=None if how == "no u" else 0.1,
+                               form_um=None if how == "no u" else 0.2)  # fmt: skip
+        artefact = Sphere(facts, artefact.points)
+        found = artefact.probed()
+        value = float((found.size if size else found.form)[0]) * 1e3
+        under = replace(STATED, probe=ProbeFacts(sensing=sensing))
+        if not size:
+            under = replace(under, uncertainty=TestUncertainty(u_form_um=0.0 if how == "no u" else 1e-6))
+        return Hand(artefact, under, {}, value, 0.1, size)
+
+    return made
+
+
+E0 = lengths(SEVEN)
+TESTS: Mapping[tuple[str, str], Callable[[str], Hand]] = {
+    ("ASME B89.4.1-1997", "volumetric performance"): volumetric,
+    ("ASME B89.4.1-1997", "repeatability"): fixed_ball,
+    ("ASME B89.4.1-1997", "linear displacement accuracy"): lengths([X, Y, Z], 10),
+    ("ASME B89.4.1-1997", "offset probe performance"): opposite_tips,
+    ("ASME B89.4.1-1997", "bidirectional length"): lengths([X, Y, Z, X + Y + Z], 1),
+    ("ASME B89.4.10360.2-2008", "E0"): E0,
+    ("ASME B89.4.10360.2-2008", "R0"): ranges,
+    ("ASME B89.4.10360.2-2008", "E150"): lengths(FACES[2:4], offset=np.array([150.0, 0.0, -200.0])),
+    ("ISO 10360-2:2009", "E0"): E0,
+    ("ISO 10360-2:2009", "R0"): ranges,
+    ("ISO 10360-2:2009", "E150"): lengths(FACES[4:], offset=np.array([0.0, -150.0, -200.0])),
+    ("ISO 10360-5:2010", "P_FTU"): probed(size=False),
+    ("ISO 10360-5:2010", "P_STU"): probed(size=True),
+    ("ISO 10360-5:2020", "P_Form.Sph.1x25:SS:Tact"): probed(size=False, sensing="contacting"),
+    ("ISO 10360-5:2020", "P_Size.Sph.1x25:SS:Tact"): probed(size=True, sensing="contacting"),
+    ("ISO 10360-8:2013", "P_Form.Sph.1x25:Tr:ODS"): probed(size=False, sensing="optical"),
+    ("ISO 10360-8:2013", "P_Size.Sph.1x25:Tr:ODS"): probed(size=True, sensing="optical"),
+    ("VDI/VDE 2617", "E0"): E0,
+    ("VDI/VDE 2617-2.1", "U3"): lengths(DIAGONALS),
+    ("VDI/VDE 2617-2.1", "U1"): lengths([X, Y, Z]),
+    ("VDI/VDE 2617-2.1", "U2"): lengths(FACES),
+}
+"""By standard and characteristic."""
+
+
+@cache
+def by_hand(standard: str, characteristic: str, how: str) -> Hand:
+    """A test that is ``complete``, ``incomplete``, ``copied``, has ``no u`` or ``one repeat out``."""
+    made = TESTS[standard, characteristic](how)
+    return replace(made, accuracy=dict(made.accuracy))

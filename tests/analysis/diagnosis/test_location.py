@@ -1,0 +1,222 @@
+"""Where a curve is large, and the curve itself, against the kernel form of the same Gaussian process."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN
+from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.analysis.diagnosis.location import located, region_of
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.physics.effect import Nonparametric
+
+PLACES = 10.0 * np.arange(7)
+
+
+@pytest.mark.parametrize(
+    ("curve", "region"),
+    [
+        ([0, 1, 2, 4, 2, 1, 0], (20.0, 40.0)),  # half of the largest belongs to it
+        ([0, 1, 1.99, 4, 2.01, 1, 0], (30.0, 40.0)),
+        ([0, -1, -3, -4, -3, -1, 0], (20.0, 40.0)),
+        ([-4, 3, 1, 0, 3, 3, 3], (0.0, 10.0)),  # what lies apart does not
+        ([3, 0, 1, 0, 2, 3, 5], (50.0, 60.0)),
+        ([3, 3, 3, 4, 3, 3, 3], (0.0, 60.0)),
+        ([0, 0, 0, 0, 0, 0, -1], (60.0, 60.0)),
+        ([2, 0, 0, 0, 0, 0, 0], (0.0, 0.0)),
+        ([3, 4, -3, 1, 0, 0, 0], (0.0, 20.0)),
+    ],
+)
+def test_the_region_is_where_the_curve_exceeds_half_of_its_largest_value(
+    curve: list[float], region: tuple[float, float]
+) -> None:
+    assert region_of(PLACES, np.array(curve, dtype=np.float64)) == region
+
+
+X = np.array([5.0, 1.0, 3.0, 1.0, 8.0, 6.0, 2.0, 9.0, 4.0, 7.0, 0.0, 10.0])
+"""A covariate of twelve observations, not in order; 1.0 occurs twice."""
+NULL = np.linspace(0.0, 1.0, 101)
+AMPLITUDE, LEAST = 3.0, 1e-4
+
+
+def term(
+    *members: Floats, columns: Floats | None = None, kind: str = UNKNOWN, name: str | None = "z_mm",
+    is_like: Any = None, form: Nonparametric | None = None,
+) -> Any:  # fmt: skip
+    """An explanation with one version a member, each of functions (n, r) of the covariate; they act on readings ten times."""
+    each = [SimpleNamespace(values=m, columns=10.0 * m if columns is None else columns) for m in members]
+    return SimpleNamespace(
+        kind=kind, covariate_name=name, covariate=X, members=each, name=f"function of {name}", term=form,
+        could_be=lambda effect: effect is is_like,
+    )  # fmt: skip
+
+
+def compared(
+    data: Floats, *terms: Any, log_odds: tuple[float, ...] = (50.0,), p_value: float = 0.0, without_mean: bool = False,
+    evidence: Floats | None = None, beside: dict[int, dict[int, float]] | None = None,
+) -> Any:  # fmt: skip
+    """What is read of a comparison: twice the noise on every observation, and a baseline of nothing, or of a constant.
+
+    ``beside`` says which log odds the others keep beside the one that was last given.
+    """
+
+    def rest(columns: Floats) -> Floats:
+        return columns - columns.mean(axis=0) if without_mean else columns
+
+    def each(*_: object) -> Any:
+        count = len(terms[0].members)
+        cube = np.log(np.ones(count) if evidence is None else 1e3 * evidence)[:, None, None]
+        yield SimpleNamespace(r=1, member=np.arange(count)), cube
+        yield SimpleNamespace(r=2, member=np.arange(count)), cube[::-1]
+
+    def weighed(given: Any, among: Any) -> Any:
+        kept = (beside or {}).get(given[-1].explanation, {}) if given else {}
+        return {
+            i: (kept.get(i, log_odds[i]) + (7.0 if given else 0.0), Version(i, 0, AMPLITUDE)) for i in range(len(terms))
+        }
+
+    comparison = SimpleNamespace(
+        noise_scale=np.full(12, 2.0), rest=rest, left=rest(data), least_noise=LEAST, each=each,
+        degrees_of_freedom=12 - without_mean,
+        beside=weighed, log_evidence_of=lambda given: np.array([7.0]),
+    )  # fmt: skip
+    artefact = SimpleNamespace(rows=np.arange(12)[:, None], points=range(12))
+    return SimpleNamespace(
+        model=SimpleNamespace(artefact=artefact, used=np.ones(12, dtype=bool)),
+        p_value=p_value,
+        explanations=terms,
+        comparison=comparison,
+        null_maximum=NULL,
+        log_odds=np.array(log_odds),
+    )
+
+
+def bent(x: Floats) -> Floats:
+    return np.column_stack([np.sin(x), np.cos(0.7 * x), x**2 / 50])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("exact", [False, True])
+def test_the_curve_is_that_of_kriging(exact: bool, sign: float) -> None:
+    """Prior covariance a²v·VVᵀ, noise v: mean a²VLᵀ(a²LLᵀ + 1)⁻¹y (Rasmussen & Williams 2006, 2.25–26), with v of the
+    residuals of least squares, or the least noise where these are less.
+    """
+    V, L = bent(np.unique(X)), 5.0 * bent(X)
+    data = sign * L @ [2e-3, -1e-3, 4e-3] + (0.0 if exact else 1e-3) * np.random.default_rng(5).standard_normal(12)
+    (place,) = located(compared(data, term(bent(X))), 0.01)
+    rest = data - L @ np.linalg.lstsq(L, data, rcond=None)[0]
+    v = LEAST**2 if exact else rest @ rest / 9
+    solved = AMPLITUDE**2 * np.linalg.solve(AMPLITUDE**2 * L @ L.T + np.eye(12), np.column_stack([data, L @ V.T]))
+    curve = V @ L.T @ solved[:, 0]
+    variance = AMPLITUDE**2 * v * np.diag(V @ V.T - V @ L.T @ solved[:, 1:])
+    x, found, u = place.curve
+    assert x.tolist() == np.unique(X).tolist()
+    np.testing.assert_allclose(found, 1e3 * curve, rtol=1e-8)
+    np.testing.assert_allclose(u, 1e3 * np.sqrt(variance), rtol=1e-6)
+    assert place.k == pytest.approx(
+        2.262157, abs=1e-6
+    )  # Student's t for nine degrees of freedom, 95 % (GUM table G.2: 2.26)
+    assured = np.abs(curve) > place.k * np.sqrt(variance)
+    assert place.amplitude_um == pytest.approx(1e3 * np.abs(curve)[assured].max())
+    assert place.region == region_of(x, curve, assured)
+    low, high, left = place.data
+    assert low.tolist() == high.tolist() == X.tolist()
+    np.testing.assert_allclose(left, 2e3 * data)  # what an observation leaves, not over its noise
+    assert (place.covariate, place.what) == ("z_mm", "function of z_mm")
+
+
+@pytest.mark.parametrize(("shown", "there"), [(0.0501, True), (0.0499, False)])
+def test_a_constant_of_which_hardly_anything_shows_is_no_part_of_the_curve(shown: float, there: bool) -> None:
+    """What the observations see of a constant is a twentieth of it, or a little less."""
+    wave = np.sin(2 * np.pi * X / 11.0)
+    values = np.column_stack([np.ones(12), wave - wave.mean()])
+    columns = 2.0 * values * [shown, 1.0]
+    data = values @ [1e-3 * shown, 2e-3]
+    (place,) = located(compared(data, term(values, columns=columns)), 0.01)
+    mean = place.curve[1].mean()
+    assert abs(mean) > 0.1 if there else abs(mean) < 1e-9
+
+
+def test_a_constant_that_the_baseline_absorbs_is_no_part_of_the_curve() -> None:
+    values = np.column_stack([np.ones(12), np.sin(X)])
+    data = 10.0 * values @ [5e-3, 2e-3]
+    (place,) = located(compared(data, term(values), without_mean=True), 0.01)
+    x, found, _ = place.curve
+    assert found.mean() == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(np.diff(found), 4.0 * np.diff(np.sin(x)), rtol=0.05, atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "region"),
+    [
+        # steps after 2, 4, 7 and 9: of 0.6, 0.3, 0.08 and 0.02 the first three are needed for 95 %
+        ([0.6, 0.3, 0.08, 0.02], (2.0, 8.0)),
+        ([0.02, 0.96, 0.01, 0.01], (4.0, 5.0)),
+        ([0.6, 0.352, 0.03, 0.018], (2.0, 5.0)),
+        ([0.07, 0.3, 0.03, 0.6], (2.0, 10.0)),
+        ([0.04, 0.92, 0.02, 0.02], (2.0, 5.0)),
+    ],
+)
+def test_a_jump_lies_where_it_is_with_95_percent(evidence: list[float], region: tuple[float, float]) -> None:
+    steps = [np.where(after < X, 1.0, 0.0)[:, None] for after in (2.0, 4.0, 7.0, 9.0)]
+    data = 1e-3 * steps[0][:, 0]
+    (place,) = located(compared(data, term(*steps), evidence=np.array(evidence)), 0.01)
+    assert place.region == region
+
+
+def test_functions_that_are_significant_are_told_the_most_significant_first() -> None:
+    data = 1e-2 * np.sin(X)
+    terms = [term(bent(X), name=name) for name in ("a", "b", "c", None)]
+    effect = term(bent(X), kind=EFFECT, name="d")
+    found = located(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0)), 0.05)
+    assert [place.covariate for place in found] == ["b", "a"]
+    assert found[0].p_value < found[1].p_value < 0.05
+    assert located(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0), p_value=0.05), 0.05) == ()
+    assert len(located(compared(data, terms[0], p_value=0.049), 0.05)) == 1
+
+
+def test_a_region_is_where_the_band_does_not_hold_zero() -> None:
+    """The largest value of all is not known to be anything; of what is, only what hangs together belongs to the region."""
+    curve = np.array([9.0, 2.0, 3.0, 4.0, 3.0, 2.5, 3.0])
+    assured = np.array([False, True, True, True, True, False, True])
+    assert region_of(PLACES, curve, assured) == (10.0, 40.0)
+
+
+def test_a_function_whose_band_holds_zero_everywhere_is_no_place() -> None:
+    noise = np.random.default_rng(11).standard_normal(12)
+    wild = 1e-2 * (noise - bent(X) @ np.linalg.lstsq(bent(X), noise, rcond=None)[0])
+    assert located(compared(wild + 1e-6 * np.sin(X), term(bent(X))), 0.01) == ()
+
+
+def test_what_fits_as_well_and_shows_nothing_more_is_named_with_the_first() -> None:
+    """Log odds of 9: within ln 20 of them 7, and not 5; neither keeps evidence beside the first."""
+    data = 1e-2 * np.sin(X)
+    terms = [term(bent(X), name=name) for name in "abc"]
+    (place,) = located(compared(data, *terms, log_odds=(7.0, 9.0, 5.0), beside={1: {0: 0.0, 2: 0.0}}), 0.05)
+    assert (place.covariate, place.also) == ("b", ("function of a",))
+
+
+def test_of_functions_that_fit_equally_well_the_one_with_the_form_of_what_was_found_is_named() -> None:
+    data, effect = 1e-2 * np.sin(X), term(bent(X), kind=EFFECT, name="effect")
+    form = Nonparametric("a", "y")
+    terms = [term(bent(X), name="a", is_like=effect, form=form), term(bent(X), name="b"), effect]
+    found = compared(data, *terms, log_odds=(7.0, 9.0, 9.0), beside={0: {1: 0.0}, 1: {0: 0.0}})
+    (place,) = located(found, 0.05, {2})
+    assert (place.covariate, place.along, place.scale, place.also) == ("a", "y", False, ("function of b",))
+    (place,) = located(found, 0.05)
+    assert (place.covariate, place.also) == ("b", ("function of a",))
+
+
+def test_a_further_place_is_told_with_what_it_carries_beside_the_first() -> None:
+    data = 1e-2 * np.sin(X)
+    terms = [term(bent(X), name=name) for name in "ab"]
+    first, second = located(compared(data, *terms, log_odds=(20.0, 19.0), beside={0: {1: 6.0}}), 0.05)
+    (alone,) = located(compared(data, terms[1], log_odds=(6.0,)), 0.05)
+    assert (first.covariate, second.covariate) == ("a", "b")
+    assert second.p_value == pytest.approx(alone.p_value)
+    assert first.p_value < second.p_value
+    assert first.also == ()

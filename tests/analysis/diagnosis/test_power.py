@@ -1,0 +1,88 @@
+"""Predicted power of the diagnosis, against recordings that are simulated and searched one by one."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from scipy import stats
+
+from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
+from cmm_uq.analysis.diagnosis.power import POWER, DrawnNoise, Power, powers, without_fault
+from cmm_uq.analysis.planning.noise import PlannedNoise
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.artefacts import artefact_of
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.physics.catalogue import effects
+from tests.analysis.planning.plans import BALLBAR, GAUGE, setting
+
+ALPHA = 0.01
+SETTING = setting(GAUGE, length_mm=820.0, repeats=1)
+POINTS = joined(ready_plan(SETTING)[1])
+
+
+@cache
+def predicted() -> dict[str, Power]:
+    model = without_fault(SETTING.observed, SETTING.model(POINTS), Noise(SETTING.sigma), 0)
+    rivals = effects(("rotation_y_y", "rotation_x_y", "rotation_y_x", "rotation_z_z"))
+    found = powers(model, rivals, stated=SETTING.sigma, sigma=SETTING.sigma, alpha=ALPHA, seed=0)
+    return {power.effect: power for power in found}
+
+
+def test_power_grows_with_the_effect_and_naming_needs_more_than_detection() -> None:
+    power = predicted()["rotation_y_y"]
+    assert power.detectable is not None
+    assert power.identifiable is not None
+    assert power.detectable <= power.identifiable
+    curve = [power.detected(part * power.detectable) for part in (0.3, 0.7, 1.0, 1.3, 2.0)]
+    assert curve == sorted(curve)
+    assert curve[2] >= POWER
+    assert np.all(power.named_at >= power.detected_at)
+
+
+def test_an_effect_that_moves_no_face_is_never_found() -> None:
+    """The ram turning about its own axis leaves the tip at its end where it is."""
+    power = predicted()["rotation_z_z"]
+    assert power.detectable is None
+    assert power.detected(1e3) == 0.0
+
+
+def test_twins_are_detected_and_never_named() -> None:
+    """On lines through one middle the pitch of X and the roll of Y bend the space diagonals alike."""
+    for name in ("rotation_x_y", "rotation_y_x"):
+        assert predicted()[name].detectable is not None
+        assert predicted()[name].identifiable is None
+        assert not np.isfinite(predicted()[name].named_at).any()
+
+
+def test_the_gate_opens_as_often_as_predicted() -> None:
+    """Six simulated recordings: the count lies within the central 99.9 % of the predicted binomial."""
+    power = predicted()["rotation_y_y"]
+    assert power.detectable is not None
+    acting = MeasurementModel(artefact_of(GAUGE, POINTS), effects(("rotation_y_y",)))
+    random = np.random.default_rng(12)
+    alarms = 0
+    for _ in range(6):
+        sizes = np.array([size.nominal + size.sd * random.standard_normal() for size in acting.artefact.sizes])
+        xyz = acting.simulate(np.array([power.detectable]), sizes, Noise(SETTING.sigma), random)
+        alarms += model_comparison(SETTING.model(POINTS.at(xyz)), SETTING.sigma, 0).p_value < ALPHA
+    low, high = stats.binom.interval(0.999, 6, power.detected(power.detectable))
+    assert low <= alarms <= high
+
+
+def test_drawn_noise_has_its_covariance() -> None:
+    """The product with the covariance, against the dense one of readings and offsets shared by repeats."""
+    chosen = setting(BALLBAR, repeats=2)
+    model = chosen.model(joined(ready_plan(chosen)[1]))
+    noise = PlannedNoise((1e-3, 1e-3, 1e-3), placing=2e-3)
+    values = np.array([unknown.prior_mean for unknown in model.unknowns])
+    drawn = DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)
+    measurement = model.artefact.measurement
+    dense = np.eye(len(measurement)) + 4.0 * (measurement[:, None] == measurement)
+    column = np.random.default_rng(3).standard_normal((len(measurement), 1))
+    np.testing.assert_allclose(drawn.covariance(column), dense @ column, rtol=1e-9, atol=1e-9)
+    # of 4000 draws, the product of two that share an offset: 4 ± √(5² + 4²)/√4000, five of which are allowed
+    many = drawn.draws(np.random.default_rng(4), 4000)
+    first, second = np.flatnonzero(measurement == measurement[0])
+    assert abs(float(np.mean(many[first] * many[second])) - 4.0) < 5 * np.sqrt(41 / 4000)

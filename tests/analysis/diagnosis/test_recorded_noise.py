@@ -1,0 +1,69 @@
+"""The noise's shapes that stand for all do so beside what may be missing, too."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.second.cases import case, write
+from cmm_uq.analysis.diagnosis import shapes
+from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
+from cmm_uq.analysis.diagnosis.comparison.unknown_functions import unknown
+from cmm_uq.analysis.diagnosis.recorded_noise import noise_kinds
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.machine.model import MeasurementModel
+
+
+@pytest.fixture(scope="module")
+def jumped(tmp_path_factory: pytest.TempPathFactory) -> MeasurementModel:
+    """A plate in three ways whose scale of X jumps midway, with an offset of each ball of each set-up and no slow noise."""
+    made, folder = case(20261124, "outside", 35), tmp_path_factory.mktemp("jumped")
+    assert made.noise.kind == "set-up"
+    assert set(made.truth["hidden"]) == {"jump in time"}
+    write(made, folder)
+    return screened_model(read_job(Path(folder) / made.name))[0]
+
+
+def test_few_shapes_say_of_a_jump_with_time_what_many_say(
+    jumped: MeasurementModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Against the integral by a hundred shapes, within what is hardly worth a mention; 100 : 1 is decisive (Jeffreys)."""
+    functions = [f for f in unknown(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
+    odds = []
+    for kept in (shapes.KEPT, 100):
+        monkeypatch.setattr(shapes, "KEPT", kept)
+        nothing, something = comparison_of(jumped, None, functions).log_evidence()
+        odds.append(something[:, 0] - nothing[0])
+    np.testing.assert_allclose(*odds, atol=1.0)
+    assert odds[0].max() > np.log(100)
+
+
+def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: MeasurementModel) -> None:
+    functions = [f for f in unknown(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
+    normal = [kind for kind in noise_kinds(jumped, functions) if kind.name != "tails"]
+    assert sum(not kind.slow.size for kind in normal) >= 2
+    assert sum(bool(kind.slow.size) for kind in normal) >= 2
+
+
+def test_without_a_time_there_is_no_jump_to_reckon_with(jumped: MeasurementModel) -> None:
+    """The same kinds of noise, whatever functions of other covariates are candidates."""
+    functions = [replace(f, covariate_name=None) for f in unknown(jumped, jumped.estimate().about)]
+    assert [k.log_whitening for k in noise_kinds(jumped, functions)] == [
+        k.log_whitening for k in noise_kinds(jumped, ())
+    ]
+
+
+def test_what_a_model_leaves_of_columns_is_at_right_angles_to_it_and_its_placing(jumped: MeasurementModel) -> None:
+    """By least squares on its design and the freedoms of its set-ups, written out."""
+    linear = jumped.estimate().linear
+    columns = np.random.default_rng(3).standard_normal((len(linear.observed), 2))
+    scale = linear.noise_scale[:, None]
+    every = np.hstack([linear.design, linear.freedoms.dense()]) / scale
+    every = every / np.linalg.norm(every, axis=0)
+    left = columns / scale - every @ np.linalg.lstsq(every, columns / scale, rcond=1e-9)[0]
+    found = shapes.unreached(linear, columns)
+    np.testing.assert_allclose(found.T @ found, left.T @ left, rtol=1e-6, atol=1e-6 * np.trace(left.T @ left))

@@ -1,0 +1,161 @@
+"""``cmm-uq due``: what is printed, written and refused."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from cmm_uq.laboratory.records import open_records
+from tests.app.cli.process import run
+from tests.laboratory.records.histories import certificate, moment
+
+ON = "2026-11-22"
+
+
+def recorded(folder: Path, *contents: Mapping[str, Any]) -> Path:
+    """Records with these reports."""
+    place = folder / "records.db"
+    with open_records(place, create=True) as records:
+        records.append_all(
+            ("check" if one.get("interim") else "report", one, moment(dt.date.fromisoformat(one["day"])))
+            for one in contents
+        )
+    return place
+
+
+def machine(serial: str, **further: Any) -> dict[str, Any]:
+    """Facts of a machine."""
+    return {
+        "serial": serial,
+        "name": f"Machine {serial}",
+        "manufacturer": "DEA",
+        "model": "Iota",
+        "place": "Hall 1",
+        **further,
+    }
+
+
+@pytest.fixture
+def three(tmp_path: Path) -> Path:
+    """One machine overdue, one due in December, one later by its rule of two years."""
+    return recorded(
+        tmp_path, certificate("1101", dt.date(2025, 3, 2)), certificate("1102", dt.date(2025, 12, 5)),
+        certificate("1103", dt.date(2025, 12, 5), machine=machine("1103", calibrate={"every_months": 24})),
+    )  # fmt: skip
+
+
+def test_the_list_is_sorted_and_says_why(three: Path) -> None:
+    done = run("due", "--records", three, "--on", ON)
+    assert (done.returncode, done.stderr) == (0, "")
+    first, *rows = done.stdout.splitlines()
+    assert first == "2026-11-22: 1 overdue, 1 due within 90 days"
+    assert [row.split()[0] for row in rows] == ["2026-03-02", "2026-12-05", "2027-06-01", "2027-12-05"]
+    assert "machine 1101" in rows[0]
+    assert "265 d ago" in rows[0]
+    assert "artefact BB-7" in rows[2]
+    assert "Fixed interval of 24 months." in rows[3]
+
+
+def test_within_leaves_out_what_is_later(three: Path) -> None:
+    data = json.loads(run("due", "--records", three, "--on", ON, "--within", "2w", "--json").stdout)
+    assert [(one["serial"], one["state"]) for one in data["items"]] == [("1101", "overdue"), ("1102", "due")]
+    assert (data["schema"], data["on"], data["within_days"]) == ("cmm-uq/due/1", ON, 14)
+
+
+def test_some_machines_bring_their_artefact_however_their_serial_is_spelled(three: Path) -> None:
+    data = json.loads(run("due", " 1102", "Machine 1102", "--records", three, "--on", ON, "--json").stdout)
+    assert [(one["item"], one["serial"]) for one in data["items"]] == [("machine", "1102"), ("artefact", "BB-7")]
+
+
+def test_strict_ends_with_4_where_anything_is_overdue(three: Path) -> None:
+    assert run("due", "--records", three, "--on", ON, "--strict", "-q").returncode == 4
+    assert run("due", "1102", "--records", three, "--on", ON, "--strict", "-q").returncode == 0
+
+
+def test_an_artefact_out_of_date_blocks(tmp_path: Path) -> None:
+    old = {
+        "serial": "BB-9",
+        "certificate": "PTB 2",
+        "laboratory": "PTB",
+        "calibrated": "2024-01-01",
+        "due": "2026-10-01",
+    }
+    place = recorded(tmp_path, certificate("1102", dt.date(2026, 3, 2), artefact=old))
+    items = {
+        one["item"]: one for one in json.loads(run("due", "--records", place, "--on", ON, "--json").stdout)["items"]
+    }
+    assert items["artefact"]["state"] == "overdue"
+    assert "BB-9 is out of date since 2026-10-01" in items["machine"]["blocked"]
+
+
+def test_a_certificate_of_tomorrow_does_not_hide_that_a_machine_is_overdue(tmp_path: Path) -> None:
+    place = recorded(tmp_path, certificate("1102", dt.date(2025, 3, 2)), certificate("1102", dt.date(2096, 3, 2)))
+    item = json.loads(run("due", "1102", "--records", place, "--on", ON, "--json").stdout)["items"][0]
+    assert (item["state"], item["due"], item["last"]) == ("overdue", "2026-03-02", "2025-03-02")
+    assert any("2096-03-02 is dated after" in text for text in item["remarks"])
+
+
+def test_an_interim_check_out_of_control_is_found_among_all_machines(three: Path) -> None:
+    far = (("scale_x.ppm", "Scale error of x", "ppm", 6.0, 0.5, 5.0, 7.0, 0.2, 8.0),)
+    with open_records(three) as records:
+        records.append(
+            "check", certificate("1103", dt.date(2026, 9, 1), far, interim=True), at=moment(dt.date(2026, 9, 1))
+        )
+    items = json.loads(run("due", "--records", three, "--on", ON, "--json").stdout)["items"]
+    found = next(one for one in items if one["serial"] == "1103")
+    assert (found["state"], found["due"]) == ("overdue", "2026-09-01")
+    assert "out of control (Scale error of x:" in found["why"]
+
+
+def test_a3_pools_the_machines_of_a_model(tmp_path: Path) -> None:
+    """Twenty intervals, fifteen within the limits, target 95 %: 231 days of 365 in the tutorial; here of 12 mean months."""
+    rule = {"method": "A3", "reliability": 0.95}
+    contents = []
+    for number in range(20):
+        value = 9.0 if number % 4 == 0 else 1.0
+        stated = (("scale_x.ppm", "Scale error of x", "ppm", value, 0.5, value - 1, value + 1, 0.2, 8.0),)
+        facts = machine(str(number), calibrate=rule)
+        contents += [certificate(str(number), dt.date(2025, 9, 1), machine=facts),
+                     certificate(str(number), dt.date(2026, 9, 1), stated, machine=facts)]  # fmt: skip
+    place = recorded(tmp_path, *sorted(contents, key=lambda one: one["day"]))
+    items = json.loads(run("due", "1", "--records", place, "--on", ON, "--json").stdout)["items"]
+    assert "15 of 20 intervals of about 12 months" in items[0]["why"]
+    assert items[0]["due"] == (dt.date(2026, 9, 1) + dt.timedelta(days=int(365.2425 * 230.846 / 365))).isoformat()
+
+
+def test_the_page_and_its_data_are_written_together(three: Path, tmp_path: Path) -> None:
+    done = run("due", "--records", three, "--on", ON, "--out", tmp_path / "out")
+    assert done.returncode == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["due.html", "due.json", "manifest.json"]
+    page = (tmp_path / "out" / "due.html").read_text(encoding="utf-8")
+    assert "1 overdue, 1 due within 90 days" in page
+    assert json.loads((tmp_path / "out" / "due.json").read_bytes())["items"][0]["serial"] == "1101"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("1l02",), "no machine '1l02' is recorded. Did you mean '1102'?"),
+        (("--within", "soon"), "'soon' is no time. Write it as 90d, 12w, 3m or 1y"),
+        (("--within", "99999y"), "is no time"),
+        (("--on", "22.11.2026"), "'22.11.2026' is no date. Write it as 2026-11-22"),
+    ],
+)
+def test_what_cannot_be_asked_is_told_in_a_line(three: Path, arguments: tuple[str, ...], words: str) -> None:
+    done = run("due", *arguments, "--records", three)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_without_records_it_says_where_they_would_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("CMM_UQ_RECORDS", raising=False)
+    done = run("due", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "there are no records" in done.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,99 @@
+"""A summary in lines: nothing runs over the edge, nothing is lost that was asked for, the decision comes first."""
+
+from __future__ import annotations
+
+import re
+from itertools import product
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+from cmm_uq.app.cli.folding import folded
+from cmm_uq.app.cli.layout import COLOURS, Layout, Line
+from cmm_uq.base.messages import Verbatim
+from cmm_uq.certificate.in_short import Summary, Verdict
+from tests.artefacts.simulated import outcome
+from tests.conftest import ROOT
+
+FILES = [("certificate.html, certificate.pdf", "the certificate"), ("results.json", "every figure, for other programs")]
+WORDS = st.lists(st.text("abcäµ漢-/.,\u00a0", min_size=1, max_size=12), min_size=1, max_size=60)
+
+
+def text(lines: list[Line]) -> list[str]:
+    return ["".join(part for part, _ in line) for line in lines]
+
+
+def screen(job: str, width: int | None, *, verbose: bool = False) -> list[Line]:
+    found = outcome(job)
+    name = found.found.job.facts.job.id
+    return Layout(width, verbose).screen(found.summary, name=name, files=FILES, folder="reports/x")
+
+
+@given(WORDS, st.integers(20, 200))
+def test_folding_keeps_every_word_and_no_line_is_too_long(words: list[str], width: int) -> None:
+    lines = folded(" ".join(words), width)
+    assert " ".join(lines) == " ".join(words)
+    assert all(cell_len(line) <= width for line in lines)
+
+
+def test_a_word_longer_than_the_line_stays_whole_so_that_a_path_can_be_copied() -> None:
+    assert folded(f"see {'p' * 50} there", 20) == ["see", "p" * 50, "there"]
+
+
+@pytest.mark.parametrize("job", ["iota-1102-20C", "sphere-simulated"])
+def test_no_line_runs_over_the_edge_and_the_decision_stands_first(job: str) -> None:
+    for width, verbose in product((60, 80, 120, 200), (False, True)):
+        lines = screen(job, width, verbose=verbose)
+        assert max(cell_len(line) for line in text(lines)) <= width
+        (word, style), *_ = lines[0]
+        assert (word, style) == {"iota-1102-20C": ("FAIL", "bold red"), "sphere-simulated": ("PASS", "bold green")}[job]
+
+
+def test_an_ordinary_certificate_is_27_lines_of_80_columns_with_three_warnings() -> None:
+    """Three lines of decision, ten figures, two lines a warning; a screen of 24 rows and a little."""
+    lines = text(screen("iota-1102-20C", 80))
+    assert len(lines) == 27
+    assert "3 warnings, shortened: --verbose shows all" in lines
+
+
+def test_verbose_says_every_warning_to_its_last_word() -> None:
+    shown = " ".join(" ".join(text(screen("iota-1102-20C", 80, verbose=True))).split())
+    warnings = outcome("iota-1102-20C").summary.warnings
+    assert len(warnings) == 3
+    assert all(" ".join(warning.split()) in shown for warning in warnings)
+
+
+def test_away_from_a_terminal_every_fact_is_one_whole_line() -> None:
+    lines = text(screen("iota-1102-20C", None))
+    found = outcome("iota-1102-20C").summary
+    assert [line for line in lines if line.startswith("FAIL  ASME B89.4.1-1997, volumetric performance: 340 µm")]
+    for i, warning in enumerate(found.warnings):
+        assert f"  {i + 1}. {warning}" in lines
+    for name, value, k in found.figures:
+        assert any(re.fullmatch(rf"  {re.escape(name)} +{re.escape(value)} +{re.escape(k)}", line) for line in lines)
+
+
+def test_the_tenth_remark_is_on_the_screen_only_when_asked_for() -> None:
+    told = Summary(remarks=tuple(Verbatim(f"remark {i}") for i in range(10)))
+    short, whole = (text(Layout(80, verbose).screen(told)) for verbose in (False, True))
+    assert short[-2:] == ["  6. remark 5", "  … and 4 more: --verbose, or the document"]
+    assert whole[-1] == "  10. remark 9"
+
+
+def test_words_that_steer_a_terminal_are_shown_as_escapes() -> None:
+    told = Summary(Verbatim("machine\x1b[31m"), verdicts=(Verdict("PASS", "good", Verbatim("a\x07"), ()),))
+    assert text(Layout(80).screen(told)) == ["PASS  a\\x07", "machine\\x1b[31m"]
+
+
+def test_green_is_for_what_passes_alone() -> None:
+    assert [name for name, style in COLOURS.items() if "green" in style] == ["good"]
+
+
+def test_the_screen_in_the_documentation_is_what_is_printed() -> None:
+    page = (ROOT / "docs" / "running.md").read_text(encoding="utf-8")
+    shown = page.partition("$ cmm-uq report examples/iota-1102-20C\n")[2].partition("  …\n")[0]
+    lines = [line.replace("\u00a0", " ") for line in text(screen("iota-1102-20C", 80))]
+    assert shown.splitlines() == lines[: shown.count("\n")]
+    assert shown.count("\n") > 5

@@ -1,0 +1,134 @@
+"""An effect of another package, named as it comes: planned, simulated, estimated, and found where it was left out."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.app.cli.process import COMMAND
+from tests.app.commands.test_planning import JOB, SIX
+from tests.conftest import ROOT
+from tests.plugin.packages import OUTSIDE_EFFECTS, describe, install
+
+TWIST = 10.0
+TRUTH = f"""
+seed = 5
+[effects.squareness_xy]
+angle_arcsec = 10.0
+[effects.beam_twist]
+twist_arcsec = {TWIST}
+[noise]
+coordinate_um = 1.0
+"""
+PLUGINS = {"outside-effects": "0.1.0"}
+
+
+def run(site: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """The command where a folder of packages is installed."""
+    paths = os.pathsep.join([str(site), str(ROOT)])
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, encoding="utf-8",
+                          env={**os.environ, "PYTHONPATH": paths})  # fmt: skip
+
+
+def done(site: Path, command: str, *arguments: object) -> None:
+    found = run(site, command, *arguments)
+    assert found.returncode == 0, found.stderr
+
+
+def results(folder: Path) -> Any:
+    return json.loads((folder / "results.json").read_bytes())
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Forty placings that tell the twist of the beam, a recording of them, its certificate, and a diagnosis without it."""
+    work = tmp_path_factory.mktemp("outside")
+    site, job = work / "site", work / "job"
+    for folder in (site, job):
+        folder.mkdir()
+    install(OUTSIDE_EFFECTS, site)
+    named = f'{SIX}, "beam_twist"'
+    text = JOB.format(plan='criterion = "A"\nnumber = 40', effects=named, length=400.0)
+    (job / "job.toml").write_text(text, encoding="utf-8")
+    (work / "truth.toml").write_text(TRUTH, encoding="utf-8")
+    done(site, "plan", job, "--out", work / "plan", "--no-power", "--quiet")
+    shutil.copy(work / "plan" / "plan.csv", job / "recording.csv")
+    done(site, "simulate", job, "--truth", work / "truth.toml", "--out", work / "simulated")
+    done(site, "report", work / "simulated", "--out", work / "report", "--quiet")
+    shutil.copytree(work / "simulated", work / "left-out")
+    drawn = (work / "simulated" / "job.toml").read_text(encoding="utf-8")
+    (work / "left-out" / "job.toml").write_text(drawn.replace(named, SIX), encoding="utf-8")
+    done(site, "diagnose", work / "left-out", "--out", work / "diagnosis", "--quiet")
+    return work
+
+
+def test_a_plan_determines_it(work: Path) -> None:
+    data = results(work / "plan")
+    (better,) = (p for p in data["better"]["determined"] if p["effect"] == "beam_twist")
+    assert better["status"] == "determined"
+    assert better["u"] < 1.0 < TWIST / 3
+    assert "Twist of the beam" in (work / "plan" / "plan.html").read_text(encoding="utf-8")
+
+
+def test_the_simulated_recording_says_whose_effect_acted(work: Path) -> None:
+    first, *_ = (work / "simulated" / "recording.csv").read_text(encoding="utf-8").splitlines()
+    assert "with outside-effects 0.1.0, seed 5" in first
+
+
+def test_its_estimate_holds_the_truth(work: Path) -> None:
+    found = results(work / "report")["estimates"]["beam_twist"]["twist_arcsec"]
+    assert abs(found["value"] - TWIST) < 4 * found["u"]
+    assert found["u"] < 1.0
+
+
+def test_a_diagnosis_finds_it_where_it_is_left_out(work: Path) -> None:
+    diagnosis = results(work / "diagnosis")["diagnosis"]
+    assert diagnosis["verdict"] == "explained"
+    (found,) = diagnosis["effects"]
+    assert found["effect"] == "beam_twist"
+    twist = found["parameters"]["twist_arcsec"]
+    assert abs(twist["value"] - TWIST) < 4 * twist["u"]
+    assert twist["u"] < 1.0
+    page = (work / "diagnosis" / "diagnosis-simulated.html").read_text(encoding="utf-8")
+    assert "The beam twists under the weight of the ram" in page.replace("&#39;", "'")
+
+
+@pytest.mark.parametrize("folder", ["plan", "report", "diagnosis"])
+def test_results_name_the_package_and_its_version(work: Path, folder: str) -> None:
+    assert results(work / folder)["software"]["plugins"] == PLUGINS
+
+
+@pytest.mark.parametrize(
+    "page", ["plan/plan.html", "report/certificate-simulated.html", "diagnosis/diagnosis-simulated.html"]
+)
+def test_so_does_every_page(work: Path, page: str) -> None:
+    assert "with outside-effects 0.1.0" in (work / page).read_text(encoding="utf-8")
+
+
+def test_without_the_package_its_effect_is_unknown(work: Path, tmp_path: Path) -> None:
+    found = run(tmp_path, "report", work / "simulated", "--out", tmp_path / "out")
+    assert found.returncode == 2
+    assert "unknown effect 'beam_twist'" in found.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("command", ["report", "diagnose"])
+def test_a_package_that_cannot_be_used_is_named_and_nothing_is_written(
+    work: Path, tmp_path: Path, command: str
+) -> None:
+    site, out = tmp_path / "site", tmp_path / "out"
+    site.mkdir()
+    (site / "torn.py").write_text("import nowhere", encoding="utf-8")
+    describe(site, "torn-effects", "3.0", {"cmm_uq.effects": {"torn": "torn:Torn"}})
+    found = run(site, command, work / "left-out", "--out", out)
+    assert found.returncode == 2
+    assert "Traceback" not in found.stderr
+    said = " ".join(found.stderr.split())
+    assert "package torn-effects 3.0: the effect 'torn' fails with ModuleNotFoundError" in said
+    assert not out.exists()

@@ -1,0 +1,223 @@
+"""The recipe on the real recording, against the figures of its source, and on recordings with known faults."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from cmm_uq.app.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.base.errors import CmmUqError
+from tests.artefacts.simulated import analysed
+from tests.conftest import ROOT
+
+EXAMPLES = ROOT / "examples"
+
+
+@pytest.fixture(scope="module")
+def uncompensated() -> Result:
+    return analysed("iota-1102-20C")
+
+
+@pytest.fixture(scope="module")
+def compensated() -> Result:
+    return analysed("iota-1102-20C-compensated")
+
+
+@pytest.mark.parametrize("name", ["iota-1102-20C", "iota-1102-20C-compensated"])
+def test_the_examples_hold_the_figures_of_their_source(name: str) -> None:
+    state = "compensated" if name.endswith("-compensated") else "uncompensated"
+    source = ROOT.parent / "shared" / "data" / "harris2004" / f"ballbar_20C_{state}.csv"
+    if not source.is_file():
+        pytest.skip("the source tables are not beside the project")
+    assert (EXAMPLES / name / "ballbar.csv").read_bytes() == source.read_bytes()
+
+
+def test_the_figures_of_performance_are_those_of_the_thesis(uncompensated: Result, compensated: Result) -> None:
+    """Harris 2004, tables 19 to 21 and figures C 2, C 4; the largest deviation is what it calls B89."""
+    wanted = {
+        "mean_length_mm": 404.2051,
+        "rms_accuracy_error_um": 73.16,
+        "b89_range_um": 339.9,
+        "b89_max_deviation_um": 185.6,
+    }
+    for name, value in wanted.items():
+        assert uncompensated.accuracy[name].value == pytest.approx(value, abs=10 ** -(4 if name.endswith("mm") else 1))
+    wanted = {
+        "mean_length_mm": 404.2357,
+        "rms_accuracy_error_um": 12.81,
+        "b89_range_um": 45.65,
+        "b89_max_deviation_um": 24.22,
+    }
+    for name, value in wanted.items():
+        assert compensated.accuracy[name].value == pytest.approx(value, abs=1e-4 if name.endswith("mm") else 1e-2)
+
+
+def test_the_squareness_agrees_with_the_machines_own_calibration(uncompensated: Result) -> None:
+    """Harris 2004, table 7, from other measurements: −173″, −19″, +21″."""
+    ls = uncompensated.least_squares
+    fitted = {u.key[0]: value for u, value in zip(ls.unknowns, ls.value, strict=True)}
+    assert fitted["squareness_xy"] == pytest.approx(-174.7, abs=0.05)
+    assert fitted["squareness_yz"] == pytest.approx(-16.9, abs=0.05)
+    assert fitted["squareness_zx"] == pytest.approx(18.1, abs=0.05)
+    for name, calibrated in (("squareness_xy", -173.0), ("squareness_yz", -19.0), ("squareness_zx", 21.0)):
+        low, high = uncompensated.parameters[name]["angle_arcsec"].interval95
+        assert low < calibrated < high
+
+
+def test_the_residual_standard_deviation_is_13_2_micrometres(uncompensated: Result) -> None:
+    """Of nineteen lengths and six parameters: position 18 is a copy of 14."""
+    assert uncompensated.least_squares.degrees_of_freedom == 19 - 6
+    assert uncompensated.least_squares.residual_sd == pytest.approx(13.2e-3, abs=5e-5)
+    assert uncompensated.posterior.converged
+
+
+def test_the_posterior_agrees_with_least_squares_where_the_data_speak(uncompensated: Result) -> None:
+    for unknown, value in zip(uncompensated.least_squares.unknowns, uncompensated.least_squares.value, strict=True):
+        if unknown.key[0] != "artefact":
+            sampled = uncompensated.parameters[unknown.key[0]][unknown.key[1]]
+            assert (
+                abs(sampled.value - value) < 0.3 * sampled.u
+            )  # noise by axis weighs the directions a little otherwise
+
+
+def test_without_a_certificate_the_common_scale_is_said_to_be_free(compensated: Result) -> None:
+    (combination,) = compensated.undetermined
+    assert [key[0] for key in combination] == ["scale_x", "scale_y", "scale_z", "artefact"]
+    assert compensated.prior_share(("scale_x", "ppm")) == pytest.approx(1 / 3, abs=0.03)
+    assert compensated.prior_share(("squareness_xy", "angle_arcsec")) < 0.01
+
+
+def test_the_copied_position_counts_once(uncompensated: Result) -> None:
+    (finding,) = uncompensated.findings
+    assert (finding.kind, finding.measurements, finding.set_aside) == ("duplicate", (14, 18), True)
+    assert uncompensated.artefact.measurement[~uncompensated.model.used].tolist() == [18]
+    assert len(uncompensated.artefact.measurement) == 20
+
+
+def test_the_machine_fails_a_limit_that_its_compensation_leaves_undecided(
+    uncompensated: Result, compensated: Result
+) -> None:
+    assert uncompensated.statements[0].decision.outcome == "fail"
+    assert compensated.statements[0].decision.outcome == "undecided"
+
+
+def test_the_same_seed_gives_the_same_result(uncompensated: Result) -> None:
+    again = analyse(EXAMPLES / "iota-1102-20C")
+    assert np.array_equal(again.posterior.draws, uncompensated.posterior.draws)
+    assert again.accuracy == uncompensated.accuracy
+
+
+def rewrite(job: Path, column: str, row: int, add: float) -> None:
+    path = job / "ballbar.csv"
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    rows[row][column] = f"{float(rows[row][column]) + add:.4f}"
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def state(job: Path, pattern: str, replacement: str) -> None:
+    path = job / "job.toml"
+    path.write_text(
+        re.sub(pattern, replacement, path.read_text(encoding="utf-8"), count=1, flags=re.M), encoding="utf-8"
+    )
+
+
+def test_a_gross_outlier_is_set_aside_from_the_fit_but_counts_in_the_figures(job: Path, uncompensated: Result) -> None:
+    rewrite(job, "x_mm", 9, 2.0)
+    found = analyse(job)
+    (outlier,) = [finding for finding in found.findings if finding.kind == "outlier"]
+    assert outlier.measurements == (5,)
+    assert outlier.why.startswith("measurement 5, repeat 1 is ")
+    assert outlier.set_aside
+    assert found.accuracy["b89_range_um"].value > 1000
+    for name in ("squareness_xy", "squareness_zx"):
+        here, there = found.parameters[name]["angle_arcsec"], uncompensated.parameters[name]["angle_arcsec"]
+        assert abs(here.value - there.value) < 2 * there.u
+
+
+def test_a_measurement_that_the_lab_sets_aside_is_not_used(job: Path) -> None:
+    state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nset_aside = [18]')
+    found = analyse(job)
+    assert found.least_squares.residual_sd == pytest.approx(13.2e-3, abs=5e-5)
+    assert found.findings[0].set_aside
+    assert len(found.artefact.measurement) == 20
+
+
+def test_the_copy_of_a_measurement_that_is_set_aside_counts(job: Path, uncompensated: Result) -> None:
+    state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nset_aside = [14]')
+    found = analyse(job)
+    assert not found.findings[0].set_aside
+    assert found.artefact.measurement[~found.model.used].tolist() == [14]
+    assert found.least_squares.value == pytest.approx(uncompensated.least_squares.value, rel=1e-12)
+
+
+def test_a_measurement_that_is_not_there_cannot_be_set_aside(job: Path) -> None:
+    state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nset_aside = [21]')
+    with pytest.raises(CmmUqError, match="no measurement 21"):
+        analyse(job)
+
+
+def test_a_stated_noise_that_the_residuals_contradict_is_not_believed(job: Path) -> None:
+    state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nu_coordinate_um = 1.0')
+    found = analyse(job)
+    assert found.noise.contradicts_stated
+    assert found.noise.coordinate.value > 5.0
+    assert found.parameters["squareness_xy"]["angle_arcsec"].u > 5.0
+
+
+def test_a_stated_noise_is_what_is_known_beforehand(job: Path) -> None:
+    state(job, r'^file = "ballbar.csv"', 'file = "ballbar.csv"\nu_coordinate_um = 9.0')
+    found = analyse(job)
+    assert not found.noise.contradicts_stated
+    low, high = found.noise.coordinate.interval95
+    assert low < 9.0 < high
+    assert found.noise.coordinate.u < 0.25 * 9.0  # good to a fifth, and the residuals say nothing else
+
+
+def test_coordinates_in_metres_are_recognised(job: Path) -> None:
+    path = job / "ballbar.csv"
+    rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
+    for row in rows[1:]:
+        row[2:5] = [f"{float(cell) / 1000:.7f}" for cell in row[2:5]]
+    path.write_text("\n".join(",".join(row) for row in rows), encoding="utf-8")
+    with pytest.raises(CmmUqError, match="look like metres, not mm"):
+        analyse(job)
+
+
+def test_a_recording_with_too_few_bars_is_refused(job: Path) -> None:
+    path = job / "ballbar.csv"
+    path.write_text("\n".join(path.read_text(encoding="utf-8").splitlines()[:9]), encoding="utf-8")
+    with pytest.raises(CmmUqError, match="4 observations cannot determine 6 parameters"):
+        analyse(job)
+
+
+def test_no_effect_at_all_is_a_model_too(job: Path) -> None:
+    state(job, r"^effects = .*", "effects = []")
+    found = analyse(job)
+    assert found.least_squares.residual_sd == pytest.approx(80e-3, abs=10e-3)
+    assert found.parameters == {}
+
+
+def test_a_display_of_coarse_steps_is_part_of_the_noise_and_of_a_reading(tmp_path: Path) -> None:
+    """Coordinates of the simulated plate, 0.7 µm of noise, rounded to 5 µm: no reading is better than 5/√12 = 1.44 µm."""
+    job = tmp_path / "job"
+    shutil.copytree(ROOT / "examples" / "plate-simulated", job)
+    table = pd.read_csv(job / "recording.csv")
+    for column in ("x_mm", "y_mm", "z_mm"):
+        table[column] = (table[column] / 5e-3).round() * 5e-3
+    table.to_csv(job / "recording.csv", index=False)
+    found = analyse(job)
+    assert isinstance(found, Result)
+    noise = outcome_of(found).results["noise"]
+    assert noise["display_step_um"] == pytest.approx(5.0)
+    assert noise["coordinate_um"]["interval95"][0] > 5 / np.sqrt(12)
+    assert not any("display" in name for name in found.draws.names)

@@ -1,0 +1,108 @@
+"""A job with an error map becomes a compensated job."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.app.commands.analysis import analyse
+from cmm_uq.app.commands.compensate import write_compensated
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError
+from tests.conftest import ROOT
+
+
+def named(job: Path, map_text: str) -> Path:
+    """The job with an error map of the table 7 squareness."""
+    (job / "map.csv").write_text(map_text, encoding="utf-8")
+    path = job / "job.toml"
+    lines = (
+        'error_map = [\n  { file = "map.csv", temperature_c = 20.0 },  # of the interferometer\n]\n'
+        "squareness_arcsec = { xy = -173.0, yz = -19.0, zx = 21.0 }\n"
+    )
+    text = re.sub(r"(?m)^(chain = .*\n)", rf"\1{lines}", path.read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8")
+    return job
+
+
+def straight(high: float = 900.0) -> str:
+    rows = ["axis,position_mm,dx_um,dy_um,dz_um,rx_arcsec,ry_arcsec,rz_arcsec"]
+    for axis, low, end in (("x", 0.0, high), ("y", 0.0, 550.0), ("z", -500.0, 0.0)):
+        rows += [f"{axis},{position},0,0,0,0,0,0" for position in (low, end)]
+    return "\n".join(rows) + "\n"
+
+
+def test_squareness_alone_moves_points_by_its_angles(job: Path, tmp_path: Path) -> None:
+    """Carriages move along unit vectors that enclose 90° + S: the Cholesky factor of the cosines between them."""
+    before = read_job(job).points
+    write_compensated(named(job, straight()), tmp_path / "out")
+    after = read_job(tmp_path / "out").points
+    xy, yz, zx = np.cos(np.pi / 2 + np.pi / 648000 * np.array([-173, -19, 21]))
+    unit = np.linalg.cholesky(np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]]))
+    np.testing.assert_allclose(after.carriages, before.carriages @ unit, atol=2e-7)
+
+
+def test_the_compensated_job_is_not_compensated_again_and_tells_its_source(job: Path, tmp_path: Path) -> None:
+    write_compensated(named(job, straight()), tmp_path / "out")
+    compensated = read_job(tmp_path / "out")
+    assert not compensated.facts.machine.error_map
+    assert compensated.facts.machine.squareness_arcsec is None
+    assert compensated.facts.machine.chain == "XYZ"
+    first = (tmp_path / "out" / "ballbar.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert first.startswith("# compensated by cmm-uq")
+    told = json.loads((tmp_path / "out" / "compensation.json").read_text(encoding="utf-8"))
+    assert told["inputs_sha256"].keys() == {"job.toml", "ballbar.csv", "map.csv"}
+    assert told["error_maps"][0]["squareness_arcsec"] == {"xy": -173.0, "yz": -19.0, "zx": 21.0}
+
+
+def test_the_thesis_map_brings_the_rms_accuracy_error_to_12_6_micrometres(job: Path, tmp_path: Path) -> None:
+    """Harris 2004 prints 12.8 µm for its own compensation, which also knew the digitizer's pose."""
+    source = ROOT.parent / "shared" / "data" / "harris2004" / "error_map_20C.csv"
+    if not source.is_file():
+        pytest.skip("the source tables are not beside the project")
+    write_compensated(named(job, source.read_text(encoding="utf-8")), tmp_path / "out")
+    found = analyse(tmp_path / "out")
+    assert found.accuracy["rms_accuracy_error_um"].value == pytest.approx(12.6, abs=0.1)
+
+
+def test_a_job_without_a_map_says_so(job: Path, tmp_path: Path) -> None:
+    with pytest.raises(CmmUqError, match="has no error map"):
+        write_compensated(job, tmp_path / "out")
+
+
+def test_a_map_that_does_not_cover_the_travel_is_refused(job: Path, tmp_path: Path) -> None:
+    with pytest.raises(CmmUqError, match=r"map\.csv"):
+        write_compensated(named(job, straight(high=600.0)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_points_beyond_the_map_are_refused_with_their_line_or_flagged(job: Path, tmp_path: Path) -> None:
+    """Position 16 reads X = 731 mm; a map that ends at 720 mm needs a travel that ends there too."""
+    path = job / "job.toml"
+    path.write_text(path.read_text(encoding="utf-8").replace("x = [0, 900]", "x = [0, 720]"), encoding="utf-8")
+    short = named(job, straight(high=720.0))
+    with pytest.raises(CmmUqError, match=r"ballbar\.csv.*line \d+"):
+        write_compensated(short, tmp_path / "out")
+    write_compensated(short, tmp_path / "flagged", beyond="extrapolate")
+    assert read_job(tmp_path / "flagged").points.columns["extrapolated"].sum() == 1
+
+
+def test_the_job_itself_is_not_written_over(job: Path) -> None:
+    with pytest.raises(CmmUqError, match="is an input of this command"):
+        write_compensated(named(job, straight()), job)
+
+
+def test_how_it_came_about_names_files_not_folders(job: Path, tmp_path: Path) -> None:
+    """The same bytes wherever the job lies, and nothing of the user's machine."""
+    named(job, straight())
+    elsewhere = Path(shutil.copytree(job, tmp_path / "elsewhere"))
+    for folder, out in ((job, "a"), (elsewhere, "b")):
+        write_compensated(folder, tmp_path / out)
+    told = [(tmp_path / out / "compensation.json").read_bytes() for out in ("a", "b")]
+    assert told[0] == told[1]
+    assert json.loads(told[0])["error_maps"][0]["file"] == "map.csv"

@@ -1,0 +1,218 @@
+"""A job is planned: what it asks for is what it gets, and a better plan is better."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.app.commands.planning import RECORDED, SPREAD, Plan, make_plan
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.base.errors import CmmUqError
+from tests.conftest import ROOT
+
+JOB = """
+[job]
+id = "to-be-measured"
+date = 2026-01-01
+[machine]
+name = "Bridge machine"
+travel_mm = {{ x = [0, 900], y = [0, 800], z = [-600, 0] }}
+[artefact]
+kind = "ballbar"
+length_mm = {length}
+u_um = 0.5
+[recording]
+file = "recording.csv"
+u_coordinate_um = 1.0
+[model]
+effects = [{effects}]
+[plan]
+{plan}
+"""
+SIX = '"scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"'
+
+
+def planned(folder: Path, plan: str = "", effects: str = SIX, length: float = 400.0, **options: bool) -> Plan:
+    (folder / "job.toml").write_text(JOB.format(plan=plan, effects=effects, length=length), encoding="utf-8")
+    return make_plan(read_job(folder, recorded=False), power=options.get("power", False))
+
+
+def test_without_wishes_the_plan_is_the_standard_one(tmp_path: Path) -> None:
+    plan = planned(tmp_path)
+    assert plan.name == "ASME B89.4.1"
+    assert len(plan.to_measure) == 20
+    assert plan.better is None
+    assert all(condition.met for condition in plan.conditions)
+
+
+def test_as_many_placings_by_a_criterion_are_at_least_as_good(tmp_path: Path) -> None:
+    for criterion in ("D", "A", "worst", "separation"):
+        plan = planned(tmp_path, f'criterion = "{criterion}"\ncandidates = 120')
+        assert plan.scores is not None
+        assert plan.scores[1] < plan.scores[0], criterion
+        assert len(plan.to_measure) == 20
+        assert plan.kept == 0
+
+
+def test_placings_more_keep_the_standard_ones_and_part_what_these_leave_alike(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'criterion = "separation"\nmore = 3')
+    assert plan.kept == 20
+    assert len(plan.to_measure) == 23
+    before, after = plan.start.identifiability, plan.outlook.identifiability
+    assert before is not None
+    assert after is not None
+    assert len(after.unseen) < len(before.unseen)
+    assert len(after.alike) <= len(before.alike)
+
+
+def test_a_recording_is_judged_and_only_what_is_missing_is_planned() -> None:
+    plan = make_plan(read_job(ROOT / "examples" / "iota-1102-20C", recorded=False), power=False)
+    assert plan.name == RECORDED
+    assert plan.measured == 20
+    (placing,) = plan.to_measure  # one position is a copy of another, so the twentieth is still to be measured
+    assert placing.title == "along +X +Y"
+    assert all(condition.met for condition in plan.conditions)
+    # the noise that the residuals of the recording show, in Harris 2004 12.7 µm of a length, √2 of a coordinate
+    assert plan.setting.sigma == pytest.approx(12.7e-3 / np.sqrt(2), rel=0.02)
+
+
+def test_what_a_recording_determined_is_what_its_report_says() -> None:
+    job = read_job(ROOT / "examples" / "iota-1102-20C")
+    plan = make_plan(read_job(ROOT / "examples" / "iota-1102-20C", recorded=False), power=False)
+    estimate = plan.setting.model(job.points).estimate().least_squares
+    assert plan.start.identifiability is not None
+    expected = [p.u for p in plan.start.identifiability.parameters]
+    # the design is taken at zero errors and not at the estimated ones, half a milliradian off
+    np.testing.assert_allclose(expected, np.sqrt(np.diag(estimate.covariance))[: len(expected)], rtol=2e-3)
+
+
+def test_measurements_set_aside_determine_nothing(job: Path) -> None:
+    text = (job / "job.toml").read_text("utf-8").replace("[recording]\n", "[recording]\nset_aside = [20]\n")
+    (job / "job.toml").write_text(text, encoding="utf-8")
+    plan = make_plan(read_job(job, recorded=False), power=False)
+    assert plan.measured == 19
+    assert 20 not in plan.start.points.measurement
+    assert plan.first == 21
+
+
+def test_further_placings_of_a_recording_are_of_the_artefact_that_was_recorded(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(ROOT / "examples" / "step-gauge-simulated", tmp_path / "job"))
+    with (folder / "job.toml").open("a", encoding="utf-8") as file:
+        file.write('\n[plan]\ncriterion = "D"\nmore = 1\ncandidates = 60\n')
+    plan = make_plan(read_job(folder, recorded=False), power=False)
+    (placing,) = plan.to_measure
+    first = plan.start.placings[0].points
+    np.testing.assert_array_equal(
+        np.unique(placing.points.columns["reference_mm"]), np.unique(first.columns["reference_mm"])
+    )
+    assert set(first.columns) <= set(plan.outlook.points.columns)
+    assert plan.measured == 7
+
+
+def test_a_budget_of_time_bounds_the_placings_that_are_searched_for(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'criterion = "D"\nbudget_min = 62\nminutes_per_placing = 5\nrepeats = 3')
+    assert len(plan.to_measure) == 10  # six minutes each
+    assert sum(plan.minutes) <= 62
+
+
+def test_a_standard_plan_beyond_the_budget_says_so(tmp_path: Path) -> None:
+    plan = planned(tmp_path, "budget_min = 60")
+    assert [c.what for c in plan.conditions if not c.met] == ["at most 60 min: 120 min"]
+
+
+def test_shift_series_say_what_they_cannot_show() -> None:
+    plan = make_plan(read_job(ROOT / "examples" / "shift-simulated", recorded=False))
+    # the greatest common measure of shifts of 20 and 50 mm
+    assert "every 10 mm" in plan.free[0]
+
+
+def test_power_comes_for_every_effect_that_the_job_does_not_name(tmp_path: Path) -> None:
+    plan = planned(tmp_path, 'rivals = ["rotation_x_z", "artefact_sag"]\nrepeats = 1', power=True)
+    found = {power.effect: power for power in plan.start.powers}
+    assert found["rotation_x_z"].detectable is not None
+    assert found["artefact_sag"].detectable is None  # one with the scales of X and Y
+
+
+def test_the_noise_of_a_plan_is_stated_or_that_of_an_earlier_recording_or_averaged(tmp_path: Path) -> None:
+    noise = planned(tmp_path).setting.noise
+    assert noise is not None
+    assert (noise.placing, noise.growth) == (None, None)
+    noise = planned(tmp_path, "placing_um = 0.5\ngrowth_um = 0.0").setting.noise
+    assert noise is not None
+    assert (noise.placing, noise.growth) == (pytest.approx(0.5e-3), 0.0)
+    (tmp_path / "earlier").mkdir()
+    earlier = {"coordinate_um": {"value": 2.0, "u": 0.1}, "placing_um": {"value": 0.3, "u": 0.4}}
+    content = json.dumps({"schema": "cmm-uq/results/1", "noise": earlier})
+    (tmp_path / "earlier" / "results.json").write_text(content, encoding="utf-8")
+    plan = planned(tmp_path, 'noise_from = "earlier"')
+    assert plan.setting.noise is not None
+    assert plan.setting.sigma == pytest.approx(2e-3)  # not the 1 µm that the job states
+    assert plan.setting.noise.placing == pytest.approx(0.5e-3)
+
+
+def test_set_up_offsets_make_what_is_expected_worse_by_what_the_repeats_share(tmp_path: Path) -> None:
+    """Three repeats: √(1/3 + 1) of a reading instead of √(1/3)."""
+    plan = planned(tmp_path, "placing_um = 1.0\ngrowth_um = 0.0", effects='"squareness_xy", "squareness_zx"')
+    assert plan.start.identifiability is not None
+    for one in plan.start.identifiability.parameters:
+        assert one.u is not None
+        assert one.u_white is not None
+        assert one.u / one.u_white == pytest.approx(2.0, rel=1e-6)
+    assert plan.worth is not None
+    assert plan.worth.enough == 4
+
+
+def test_what_the_diagnosis_would_find_is_larger_under_set_up_offsets(tmp_path: Path) -> None:
+    found = []
+    for offset in ("0.0", "2.0"):
+        plan = planned(tmp_path, f'rivals = ["rotation_x_z"]\nplacing_um = {offset}\ngrowth_um = 0.0', power=True)
+        (power,) = plan.start.powers
+        assert power.detectable is not None
+        found.append(power.detectable)
+    # √(1/3 + 4) over √(1/3) is 3.6 where it is known that there are none; a diagnosis reckons with some in either case
+    assert 1.5 < found[1] / found[0] < 3.6
+
+
+@pytest.mark.parametrize(("plan", "effects", "length", "said"), [
+    ("", "", 400.0, "no effect is named"),
+    ("", SIX, 1000.0, "long along"),
+    ("volume_mm = { z = [-200.0, 0.0] }", SIX, 400.0, "long along"),
+    ('criterion = "D"', SIX, 2000.0, "long along"),
+    ('criterion = "D"\nnumber = 9', SIX, 2000.0, "no placing is possible"),
+    ("[plan.fixtures]\ndirections = [[0.0, 0.0, 1.0]]", SIX, 400.0, "no fixture holds the artefact"),
+    ('criterion = "D"\nbudget_min = 2', SIX, 400.0, "too short for a single placing"),
+    ('criterion = "D"\nmore = 1\nbudget_min = 123', SIX, 400.0, "beside the 20 that are kept"),
+    ('criterion = "separation"\nrivals = ["rotation_x_z"]', SIX, 400.0, "at least 2 effects"),
+    ('criterion = "D"', '"rotation_z_z"', 400.0, "no candidate placing shows any of these effects"),
+    ('rivals = ["hysteresis_x"]', SIX, 400.0, "needs the column approach_x"),
+    ('rivals = ["rotation_w_z"]', SIX, 400.0, "unknown effect"),
+    ('ready = "ISO 10360-2"', SIX, 400.0, "no plan for a job of kind 'ballbar'"),
+])  # fmt: skip
+def test_what_cannot_be_planned_is_refused_with_its_reason(
+    tmp_path: Path, plan: str, effects: str, length: float, said: str
+) -> None:
+    with pytest.raises(CmmUqError, match=said):
+        planned(tmp_path, plan, effects, length)
+
+
+def test_where_the_standard_plan_is_not_possible_a_criterion_finds_another(tmp_path: Path) -> None:
+    """A stand that holds the bar level only: no diagonal of the standard in height."""
+    fixtures = "\n[plan.fixtures]\ndirections = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, -1.0, 0.0]]"
+    level = '"scale_x", "scale_y", "squareness_xy"'
+    with pytest.raises(CmmUqError, match="no fixture"):
+        planned(tmp_path, 'criterion = "D"' + fixtures, level)
+    plan = planned(tmp_path, 'criterion = "D"\nnumber = 12' + fixtures, level)
+    assert plan.name == SPREAD
+    assert len(plan.to_measure) == 12
+    assert plan.scores is not None
+    assert plan.scores[1] < plan.scores[0]
+    assert {round(float(abs(p.points.xyz[1, 2] - p.points.xyz[0, 2])), 6) for p in plan.to_measure} == {0.0}
+
+
+def test_a_plate_shifted_in_a_plane_is_left_to_its_report() -> None:
+    with pytest.raises(CmmUqError, match="are not planned"):
+        make_plan(read_job(ROOT / "examples" / "shift-plate-simulated", recorded=False))

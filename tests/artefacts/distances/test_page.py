@@ -1,0 +1,65 @@
+"""The adjustment that a machine needs, as the certificate of a ballbar and of a Bryan gauge prints it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from cmm_uq.artefacts.ballbar.analysis import results
+from cmm_uq.certificate.document import Paragraph
+from tests.artefacts.reading import number
+from tests.artefacts.simulated import SQUARE, analysed, blocks, recovered, table
+
+WHAT = "What to turn and what to enter"
+SECOND_WAY = "The six factors by the distance equations, a second way"
+
+
+def test_the_real_machine_is_told_what_to_turn() -> None:
+    """Squareness XY −174″: the angle X–Y is 174″ short of 90°, so Y turns by +174″ about +Z, 465 µm over 550 mm."""
+    rows = {row[0]: row for row in table("iota-1102-20C", WHAT).rows}
+    guide = rows["Guide of Y: turn about +Z by"]
+    assert guide[1:4] == ("174", "16", "″")
+    assert guide[4] == "465"
+    assert guide[5] == "yes"
+    assert rows["Scale of Z: lengthen what it reads by"][5] == ""
+
+
+def test_distance_equations_and_model_agree_on_the_real_recording() -> None:
+    for name, by_equations, U, _, by_model, *_ in table("iota-1102-20C", SECOND_WAY).rows:
+        assert abs(number(by_equations) - number(by_model)) <= 0.1 * number(U), name
+
+
+def test_distance_equations_are_as_uncertain_as_least_squares_under_white_noise() -> None:
+    """The certificate of the bar is part of both: u of the residuals and 5 µm on 404 mm; k is of t."""
+    result = analysed("iota-1102-20C")
+    found = results(result)["distance_equations"]["factors"]
+    squares = result.least_squares
+    freedom = squares.degrees_of_freedom
+    for unknown, variance in zip(squares.unknowns[:6], np.diag(squares.covariance), strict=False):
+        one = found[unknown.key[0]][unknown.key[1]]
+        assert one["u"] == pytest.approx(float(np.sqrt(variance)), rel=1e-3), unknown.key
+        certificate = 5.0 / 404.2357e-3 / one["u"] if unknown.unit == "ppm" else 0.0
+        effective = freedom / (1 - certificate**2) ** 2  # JCGM 100, G.2b
+        assert one["k"] == pytest.approx(stats.t.ppf(0.975, np.floor(effective)), rel=1e-6), unknown.key
+        assert one["U"] == pytest.approx(one["k"] * one["u"])
+
+
+def test_an_uncalibrated_bar_gives_no_scale_to_enter() -> None:
+    rows = table("bryan-simulated", WHAT).rows
+    assert [row[0] for row in rows] == [
+        "Guide of Y: turn about +Z by", "Guide of Z: turn about +X by", "Guide of Z: turn about +Y by",
+    ]  # fmt: skip
+    assert [row[4] for row in table("bryan-simulated", SECOND_WAY).rows[:3]] == ["not determined"] * 3
+    notes = [block.text for block in blocks("iota-1102-20C-compensated") if isinstance(block, Paragraph)]
+    assert any("The length of the bar is not certified" in note for note in notes)
+
+
+def test_the_joint_fit_finds_what_two_steps_lose() -> None:
+    """Swept over half a sphere: Z–X was simulated as 4″, the second step has a quarter of it, and U says so."""
+    recovered("bryan-simulated", SQUARE)
+    rows = {row[0]: row for row in table("bryan-simulated", SECOND_WAY).rows}
+    _, two_steps, U, _, joint, *_ = rows["Angle Z–X − 90°"]
+    assert abs(number(joint) - 4.0) + 2 < abs(number(two_steps) - 4.0) < number(U)
+    _, two_steps, U, _, joint, *_ = rows["Angle Y–Z − 90°"]
+    assert abs(number(joint) + 7.5) + 2 < abs(number(two_steps) + 7.5) < number(U)

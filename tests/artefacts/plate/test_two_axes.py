@@ -1,0 +1,148 @@
+"""A coordinate that nobody read is no observation: a plate on a machine that reads two axes, and a plane that stands still."""
+
+from __future__ import annotations
+
+import datetime as dt
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import cmm_uq
+from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.base.points import Floats
+from cmm_uq.jobs.job import Job
+from cmm_uq.machine.model import MeasurementModel
+
+GRID = np.array([[i, j, 0.0] for j in range(5) for i in range(5)]) * 90.0
+MACHINE = {"name": "M", "travel_mm": {"x": [0, 900], "y": [0, 600], "z": [-500, 10]}}
+EFFECTS = ["scale_x", "scale_y", "squareness_xy"]
+SECOND = np.pi / 648000
+
+
+def flat(seed: int, *, still: bool = True, turned: bool = False) -> pd.DataFrame:
+    """Twenty-five balls in two places on the table, noise of 2 µm; z read as 0, or with its noise."""
+    random, frames = np.random.default_rng(seed), []
+    for number, place in enumerate(([100, 60, 0], [400, 150, 0]), 1):
+        body = GRID[:, [1, 0, 2]] if turned and number == 2 else GRID
+        xyz = body + place + 2e-3 * random.standard_normal(GRID.shape)
+        if still:
+            xyz[:, 2] = 0
+        told = {f"{a}_mm": xyz[:, i] for i, a in enumerate("xyz")}
+        frames.append(pd.DataFrame({"measurement": number, "point": np.arange(1, 26), **told}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def referenced(points: pd.DataFrame) -> pd.DataFrame:
+    """With the nominal positions beside them."""
+    return points.assign(**{f"reference_{a}_mm": np.tile(GRID[:, i], 2) for i, a in enumerate("xyz")})
+
+
+def model_of(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+    return screened_model(job)
+
+
+def plate_job(points: pd.DataFrame, **recording: object) -> Job:
+    artefact = {"kind": "plate"} if "earlier" in recording else {"kind": "plate", "u_um": 0.0}
+    files = {"earlier.csv": recording.pop("frame")} if "earlier" in recording else {}
+    return cmm_uq.job(points, machine=MACHINE, artefact=artefact, effects=EFFECTS, recording=recording, files=files)
+
+
+def in_the_plane(difference: Floats, at: Floats, number: Floats) -> tuple[Floats, Floats, float, int]:
+    """Least squares of differences (n, 2) at places (n, 2), written out: two shifts and a turn of each placing, three factors.
+
+    Returns the factors, their standard uncertainties, the standard deviation of a residual, and the degrees of freedom.
+    """
+    columns = []
+    for each in np.unique(number):
+        own = (number == each).astype(float)
+        columns += [
+            np.column_stack([own, 0 * own]),
+            np.column_stack([0 * own, own]),
+            own[:, None] * at[:, ::-1] * [-1, 1],
+        ]
+    nothing = np.zeros(len(at))
+    factors = [np.column_stack([-1e-6 * at[:, 0], nothing]), np.column_stack([nothing, -1e-6 * at[:, 1]]),
+               np.column_stack([SECOND * at[:, 1], nothing])]  # fmt: skip
+    A = np.column_stack([column.ravel() for column in (*factors, *columns)])
+    found, rest, rank, _ = np.linalg.lstsq(A, difference.ravel(), rcond=None)
+    dof = A.shape[0] - int(rank)
+    sd = float(np.sqrt(rest[0] / dof))
+    return found[:3], sd * np.sqrt(np.diag(np.linalg.inv(A.T @ A)))[:3], sd, dof
+
+
+def test_a_plate_on_two_axes_has_the_least_squares_of_two_coordinates() -> None:
+    points = flat(1)
+    model, _ = model_of(plate_job(referenced(points)))
+    found = model.estimate().least_squares
+    indicated = points[["x_mm", "y_mm"]].to_numpy()
+    value, u, sd, dof = in_the_plane(indicated - np.tile(GRID[:, :2], (2, 1)), indicated, points.measurement.to_numpy())
+    assert found.degrees_of_freedom == dof == 2 * 50 - 2 * 3 - 3
+    assert found.sigma == pytest.approx(sd, rel=1e-3)
+    assert np.sqrt(np.diag(found.covariance))[:3] == pytest.approx(u, rel=1e-3)
+    assert found.value[:3] == pytest.approx(value, abs=0.01 * u.min())
+
+
+@pytest.mark.parametrize(
+    ("now", "then", "tilts", "within"), [(True, True, 0, 1e-3), (False, True, 0, 1e-3), (True, False, 4, 0.1)]
+)
+def test_what_was_not_read_on_one_of_two_dates_is_no_difference(
+    now: bool, then: bool, tilts: int, within: float
+) -> None:
+    """Where z was read earlier alone, its noise is the shape of the plate, and two tilts of each placing move it a little."""
+    later, earlier = flat(1, still=now), flat(2, still=then)
+    job = plate_job(later, earlier="earlier.csv", earlier_date=dt.date(2025, 1, 1), frame=earlier)
+    model, findings = model_of(job)
+    assert [(f.measurements, f.column) for f in findings] == [((m,), "z_mm" if now else None) for m in (1, 2)]
+    found = model.estimate().least_squares
+    a, b = (frame[["x_mm", "y_mm"]].to_numpy() for frame in (later, earlier))
+    _, u, sd, dof = in_the_plane(a - b, a, later.measurement.to_numpy())
+    assert found.degrees_of_freedom == dof - tilts
+    assert found.sigma == pytest.approx(sd / 2**0.5, rel=within)
+    assert np.sqrt(np.diag(found.covariance))[:3] == pytest.approx(u, rel=within)
+
+
+def test_a_plate_on_three_axes_has_three_coordinates() -> None:
+    model, findings = model_of(plate_job(referenced(flat(1, still=False))))
+    assert model.estimate().least_squares.degrees_of_freedom == 3 * 50 - 2 * 6 - 3
+    assert not model.artefact.unread().any()
+    assert not findings
+
+
+def test_the_unread_axis_is_found_however_the_plate_lies() -> None:
+    """Upright along X the plate's own z lies along the machine's y; with one plate tilted only the other loses an axis."""
+    points = referenced(flat(3, turned=True))
+    upright = points.assign(y_mm=points.z_mm + 300, z_mm=points.y_mm - 480)
+    model, _ = model_of(plate_job(upright))
+    assert model.artefact.unread().reshape(-1, 3).tolist() == [[False, False, True]] * 50
+    tilted = points.assign(z_mm=np.where(points.measurement == 2, 0.1 * points.x_mm - 80, 0.0))
+    tilted.loc[tilted.measurement == 2, "x_mm"] *= np.sqrt(1 - 0.1**2)
+    artefact = model_of(plate_job(tilted))[0].artefact
+    assert artefact.unread().reshape(-1, 3).any(axis=1).tolist() == [True] * 25 + [False] * 25
+
+
+def test_the_coordinate_is_named_with_its_measurement() -> None:
+    _, findings = model_of(plate_job(referenced(flat(1))))
+    assert [(f.kind, f.column, f.measurements, f.set_aside) for f in findings] == [
+        ("stuck", "z_mm", (1,), True), ("stuck", "z_mm", (2,), True)
+    ]  # fmt: skip
+    assert findings[0].why == "in all of measurement 1 z_mm is 0: nobody read it, and it says nothing"
+
+
+def plane_job(*heights: Floats | float) -> Job:
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(50, 800, 7), np.linspace(50, 500, 5)))
+    frames = [
+        pd.DataFrame({"measurement": number, "point": np.arange(1, 36), "x_mm": x, "y_mm": y, "z_mm": z})
+        for number, z in enumerate(heights, 1)
+    ]
+    return cmm_uq.job(pd.concat(frames), machine=MACHINE, artefact={"kind": "plane"}, effects=["straightness_x_z"])
+
+
+def test_a_plane_that_nobody_read_is_refused_and_makes_no_other_look_better() -> None:
+    read = -200 + 1e-3 * np.random.default_rng(4).standard_normal(35)
+    with pytest.raises(cmm_uq.CmmUqError, match="no observation is left"):
+        model_of(plane_job(-300.0))
+    both, alone = (model_of(job)[0].estimate().least_squares for job in (plane_job(-300.0, read), plane_job(read)))
+    assert both.degrees_of_freedom == alone.degrees_of_freedom == 35 - 3 - 1
+    assert both.sigma == pytest.approx(alone.sigma, rel=1e-9)

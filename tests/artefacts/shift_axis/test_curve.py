@@ -1,0 +1,171 @@
+"""The joint estimate of an axis: what it finds of a known error, and what it must agree with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cmm_uq.artefacts.shift_axis.curve import CurveEstimate, estimate_curve
+from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
+from cmm_uq.artefacts.shift_axis.series import shifted_series
+from cmm_uq.base.points import Points
+from tests.artefacts.shifting.shifted import PITCH_20, bent, read
+
+NOISE = 1.1e-3
+KNOWN = KnownSpan(0, 22, 440.0, 0.0)
+
+
+def off(estimate: CurveEstimate, error=bent):
+    """True minus estimated error, and the standard uncertainty, at the positions read."""
+    curve, start = estimate.curve, estimate.series.reading[0]
+    return error(curve.position) - error(np.array([start])) - curve.error, curve.u
+
+
+@pytest.fixture(scope="module")
+def paper() -> CurveEstimate:
+    """The paper's data: 23 points, 20 mm, ten readings of 1.1 µm, one shift by the pitch."""
+    points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 10)
+    return estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.5), KNOWN)
+
+
+def test_the_chains_converge(paper: CurveEstimate) -> None:
+    assert paper.chains.converged
+
+
+def test_the_true_curve_lies_in_the_simultaneous_band_widened_to_a_chance_of_one_in_ten_thousand(
+    paper: CurveEstimate,
+) -> None:
+    away, u = off(paper)
+    assert np.all(np.abs(away[u > 1e-7]) < 5.0 * u[u > 1e-7])
+
+
+def test_repeats_give_the_repeatability(paper: CurveEstimate) -> None:
+    """460 readings: to 1/√(2·414) = 3.5 %, three times that."""
+    assert paper.sigma.mean() == pytest.approx(NOISE, rel=0.105)
+
+
+def test_the_posterior_agrees_with_the_law_of_propagation_where_smoothness_adds_little(paper: CurveEstimate) -> None:
+    """A shift by the pitch joins all points: the integration is unbiased, and the joint fit at most as uncertain."""
+    a, b = paper.series.pair
+    law = integrated(a, b, np.full((2, 23), paper.sigma.mean() / np.sqrt(10)), known=KNOWN)
+    joint = paper.at(a)
+    assert np.all(joint.u[1:] <= 1.1 * law.u[1:])  # 2000 draws know u to 1.6 %; growth and σ add to the posterior's
+    assert np.all(joint.u[5:18] > 0.8 * law.u[5:18])
+    assert np.all(np.abs(joint.error - law.error) < 3 * law.u + 1e-12)
+
+
+def test_the_known_length_is_met_exactly(paper: CurveEstimate) -> None:
+    np.testing.assert_allclose(paper.artefact[:, 22], 440.0, atol=1e-9)
+
+
+def test_without_noise_three_placings_give_the_curve_and_the_artefact() -> None:
+    places = PITCH_20 + np.random.default_rng(3).normal(0, 0.01, 23)
+    points = read(bent, places, (0.0, 20.0, 47.0))
+    known = KnownSpan(0, 22, places[22] - places[0], 0.0)
+    estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0, 47.0]), 0.5), known, sigma=1e-5)
+    away, _ = off(estimate)
+    assert np.abs(away).max() < 0.2e-3
+    np.testing.assert_allclose(estimate.artefact.mean(axis=0), places - places[0], atol=0.2e-3)
+
+
+def test_points_missing_in_a_placing_cost_little() -> None:
+    points = read(bent, PITCH_20, (0.0, 20.0, 47.0), 0.2e-3, 3)
+    gone = ((points.measurement == 2) & (points.point == 7)) | ((points.measurement == 3) & (points.point > 18))
+    series = shifted_series(points.select(~gone), "x", np.array([0.0, 20.0, 47.0]), 0.5)
+    estimate = estimate_curve(series, KNOWN)
+    away, u = off(estimate)
+    assert np.all(np.abs(away[u > 1e-7]) < 5 * u[u > 1e-7])
+
+
+def test_an_artefact_turned_a_little_sideways_reads_shorter_by_its_cosine() -> None:
+    """2 mrad: 440 mm shorten by 0.88 µm in that placing alone; the other coordinates tell."""
+    points = read(lambda x: 0 * x, PITCH_20, (0.0, 20.0))
+    turned = points.measurement == 2
+    x = points.xyz[:, 0].copy()
+    xyz = np.column_stack([
+        np.where(turned, 20 + (x - 20) * np.cos(2e-3), x), np.where(turned, (x - 20) * np.sin(2e-3), 0), 0 * x
+    ])  # fmt: skip
+    series = shifted_series(replace(points, xyz=xyz), "x", np.array([0.0, 20.0]), 0.5)
+    assert series.cosine == pytest.approx([1.0, np.cos(2e-3)], abs=1e-12)
+    estimate = estimate_curve(series, KNOWN, sigma=1e-5)
+    assert np.abs(estimate.curve.error).max() < 0.05e-3
+
+
+def forth_and_back(rate: float, noise: float) -> tuple[Points, Points]:
+    """Two series, the second read forth and halfway back, while the machine drifts, mm/h; half an hour forth and back.
+
+    With and without the time of each reading.
+    """
+    points = read(bent, PITCH_20, (0.0, 20.0), noise, 2)
+    points = points.select((points.repeat == 1) | ((points.measurement == 2) & (points.point > 8)))
+    way = np.where(points.repeat == 1, points.point - 1, 46 - points.point) / 45
+    time = 1800.0 * (way + points.measurement - 1)
+    drifting = replace(points, xyz=points.xyz + np.column_stack([rate * time / 3600, 0 * time, 0 * time]))
+    return replace(drifting, columns={"time_s": time}), drifting
+
+
+def test_drift_is_told_from_the_curve_where_series_are_read_forth_and_back() -> None:
+    """6 µm/h; read one way only, a drift makes b − a change linearly along the axis, as a parabola of errors would."""
+    timed, blind = forth_and_back(6e-3, 0.0)
+    shifts = np.array([0.0, 20.0])
+    series = shifted_series(timed, "x", shifts, 0.5)
+    assert series.drift is not None
+    assert series.drift.rate == pytest.approx(6e-3, rel=1e-4)
+    away, _ = off(estimate_curve(series, KNOWN, sigma=1e-5))
+    worse, _ = off(estimate_curve(shifted_series(blind, "x", shifts, 0.5), KNOWN, sigma=1e-5))
+    assert np.ptp(away) < 0.2e-3 < 1e-3 < np.ptp(worse)
+
+
+def test_repeats_tell_the_repeatability_apart_from_the_drift() -> None:
+    """15 differences of two readings, one spent on the drift: known to 1/√28 = 19 %; three times that."""
+    timed, blind = forth_and_back(20e-3, NOISE)
+    scatters = [shifted_series(p, "x", np.array([0.0, 20.0]), 0.5).scatter for p in (timed, blind)]
+    assert scatters[0] is not None
+    assert scatters[1] is not None
+    assert scatters[0].sigma == pytest.approx(NOISE, rel=0.57)
+    assert scatters[1].sigma > 2 * NOISE
+
+
+def test_without_a_known_length_and_shift_the_curve_is_zero_at_both_ends() -> None:
+    points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 3)
+    estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.5))
+    ends = estimate.at(estimate.series.reading[[0, 22]])
+    assert not estimate.scale_known
+    np.testing.assert_allclose(ends.draws, 0.0, atol=1e-12)
+
+
+def test_a_shift_known_exactly_gives_the_scale() -> None:
+    """50 ppm: a shift of 20 mm, read without noise, shows 1 nm a µm of scale."""
+    points = read(lambda x: 50e-6 * x, PITCH_20, (0.0, 20.0))
+    estimate = estimate_curve(shifted_series(points, "x", np.array([0.0, 20.0]), 0.0), sigma=1e-5)
+    assert estimate.scale.mean() == pytest.approx(50e-6, abs=0.5e-6)
+
+
+def test_the_same_seed_gives_the_same_draws() -> None:
+    points = read(bent, PITCH_20, (0.0, 20.0), NOISE, 2)
+    series = shifted_series(points, "x", np.array([0.0, 20.0]), 0.5)
+    one, other = (estimate_curve(series, KNOWN, seed=5).curve.draws for _ in range(2))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_with_next_to_no_smoothness_the_posterior_is_the_integration_with_its_propagated_uncertainty(
+    paper: CurveEstimate,
+) -> None:
+    """A shift by the pitch determines every place once, so nothing else can come out: GUM, Monte Carlo and posterior agree.
+
+    Hyper-parameters held at 150 µm, a correlation length of 14 mm and σ = 1.1 µm; 10 000 draws give u to 0.7 %.
+    """
+    a, b = paper.series.pair
+    theta = np.tile([np.log(30.0), np.log(0.03), 0.0, np.log(NOISE)], (10_000, 1))
+    free = replace(paper, coefficients=paper.coefficients.model.draw(theta, np.random.default_rng(2))).at(a)
+    noise = np.full((2, 23), NOISE / np.sqrt(10))
+    law = integrated(a, b, noise, known=KNOWN)
+    trials = integrated_by_monte_carlo(a, b, noise, known=KNOWN)
+    np.testing.assert_allclose(free.u[1:], law.u[1:], rtol=0.035, atol=1e-9)
+    np.testing.assert_allclose(trials.u[1:], law.u[1:], rtol=0.012, atol=1e-9)
+    np.testing.assert_allclose(free.error, law.error, atol=5 * law.u.max() / 100)
+    correlation = np.corrcoef(free.draws[:, 1:-1], rowvar=False)
+    spread = np.outer(law.u, law.u)[1:-1, 1:-1]
+    np.testing.assert_allclose(correlation, law.covariance[1:-1, 1:-1] / spread, atol=0.05)

@@ -1,0 +1,34 @@
+"""Recordings of shifted artefacts on machines whose error is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from cmm_uq.base.points import Floats, Points
+
+Error = Callable[[Floats], Floats]
+PITCH_20 = 20.0 * np.arange(23)
+
+
+def bent(x: Floats) -> Floats:
+    """About 27 µm peak to valley over 460 mm; neither a sine of the estimator's basis nor a draw of its prior."""
+    return np.asarray(0.006 * np.cos(x / 70) + 0.012 * (x / 230 - 1) ** 3)
+
+
+def read(
+    error: Error, places: Floats, shifts: Sequence[float], noise: float = 0.0, repeats: int = 1, seed: int = 0
+) -> Points:
+    """Readings r with r + e(r) = place + shift, one row a repeat."""
+    random = np.random.default_rng(seed)
+    rows = []
+    for s, shift in enumerate(shifts, 1):
+        ideal = places + shift
+        for _ in range(10):
+            ideal = places + shift - error(ideal)
+        for p, x in enumerate(ideal, 1):
+            rows += [(x + random.normal(0, noise), s, p, k) for k in range(1, repeats + 1)]
+    x, series, point, repeat = np.array(rows).T
+    whole = (values.astype(np.int64) for values in (series, point, repeat))
+    return Points(np.column_stack([x, 0 * x, 0 * x]), *whole)

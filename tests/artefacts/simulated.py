@@ -1,0 +1,105 @@
+"""The simulated example jobs, analysed once, with the errors that were put into them.
+
+Their documents are made once for all processes of a run of the tests, in its temporary folder.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.app.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.app.commands.plan import plan_outcome
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import diagnosis_outcome
+from cmm_uq.certificate.document import Block, Document, Table
+from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.results_file import as_json
+from tests.conftest import ROOT
+
+SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}
+SQUARE = {"squareness_xy": 12.0, "squareness_yz": -7.5, "squareness_zx": 4.0}
+
+
+def kept(make: Callable[[str], Document]) -> Callable[[str], Document]:
+    """Documents as another process of this run may have made them already; two at once make the same."""
+
+    @cache
+    def found(job: str) -> Document:
+        folder = os.environ.get("CMM_UQ_TESTS_SHARE")
+        if folder is None:
+            return make(job)
+        path = Path(folder) / f"{make.__name__}-{job}.pickle"
+        if not path.exists():
+            own = path.with_suffix(f".{os.getpid()}")
+            own.write_bytes(pickle.dumps(make(job)))
+            own.replace(path)
+        document = pickle.loads(path.read_bytes())
+        assert isinstance(document, Document)
+        return document
+
+    return found
+
+
+@cache
+def analysed(job: str) -> Result:
+    return analyse(ROOT / "examples" / job)
+
+
+@cache
+def outcome(job: str) -> Outcome:
+    return outcome_of(analysed(job))
+
+
+@kept
+def document(job: str) -> Document:
+    results(job)
+    return outcome(job).document
+
+
+@cache
+def results(job: str) -> dict[str, Any]:
+    """Data of results.json, as any process of this run may have made them already."""
+    folder = os.environ.get("CMM_UQ_TESTS_SHARE")
+    if folder is None:
+        data = as_json(outcome(job).results)
+    else:
+        path = Path(folder) / f"results-{job}.json"
+        if not path.exists():
+            own = path.with_suffix(f".{os.getpid()}")
+            own.write_bytes(as_json(outcome(job).results))
+            own.replace(path)
+        data = path.read_bytes()
+    found: dict[str, Any] = json.loads(data)
+    return found
+
+
+@kept
+def diagnosed(job: str) -> Document:
+    return diagnosis_outcome(read_job(ROOT / "examples" / job)).document
+
+
+@kept
+def planned(job: str) -> Document:
+    return plan_outcome(read_job(ROOT / "examples" / job, recorded=False), power=False).document
+
+
+def blocks(job: str) -> list[Block]:
+    return [block for section in document(job).sections for block in section.blocks]
+
+
+def table(job: str, caption: str) -> Table:
+    return next(block for block in blocks(job) if isinstance(block, Table) and block.caption == caption)
+
+
+def recovered(job: str, truth: dict[str, float]) -> None:
+    """Every error is found again, within four standard uncertainties."""
+    result = analysed(job)
+    for effect, value in truth.items():
+        quantity = next(iter(result.parameters[effect].values()))
+        assert abs(quantity.value - value) < 4 * quantity.u, effect

@@ -1,0 +1,297 @@
+"""Every number in a certificate's tables stands in results.json: rounded as printed, in the record of its own row."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from decimal import Decimal
+from itertools import chain
+from typing import Any
+
+import pytest
+
+from cmm_uq.app.commands.analysis import outcome_of
+from cmm_uq.artefacts.shift_plate.curves_page import EVERY
+from cmm_uq.certificate.document import Document, Table
+from cmm_uq.certificate.results_file import as_json
+from tests.artefacts.reading import tables
+from tests.artefacts.simulated import analysed, document
+from tests.conftest import MACHINE_JOBS
+
+Record = Sequence[Any]
+Results = Mapping[str, Any]
+
+EXAMPLES = sorted(
+    folder.name for folder in MACHINE_JOBS
+    if not folder.name.startswith("plan-") and folder.name != "iota-1102-maps"  # which is diagnosed, not certified
+)  # fmt: skip
+
+
+def columns(data: Mapping[str, Any], *names: str) -> list[Record]:
+    """Rows of lists of one length."""
+    return list(zip(*(data[name] for name in names), strict=True))
+
+
+def parameters(results: Results) -> list[Record]:
+    return [
+        [quantity, results.get("least_squares", {}).get("estimates", {}).get(effect, {}).get(name)]
+        for effect, found in results["estimates"].items() for name, quantity in found.items()
+    ]  # fmt: skip
+
+
+def beside_estimates(results: Results, found: Mapping[str, Any]) -> list[Record]:
+    return [[value, results["estimates"].get(effect)] for effect, value in found.items()]
+
+
+def axis_figures(results: Results) -> list[Record]:
+    return [*([quantity] for found in results["estimates"].values() for quantity in found.values()),
+            [results["noise"]["coordinate_um"]]]  # fmt: skip
+
+
+def curves_of(axis: str) -> Callable[[Results], list[Record]]:
+    def rows(results: Results) -> list[Record]:
+        own = [curve for name, curve in results["curves"].items() if name.split("_")[1] == axis]
+        units = ["um" if "error_um" in curve else "arcsec" for curve in own]
+        values = [columns(c, "position_mm", f"error_{u}", f"U_{u}") for c, u in zip(own, units, strict=True)]
+        return list(zip(*values, strict=True))[::EVERY]
+
+    return rows
+
+
+def surfaces(results: Results) -> list[Record]:
+    return [[plane] for plane in results["planes"] if plane["surface"]]
+
+
+def standard(results: Results) -> list[Record]:
+    found = results["standard"]
+    return [[record] for record in (*found["sides_mm"].values(), *found["angles"].values(), found["height_mm"])]
+
+
+def ball_places(results: Results) -> list[Record]:
+    return columns(results["artefact"], "point", "first_mm", "U_first_mm", "second_mm", "U_second_mm")
+
+
+def offset(results: Results) -> list[Record]:
+    found = results["digitizer"]
+    return list(zip(found["offset_mm"].values(), found["correlation"], strict=True))
+
+
+def offset_by_other_ways(results: Results) -> list[Record]:
+    found = results["digitizer"]
+    return list(zip(found["offset_mm"].values(), found["by_centres_mm"], found["closed_form_mm"], strict=True))
+
+
+def decided(results: Results) -> list[Record]:
+    """Values of one length in one measurement, as a row has them, in the order of the first."""
+    (stated,) = results["conformity"]
+    rows: dict[tuple[Any, ...], list[Any]] = {}
+    for one in stated["errors"]:
+        key = (one["measurement"], one["length_mm"], one["u_um"], one["limit_um"], one["standing"])
+        rows.setdefault(key, []).append(one)
+    return list(rows.values())
+
+
+def of_test_value(results: Results) -> list[Record]:
+    """Lines that contribute, in µm as printed."""
+    (stated,) = results["conformity"]
+    lines = stated["test_uncertainty"]["budget"]
+    scale = 1e3 if any(line["unit"] == "mm" for line in lines) else 1.0
+    return [[line | {"contribution": scale * line["contribution"]}] for line in lines if line["contribution"]]
+
+
+STATED = (
+    "ASME B89.4.1-1997, volumetric performance",
+    "ISO 10360-2:2009, E0",
+    "ISO 10360-5:2010, P_FTU",
+    "VDI/VDE 2617, E0",
+)
+
+RECORDS: dict[str, Callable[[Results], Sequence[Record]]] = {
+    "Figures of performance": lambda r: [[quantity] for quantity in r["accuracy_uncertainty"].values()],
+    "Error factors of the machine": parameters,
+    "Differences that are determined": lambda r: [[one] for one in r["differences"]],
+    "What to turn and what to enter": lambda r: [[one] for one in r["adjustments"]],
+    "The six factors by the distance equations, a second way":
+        lambda r: beside_estimates(r, r["distance_equations"]["factors"]),
+    "Lengths brought to 20 °C": lambda r: [[one] for one in r["lengths"]["each"]],
+    "Contributions to the deviation of one length": lambda r: [[line] for line in r["length_budget"]["budget"]],
+    "Each line by itself, at 20 °C": lambda r: [[line] for line in r["lines"]],
+    "Flatness as recorded": lambda r: [[plane] for plane in r["planes"]],
+    "Surface, compensated for the probe's offset": surfaces,
+    "Deviation of a coordinate": lambda r: [[placing] for placing in r["placings"]],
+    "Probing errors": lambda r: [[sphere] for sphere in r["spheres"]],
+    "Parameters and tolerances": lambda r: beside_estimates(r, r["tolerances"]),
+    "Sides and angles of the standard at 20 °C": standard,
+    "Scale, squareness, pitch, yaw and roll": lambda r: beside_estimates(r, r["equations"]),
+    "Axis figures": axis_figures,
+    "Error by position": lambda r: columns(r["curves"]["linearity_x"], "position_mm", "error_um", "U_um", "band_um"),
+    "The artefact's own dimensions": lambda r: columns(r["artefact"], "point", "distance_mm", "U_mm"),
+    "Plane figures": axis_figures,
+    "Errors of axis X": curves_of("x"),
+    "Errors of axis Y": curves_of("y"),
+    "Placings, as found from the readings": lambda r: [[placing] for placing in r["placings"]],
+    "The plate's own geometry": ball_places,
+    "Offset of the mount": offset,
+    "The offset by other ways": offset_by_other_ways,
+    "Every attitude": lambda r: [[pose] for pose in r["digitizer"]["poses"]],
+    **{f"All values decided by {name}": decided for name in STATED},
+    **{f"Contributions to the uncertainty of the test value named, {name}": of_test_value for name in STATED},
+}  # fmt: skip
+"""Where in results.json the rows of a table stand, in their order, by the table's caption."""
+
+WORDS = {"", "–", "∞", "not determined", "set aside", "see warnings", "yes"}
+"""What stands in a numeric column, or in the place of a figure, and is none."""
+
+NUMBER = re.compile(r"−?\d+(?:\.\d+)?")
+FIGURE = re.compile(r"(?:[(,]?\s?−?\d+(?:\.\d+)?\)?(?:″| %)?)+")
+
+
+def numbers_in(data: object) -> Iterator[float]:
+    if isinstance(data, Mapping):
+        data = list(data.values())
+    if isinstance(data, (list, tuple)):
+        yield from chain.from_iterable(map(numbers_in, data))
+    elif isinstance(data, (int, float)) and not isinstance(data, bool):
+        yield float(data)
+
+
+def printed(table: Table, row: tuple[str, ...]) -> Iterator[tuple[Decimal, Decimal]]:
+    """Figures of a row, with half of the last place to which each is rounded."""
+    for column, cell in zip(table.columns, row, strict=True):
+        if cell in WORDS:
+            continue
+        if not FIGURE.fullmatch(cell):
+            assert not column.numeric, f"{table.caption}: {cell!r} is no figure"
+            continue
+        for text in NUMBER.findall(cell):
+            value = Decimal(text.replace("−", "-"))
+            # zeros before the point may only fill the places that an uncertainty does not support
+            place = value.as_tuple().exponent if "." in text else len(text) - len(text.rstrip("0")) if value else 0
+            part = Decimal("0.01") if "%" in cell else Decimal(1)
+            yield value * part, part * Decimal(10) ** int(place) / 2
+
+
+def missing(table: Table, records: Sequence[Record]) -> list[str]:
+    """Figures that their record does not have."""
+    lost = []
+    for row, record in zip(table.rows, records[: len(table.rows)], strict=True):
+        held = [Decimal(repr(number)) for number in numbers_in(record)]
+        for value, half in printed(table, row):
+            if not any(abs(value - number) <= half * Decimal("1.000001") for number in held):
+                lost.append(f"{row[0]}: {value}")
+    return lost
+
+
+def read_back(example: str) -> Results:
+    found: Results = json.loads(as_json(outcome_of(analysed(example)).results))
+    return found
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_every_printed_number_stands_in_results_json(example: str) -> None:
+    results = read_back(example)
+    for caption, table in tables(document(example)).items():
+        assert missing(table, RECORDS[caption](results)) == [], caption
+
+
+def test_a_figure_that_is_off_by_its_last_place_is_not_found() -> None:
+    """The comparison itself can fail, in each column."""
+    table = tables(document("sphere-simulated"))["Probing errors"]
+    records = RECORDS["Probing errors"](read_back("sphere-simulated"))
+    assert missing(table, records) == []
+    for key in ("points", "form_error_um", "size_error_um"):
+        (sphere,) = records[0]
+        off = [[{**sphere, key: sphere[key] * 1.05 + 0.02}], *records[1:]]
+        assert len(missing(table, off)) == 1, key
+
+
+def stated(data: object, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Every expanded uncertainty of an effect's parameter, by where it stands; adjustments have the effect in a key."""
+    if isinstance(data, Mapping):
+        named = (str(data["effect"]),) if isinstance(data.get("effect"), str) else ()
+        for key, value in data.items():
+            if isinstance(value, Mapping) and isinstance(value.get("U"), float):
+                yield (*path, *named, key), value["U"]
+            yield from stated(value, (*path, *named, key))
+    elif isinstance(data, list):
+        for one in data:
+            yield from stated(one, path)
+
+
+def disagreeing(results: Results) -> list[str]:
+    """Parts of results.json that state another U of an estimated parameter than the estimates, and no reason.
+
+    The turn by which an axis is adjusted is not the angle between two axes: they differ by products of the angles, 10⁻³ of U.
+    """
+    own = {path[-2:]: U for path, U in stated(results["estimates"])}
+    return [
+        ".".join(path)
+        for path, U in stated(results)
+        if path[-2:] in own
+        and not math.isclose(own[path[-2:]], U, rel_tol=1e-3 if path[0] == "adjustments" else 0)
+        and not results["conditional"].get(path[0])
+    ]
+
+
+def two_uncertainties(document: Document) -> list[str]:
+    """Rows of which two tables print different U, where no note of either says what one of them is conditional on."""
+    seen: dict[str, list[tuple[str, bool]]] = {}
+    for table in tables(document).values():
+        reason = any("conditional on" in note for note in table.notes)
+        for row in table.rows:
+            if NUMBER.fullmatch(row[0]):  # a position or a line, of which the columns are several quantities
+                continue
+            cells = zip(table.columns, row, strict=True)
+            for U in {cell for column, cell in cells if column.heading == "U" and cell not in WORDS}:
+                seen.setdefault(row[0], []).append((U, reason))
+    return [name for name, found in seen.items() if len({U for U, _ in found}) > 1 and not any(r for _, r in found)]
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_no_quantity_has_two_uncertainties_without_a_reason(example: str) -> None:
+    results = {"conditional": {}, **read_back(example)}
+    assert disagreeing(results) == []
+    assert two_uncertainties(document(example)) == []
+
+
+def test_two_uncertainties_of_one_quantity_are_seen() -> None:
+    """Without its reason, the second way to the factors of a ballbar is one."""
+    results = read_back("iota-1102-20C")
+    assert len(disagreeing({**results, "conditional": {}})) == 6
+    found = document("iota-1102-20C")
+    bare = [
+        replace(section, blocks=tuple(replace(b, notes=()) if isinstance(b, Table) else b for b in section.blocks))
+        for section in found.sections
+    ]
+    # 16″ of X–Y are the same as printed
+    expected = [*(f"Scale error of {axis}" for axis in "XYZ"), "Angle Y–Z − 90°", "Angle Z–X − 90°"]
+    assert two_uncertainties(replace(found, sections=tuple(bare))) == expected
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_the_covariance_has_the_variance_of_every_estimate(example: str) -> None:
+    results = read_back(example)
+    covariance = results["covariance"]
+    stated = {f"{effect}.{name}": quantity["u"] for effect, found in results["estimates"].items()
+              for name, quantity in found.items()}  # fmt: skip
+    if "certified" in results:
+        stated |= {f"artefact.{name}": quantity["u"] for name, quantity in results["artefact"].items()}
+    assert set(covariance["parameters"]) == set(stated)
+    for i, (name, row) in enumerate(zip(covariance["parameters"], covariance["matrix"], strict=True)):
+        assert row[i] == pytest.approx(stated[name] ** 2, rel=1e-8)
+        assert row == [other[i] for other in covariance["matrix"]]
+        assert len(covariance["units"]) == len(row)
+
+
+def test_the_covariance_gives_the_uncertainty_of_a_difference() -> None:
+    """The scales of an uncalibrated bar share one free part: a difference is far better known than either of them."""
+    results = read_back("bryan-simulated")
+    names, matrix = results["covariance"]["parameters"], results["covariance"]["matrix"]
+    for one in results["differences"]:
+        i, j = names.index(one["of"]), names.index(one["minus"])
+        variance = matrix[i][i] + matrix[j][j] - 2 * matrix[i][j]
+        assert one["ppm"]["u"] == pytest.approx(variance**0.5, rel=1e-4)
+        assert one["ppm"]["u"] < 0.1 * matrix[i][i] ** 0.5

@@ -1,0 +1,203 @@
+"""A diagnosis in four lines: what each verdict says first, in words without identifiers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import cmm_uq
+from cmm_uq.analysis.diagnosis.rivals import Remaining, Rival
+from cmm_uq.app.commands.diagnosing import diagnose_job
+from cmm_uq.base.messages import say
+from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
+from cmm_uq.certificate.diagnosis.page import diagnosis_document
+from cmm_uq.certificate.document import Document, Overview, Plot, Table
+from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.where_section import place_words, region_words
+from cmm_uq.machine.physics.catalogue import EVERY
+from tests.artefacts.simulated import diagnosed
+from tests.certificate.saying import leaves
+from tests.conftest import ROOT
+
+IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
+"""Words that no technician says."""
+
+
+@cache
+def recorded() -> Diagnosed:
+    return diagnose_job(ROOT / "examples" / "iota-1102-20C")
+
+
+def consistent() -> Diagnosed:
+    """The same as if it could have shown everything, so that nothing more were to be measured."""
+    return replace(recorded(), unseen=(), next_plan=None)
+
+
+@pytest.fixture(scope="module")
+def explained(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
+    """The real recording, its squareness of X and Y left out."""
+    folder = tmp_path_factory.mktemp("left out")
+    for file in (ROOT / "examples" / "iota-1102-20C").iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    text = (folder / "job.toml").read_text("utf-8")
+    (folder / "job.toml").write_text(text.replace('"squareness_xy", ', ""), encoding="utf-8")
+    return diagnose_job(folder)
+
+
+def rows(found: Diagnosed) -> dict[str, str]:
+    return {str.__str__(label): str.__str__(text) for label, text in overview_of(found).rows}
+
+
+def plots(document: Document) -> list[Plot]:
+    return [block for section in document.sections for block in section.blocks if isinstance(block, Plot)]
+
+
+def test_what_was_found_is_said_with_its_sense_its_place_and_what_to_do(explained: Diagnosed) -> None:
+    """−173″ by the machine's own calibration (Harris 2004, table 7): the angle is smaller than 90°."""
+    told = rows(explained)
+    assert list(told) == ["Found", "Where", "How sure", "What to do"]
+    assert re.match(r"Squareness X–Y: the angle between X and Y is 90° minus 17\d ± \d+\s″\.", told["Found"])
+    assert told["Where"].startswith("Along X, depending on Y, most from ")
+    assert "adjust the guideways or the squareness in the compensation" in told["What to do"]
+    gain = explained.diagnosis.improvement
+    assert f"{gain.heldout_rms_after_um:.1f}" in told["How sure"]
+    assert f"{gain.heldout_rms_before_um:.1f}" in told["How sure"]
+    assert overview_of(explained).standing == "open"
+
+
+def test_a_consistent_recording_has_one_picture_and_nothing_before_and_after() -> None:
+    document = diagnosis_document(consistent())
+    assert len(plots(document)) == 1
+    assert document.overview is not None
+    assert document.overview.standing == "good"
+    assert "Before and after" not in [section.title for section in document.sections]
+    share = f"{100 * consistent().diagnosis.p_value:.0f} of 100"
+    assert rows(consistent())["How sure"] == f"Noise alone looks like this in {share} recordings."
+    assert "see the warnings" in rows(consistent())["What to do"]  # a row of it is a copy
+
+
+def test_a_consistent_one_that_could_not_have_shown_much_says_so_and_what_to_measure() -> None:
+    """Twenty bars leave bows of guideways open: no comfort in green."""
+    overview = overview_of(recorded())
+    assert (overview.standing, overview.verdict) == ("open", "Consistent, as far as this recording can show")
+    assert "this recording could not have shown: straightness of X" in rows(recorded())["How sure"]
+    assert "measure the set-ups" in rows(recorded())["What to do"]
+    titles = [str.__str__(section.title) for section in diagnosis_document(recorded()).sections]
+    assert titles.index("What to measure next") < titles.index("What would not have been seen")
+
+
+def test_an_explained_one_has_the_field_the_profile_and_each_observation(explained: Diagnosed) -> None:
+    document = diagnosis_document(replace(explained, next_plan=None))
+    assert len(plots(document)) == 3
+    titles = [str.__str__(section.title) for section in document.sections]
+    assert titles[:2] == ["What was left out", "Where it is"]
+    assert titles[-1] == "Candidate explanations"  # long tables are detail
+
+
+def test_no_text_of_the_page_is_an_identifier(explained: Diagnosed) -> None:
+    document = diagnosis_document(explained)
+    texts = [str.__str__(text) for text in leaves(replace(document, attachments=(), produced_by=document.title))]
+    assert [text for text in texts if IDENTIFIER.search(text)] == []
+    assert not [name for name in EVERY for text in texts if name in text]
+
+
+def test_an_unexplained_one_says_so_and_sends_nobody_to_compensate(explained: Diagnosed) -> None:
+    d = explained.diagnosis
+    found = replace(
+        explained, diagnosis=replace(d, verdict="unexplained", effects=(), after=d.before, indistinguishable=())
+    )
+    assert rows(found)["Found"] == "A misfit that no known effect accounts for."
+    assert "do not compensate" in rows(found)["What to do"]
+    assert overview_of(found).standing == "bad"
+    [field, *_] = plots(diagnosis_document(found))
+    assert [text for text in field.lettering if "After" in text] == []
+
+
+def test_of_two_that_cannot_be_told_apart_both_causes_are_told(explained: Diagnosed) -> None:
+    group = (("squareness_xy", "straightness_x_y"),)
+    told = rows(replace(explained, diagnosis=replace(explained.diagnosis, indistinguishable=group)))
+    assert "It could as well be: straightness of X along Y." in told["Found"]
+    assert "If it is squareness X–Y: the axes are not square" in told["What to do"]
+    assert "If it is straightness of X along Y: a bowed guideway" in told["What to do"]
+
+
+def test_where_nothing_stands_out_by_itself_it_says_so(explained: Diagnosed) -> None:
+    told = rows(replace(explained, diagnosis=replace(explained.diagnosis, where=())))
+    assert told["Where"] == "Spread over the recording: no reading or direction by itself stands out."
+
+
+def test_a_place_is_told_with_axis_covariate_and_region(explained: Diagnosed) -> None:
+    (place,) = explained.diagnosis.where
+    y = replace(place, covariate="y_mm", region=(300.4, 412.7), along="x")
+    assert place_words(y) == "along X, depending on Y, most from 300 to 413\u00a0mm"
+    time = replace(place, covariate="time_s", region=(10.0, 20.5), along="z", scale=True)
+    told = "in the scale of Z, depending on the time, most from 10 to 20.5\u00a0s"
+    assert place_words(time) == told
+    assert region_words("x_mm", 650.003, 650.01) == "at 650\u00a0mm"
+    assert region_words("x_mm", -420.0, -1.234) == "from −420 to −1.23\u00a0mm"
+    own = replace(place, covariate="humidity of the hall", region=(40.0, 50.0), along=None)
+    assert place_words(own) == "depending on the humidity of the hall, most from 40 to 50"
+
+
+@pytest.mark.parametrize(("p", "told"), [
+    (0.17, "17 of 100"), (0.05, "5 of 100"), (0.004, "1 of 250"), (1e-4, "1 of 10000"), (9e-5, "fewer than 1 of 10\u00a0000"),
+])  # fmt: skip
+def test_a_p_value_is_told_as_a_share_of_recordings(p: float, told: str) -> None:
+    assert share_of(p) == told
+
+
+def test_the_verdict_is_said_in_colour_by_a_sign_and_in_words(explained: Diagnosed) -> None:
+    for found, sign, name in ((consistent(), "✓", "good"), (explained, "!", "open")):
+        page = render_html(diagnosis_document(found))
+        title = overview_of(found).verdict
+        assert f'<div class="overview {name}">' in page
+        assert re.search(rf'<p class="verdict"><span aria-hidden="true">{sign}</span> {re.escape(title)}</p>', page)
+        assert page.index('class="overview') < page.index('class="particulars"')
+
+
+def test_the_terminal_says_the_same_four_lines_first(explained: Diagnosed, tmp_path: Path) -> None:
+    job = explained.job.folder
+    remarks = cmm_uq.diagnose(job).outcome.summary.remarks
+    for (label, text), said in zip(rows(explained).items(), remarks, strict=False):
+        assert str.__str__(said) == f"{label}: {text}"
+
+
+def test_an_overview_is_a_block_of_any_document(explained: Diagnosed) -> None:
+    from cmm_uq.certificate.diagnosis.page import diagnosis_sections
+
+    first = diagnosis_sections(explained)[0].blocks[0]
+    assert isinstance(first, Overview)
+    assert first == overview_of(explained)
+
+
+def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(explained: Diagnosed) -> None:
+    d, free = explained.diagnosis, np.zeros((0, 0))
+
+    def rival(probability: float, *effects: str, unknown: bool = False) -> Rival:
+        functions = (say("error along Y as a function of X"),) if unknown else ()
+        return Rival(probability, effects, functions, {}, {}, d.after, free)
+
+    several = (
+        rival(0.56, "squareness_xy"), rival(0.3, unknown=True), rival(0.09, "squareness_xy", "scale_curvature_x"),
+        rival(0.04, "straightness_x_y"),
+    )  # fmt: skip
+    open_ = replace(explained, diagnosis=replace(d, remaining=Remaining(several)))
+    told = rows(open_)["How sure"]
+    assert "Otherwise: error along Y as a function of X 30\u00a0%." in told
+    assert "Otherwise" not in rows(explained)["How sure"]
+    assert overview_of(open_).verdict == "Explained: more than one cause is possible"
+    alone = replace(explained, diagnosis=replace(d, indistinguishable=(), remaining=Remaining()))
+    assert overview_of(alone).verdict == "Explained: the cause is found"
+
+
+@pytest.mark.parametrize("job", ["iota-1102-20C-against-simulation", "plate-simulated"])
+def test_no_table_is_without_rows(job: str) -> None:
+    tables = [block for section in diagnosed(job).sections for block in section.blocks if isinstance(block, Table)]
+    assert tables
+    assert [table.caption for table in tables if not table.rows] == []

@@ -1,0 +1,75 @@
+"""No result depends on when it is written: no module reads a clock, and only a new job's date comes from one."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.certificate.document import Document
+from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.pdf import render_pdf
+from tests.conftest import ROOT
+
+CLOCKS = {
+    "now",
+    "today",
+    "utcnow",
+    "time_ns",
+    "localtime",
+    "gmtime",
+    "ctime",
+    "perf_counter",
+    "monotonic",
+    "process_time",
+}
+READ = {
+    "cmm_uq/base/output/staging.py": {"monotonic"}, "cmm_uq/base/output/interruption.py": {"monotonic"},
+    "cmm_uq/app/commands/new.py": {"now"},
+    "cmm_uq/app/commands/new_part.py": {"now"},
+    "cmm_uq/laboratory/live/instruments/source.py": {"time_ns"},
+    "cmm_uq/laboratory/live/instruments/simulated/line.py": {"monotonic"},
+    "cmm_uq/laboratory/records/entries.py": {"now"}, "cmm_uq/app/cli/records.py": {"now"},
+    "cmm_uq/app/commands/due.py": {"now"}, "cmm_uq/app/commands/history.py": {"now"},
+    "cmm_uq/app/commands/schedule.py": {"now"}, "cmm_uq/app/commands/scheduled.py": {"now"},
+    "cmm_uq/laboratory/schedule/run.py": {"now"}, "cmm_uq/laboratory/schedule/outbox.py": {"now", "time"},
+    "cmm_uq/laboratory/schedule/work.py": {"monotonic"}, "cmm_uq/laboratory/schedule/locks.py": {"monotonic"},
+    "cmm_uq/laboratory/schedule/cluster.py": {"monotonic"},
+    "cmm_uq/certificate/sign/clock.py": {"now"}, "cmm_uq/app/serve/checking.py": {"now"},
+    "cmm_uq/app/serve/server.py": {"monotonic"},
+}  # fmt: skip
+"""How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job
+begins with, for its reader to change; when a reading came, and when a simulated instrument sends one; when something was
+recorded or sent, on which day something is due, when something was signed, and how long a job, a lock, a cluster or a browser
+is waited for. No certificate and no results.json has any of these."""
+
+
+def clocks(source: str) -> set[str]:
+    """Clocks that a module reads, by the names of ``time`` and ``datetime``."""
+    calls = [node.func for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+    named = [call for call in calls if isinstance(call, ast.Attribute)]
+    of_time = {
+        "time" for call in named if call.attr == "time" and isinstance(call.value, ast.Name) and call.value.id == "time"
+    }
+    return {call.attr for call in named if call.attr in CLOCKS} | of_time
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "cmm_uq").rglob("*.py")), ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_module_reads_a_clock(path: Path) -> None:
+    assert clocks(path.read_text(encoding="utf-8")) == READ.get(path.relative_to(ROOT).as_posix(), set())
+
+
+@pytest.mark.parametrize("call", ["dt.datetime.now()", "date.today()", "time.time()", "time.perf_counter()"])
+def test_a_clock_would_be_found(call: str) -> None:
+    assert clocks(f"x = {call}")
+
+
+@pytest.mark.parametrize("epoch", ["0", "4102444800"])
+def test_the_epoch_of_a_reproducible_build_changes_no_byte(
+    epoch: str, certificate: Document, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    before = render_html(certificate), render_pdf(certificate, {"job.toml": b"[job]"})
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+    assert (render_html(certificate), render_pdf(certificate, {"job.toml": b"[job]"})) == before

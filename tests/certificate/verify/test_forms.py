@@ -1,0 +1,231 @@
+"""The forms of a certificate agree to the character and to the byte; whatever does not is named with its place."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pikepdf
+import pytest
+from typer.testing import CliRunner
+
+from cmm_uq import __version__
+from cmm_uq.app.cli import NOT_VERIFIED, NOT_WHOLLY_CHECKED
+from cmm_uq.app.commands.verify import Verification, verify
+from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_kernels, differences
+from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.html_page import read_html
+from cmm_uq.certificate.verify.pdf_file import read_pdf
+from cmm_uq.certificate.verify.views_agree import compare_views, without_foot
+from cmm_uq.jobs.job import Job
+from tests.conftest import ROOT
+
+
+def checked(folder: Path, again: Again, *names: str) -> Verification:
+    """Verified with the second computation handed in."""
+    return verify([folder / name for name in names] or [folder], compute=lambda given, job: again)
+
+
+def told(found: Verification) -> str:
+    return "\n".join(map(str, found.inquiry.findings))
+
+
+def spoil(path: Path, change: Callable[[bytes], bytes]) -> None:
+    content = path.read_bytes()
+    new = change(content)
+    assert new != content
+    path.write_bytes(new)
+
+
+def test_a_certificate_is_verified_in_any_choice_of_its_forms(certificate: Path, again: Again) -> None:
+    for names in (
+        (),
+        ("certificate.pdf",),
+        ("certificate.pdf", "certificate.html"),
+        ("certificate.pdf", "results.json"),
+    ):
+        found = checked(certificate, again, *names)
+        assert found.inquiry.word == "VERIFIED", told(found)
+    assert any("no electronic signature" in note for note in found.inquiry.notes)
+
+
+def test_computed_again_from_the_file_alone_everything_is_the_same(made: Path) -> None:
+    """The only test that computes: what is in the PDF gives the PDF to the byte."""
+    found = verify([made])
+    assert found.inquiry.word == "VERIFIED", told(found)
+    assert found.inquiry.done["again"] > 800
+
+
+def test_without_computing_again_not_everything_is_checked(made: Path) -> None:
+    found = verify([made], rerun=False)
+    assert found.inquiry.word == "NOT WHOLLY CHECKED"
+    assert [one.what for one in found.inquiry.unchecked] == ["computing again"]
+
+
+@pytest.mark.parametrize(("old", "new", "place"), [
+    (">404.2051<", ">404.2061<", "page 1"), ("2004-09-01", "2014-09-01", "information /Subject"),
+    (">ppm<", ">ppb<", "page"), ("Fail</p>", "Pass</p>", "page"),
+])  # fmt: skip
+def test_html_that_says_something_else_than_the_pdf_is_named(made: Path, old: str, new: str, place: str) -> None:
+    page = (made / "certificate.html").read_text(encoding="utf-8")
+    assert old in page
+    pdf, inquiry = read_pdf((made / "certificate.pdf").read_bytes(), "certificate.pdf"), Inquiry()
+    spoilt = read_html(page.replace(old, new, 1).encode(), "certificate.html")
+    compare_views(inquiry, pdf, spoilt, files=("certificate.pdf", "certificate.html"))
+    assert any(one.place.startswith(place) for one in inquiry.findings)
+
+
+def test_text_of_a_page_without_its_foot() -> None:
+    assert without_foot("abcCertificate1Page2of6", "Certificate1", 2, 6) == ("abc", True)
+    assert without_foot("abcCertificate1Page3of6", "Certificate1", 2, 6)[1] is False
+    assert without_foot("abc", "Certificate1", 2, 6)[1] is False
+
+
+def test_a_digit_of_results_is_named_by_its_path(certificate: Path, again: Again) -> None:
+    spoil(certificate / "results.json", lambda content: content.replace(b"79.34911611", b"79.34911612", 1))
+    found = checked(certificate, again)
+    assert found.inquiry.word == "NOT VERIFIED"
+    assert any(
+        one.place == "estimates.scale_x.ppm.value" and one.should == "79.34911611" for one in found.inquiry.findings
+    )
+    assert any("attachment results.json" in one.place for one in found.inquiry.findings)
+
+
+def test_an_input_that_is_another_is_named_by_its_hash(certificate: Path, made: Path, again: Again) -> None:
+    (certificate / "certificate.pdf").unlink()
+    for name in ("job.toml", "ballbar.csv"):
+        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, certificate)
+    assert checked(certificate, again).inquiry.word == "VERIFIED"
+    spoil(certificate / "ballbar.csv", lambda content: content.replace(b"4", b"5", 1))
+    found = checked(certificate, again)
+    assert any(one.check == "inputs" and one.file == "ballbar.csv" for one in found.inquiry.findings)
+
+
+def test_an_input_with_a_forged_hash_is_computed_again(certificate: Path, again: Again) -> None:
+    """Hash and input agree, so that only what the input gives can tell."""
+    (certificate / "certificate.pdf").unlink()
+    shutil.copy(ROOT / "examples" / "iota-1102-20C" / "job.toml", certificate)
+    recording = (ROOT / "examples" / "iota-1102-20C" / "ballbar.csv").read_bytes()
+    lines = recording.splitlines(keepends=True)
+    forged = b"".join([*lines[:-1], lines[-1].replace(b"1", b"2")])
+    (certificate / "ballbar.csv").write_bytes(forged)
+    old, new = (hashlib.sha256(content).hexdigest().encode() for content in (recording, forged))
+    spoil(certificate / "results.json", lambda content: content.replace(old, new))
+    asked = []
+
+    def compute(given: object, job: Job) -> Again:
+        asked.append(job.inputs["ballbar.csv"])
+        return again
+
+    found = verify([certificate], compute=compute)
+    assert asked == [forged]
+    assert any(one.place == "job.inputs_sha256.ballbar.csv" for one in found.inquiry.findings)
+
+
+def test_a_figure_written_otherwise_is_named_though_it_is_equal(certificate: Path, again: Again) -> None:
+    for name in ("certificate.pdf", "certificate.xml", "certificate.html"):
+        (certificate / name).unlink(missing_ok=True)
+    for name in ("job.toml", "ballbar.csv"):
+        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, certificate)
+    spoil(certificate / "results.json", lambda content: content.replace(b": 0.0,", b": -0.0,", 1))
+    assert "written otherwise than its inputs give it" in told(checked(certificate, again))
+
+
+def resaved(path: Path, change: Callable[[pikepdf.Pdf], None]) -> None:
+    with pikepdf.open(io.BytesIO(path.read_bytes())) as pdf:
+        change(pdf)
+        pdf.save(path, fix_metadata_version=False, object_stream_mode=pikepdf.ObjectStreamMode.disable)
+
+
+def test_a_page_that_was_drawn_over_is_named(certificate: Path, again: Again) -> None:
+    resaved(certificate / "certificate.pdf", lambda pdf: pdf.pages[1].contents_add(b"q 1 1 1 rg 50 50 100 9 re f Q"))
+    found = checked(certificate, again)
+    assert any(one.place.startswith("page 2: /Contents") for one in found.inquiry.findings), told(found)
+
+
+def test_a_pdf_written_anew_is_not_the_file_that_was_made(certificate: Path, again: Again) -> None:
+    resaved(certificate / "certificate.pdf", lambda pdf: None)
+    assert "written anew" in told(checked(certificate, again))
+
+
+def test_a_missing_and_a_further_attachment_are_named(certificate: Path, again: Again) -> None:
+    def change(pdf: pikepdf.Pdf) -> None:
+        del pdf.attachments["ballbar.csv"]
+        pdf.attachments["more.csv"] = pikepdf.AttachedFileSpec(pdf, b"1", filename="more.csv")
+
+    resaved(certificate / "certificate.pdf", change)
+    found = told(checked(certificate, again))
+    assert "attachment ballbar.csv" in found
+
+
+def test_a_folder_whose_manifest_has_other_hashes_is_named(made: Path, tmp_path: Path, again: Again) -> None:
+    folder = Path(shutil.copytree(made, tmp_path / "report"))
+    assert checked(folder, again).inquiry.word == "VERIFIED"
+    spoil(folder / "posterior.npz", lambda content: content + b"\0")
+    assert "whose hash manifest.json has" in told(checked(folder, again))
+
+
+@pytest.mark.parametrize(("by", "said"), [
+    ("0.5.0", "since then touch"), ("0.3.0", "corrections since then touch this certificate"),
+    ("99.0.0", "install that"),
+])  # fmt: skip
+def test_another_version_says_which_corrections_touch_it(certificate: Path, again: Again, by: str, said: str) -> None:
+    """Of corrections.toml; a version to come cannot be computed by this one."""
+    (certificate / "certificate.pdf").unlink()
+    for name in ("job.toml", "ballbar.csv"):
+        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, certificate)
+    version = f'"version": "{__version__}"'.encode()
+    spoil(certificate / "results.json", lambda content: content.replace(version, f'"version": "{by}"'.encode(), 1))
+    inquiry = checked(certificate, again).inquiry
+    assert inquiry.word == "NOT WHOLLY CHECKED"
+    assert said in "\n".join(map(str, inquiry.unchecked))
+    assert any(note.startswith("Version 0.6.0 corrects") for note in inquiry.notes) == (by != "99.0.0")
+
+
+def test_a_package_that_took_part_and_is_not_here_is_named(certificate: Path, again: Again) -> None:
+    (certificate / "certificate.pdf").unlink()
+    for name in ("job.toml", "ballbar.csv"):
+        shutil.copy(ROOT / "examples" / "iota-1102-20C" / name, certificate)
+    data = json.loads((certificate / "results.json").read_bytes())
+    data["software"]["plugins"] = {"no-such-effects": "1.2"}
+    (certificate / "results.json").write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    found = checked(certificate, again)
+    assert "no-such-effects 1.2 took part, and it is not installed" in "\n".join(map(str, found.inquiry.unchecked))
+
+
+def sampled(shift: float) -> dict[str, object]:
+    """Twenty quantities of a Monte Carlo of 4000 effective draws, each shifted by some of its standard uncertainty."""
+    one = {
+        f"p{i}": {"value": i + 0.5 + shift * 0.1, "u": 0.1, "interval95": [i + 0.3, i + 0.7], "U": 0.2, "k": 2.0}
+        for i in range(20)
+    }
+    return {"estimates": one, "sampling": {"ess_min": 4000.0}}
+
+
+def test_other_kernels_change_nearly_every_figure_and_a_forger_one() -> None:
+    plain = sampled(0.0)
+    assert not differences(plain, sampled(0.0))
+    assert not by_other_kernels(sampled(0.01), plain)  # a fifth of the figures: the values alone
+    found = differences(sampled(0.05), plain)
+    assert not list(beyond_sampling(sampled(0.05), plain, found))
+    far = differences(sampled(9.0), plain)
+    assert len(list(beyond_sampling(sampled(9.0), plain, far))) == 20
+
+
+def test_the_exit_code_says_what_came_out(certificate: Path) -> None:
+    from cmm_uq.app.cli.commands import app
+
+    run = CliRunner().invoke(app, ["verify", str(certificate / "certificate.pdf"), "--no-rerun", "--json"])
+    assert run.exit_code == NOT_WHOLLY_CHECKED
+    assert json.loads(run.stdout)["verdict"] == "NOT WHOLLY CHECKED"
+    spoil(
+        certificate / "results.json", lambda content: content.replace(b'"decision": "fail"', b'"decision": "pass"', 1)
+    )
+    run = CliRunner().invoke(app, ["verify", str(certificate), "--no-rerun"])
+    assert run.exit_code == NOT_VERIFIED
+    assert run.stdout.startswith("NOT VERIFIED")
+    assert "conformity[0].decision: does not follow from what was decided: “pass” instead of “fail”" in run.stdout

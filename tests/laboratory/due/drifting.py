@@ -1,0 +1,103 @@
+"""Histories for the tests of drift, and the model written a second time with dense matrices."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from scipy.stats import multivariate_normal
+
+from cmm_uq.base.points import Floats
+from cmm_uq.laboratory.due.drift import YEAR, History
+from cmm_uq.laboratory.due.drift_prior import WRONG, WRONG_TIMES, Prior
+
+FIRST = 730_000.0
+
+
+def machine(
+    years: list[float],
+    values: list[float],
+    u: float | list[float] = 0.5,
+    shared: float | list[float] = 0.0,
+    artefacts: str = "",
+    adjusted: list[float] | None = None,
+) -> History:
+    """A history: times in years, a letter an artefact, times of the last adjustment in years."""
+    n = len(years)
+    since = np.full(n, np.nan) if adjusted is None else FIRST + YEAR * np.array(adjusted)
+    return History(
+        FIRST + YEAR * np.array(years), np.array(values, dtype=float), np.broadcast_to(u, n).astype(float),
+        np.broadcast_to(shared, n).astype(float), tuple(artefacts or "A" * n), since,
+    )  # fmt: skip
+
+
+def one_node(**of: float) -> Prior:
+    """A prior of one node."""
+    usual = {
+        "rate": 0.0,
+        "rate_sd": 1.0,
+        "walk": 0.7,
+        "first_sd": 3.0,
+        "as_left_sd": 1.0,
+        "steps_per_year": 0.2,
+        "step_sd": 2.5,
+    }
+    return Prior(**{name: np.array([value]) for name, value in (usual | of).items()}, weight=np.ones(1),
+                 group=np.zeros(1, dtype=np.int64))  # fmt: skip
+
+
+def dense(of: History, prior: Prior) -> tuple[float, Floats, Floats]:
+    """Log evidence, mean and covariance of (level at the last certificate, rate): every tale, one normal distribution each.
+
+    All is a linear map of independent normal variables: first level, rate, levels as left, increments of the walk, steps,
+    artefacts' errors, readings' errors.
+    """
+    n, p = len(of.day), {name: float(getattr(prior, name)[0]) for name in (
+        "rate", "rate_sd", "walk", "first_sd", "as_left_sd", "steps_per_year", "step_sd")}  # fmt: skip
+    t = (of.day - FIRST) / YEAR
+    names = sorted(set(of.artefact))
+    log, means, covariances = [], [], []
+    for tale in product(*[(0, 1)] * (2 * n)):
+        steps, wrong = tale[:n], tale[n:]
+        chance = 0.0
+        begun, before = t[0], np.nan
+        rows: list[dict[str, float]] = []
+        state: dict[str, float] = {"first": 1.0}
+        sd = {"first": p["first_sd"], "rate": p["rate_sd"]}
+        for k in range(n):
+            since = (of.adjusted_since[k] - FIRST) / YEAR
+            if np.isfinite(since) and not since <= before:
+                begun, state = max(since, begun) if k else since, {f"left{k}": 1.0}
+                sd[f"left{k}"] = p["as_left_sd"]
+            before, gap = since, t[k] - begun
+            state = {**state, "rate": state.get("rate", 0.0) + gap, f"walk{k}": 1.0}
+            sd[f"walk{k}"] = p["walk"] * np.sqrt(gap)
+            none = np.exp(-p["steps_per_year"] * gap)
+            chance += np.log(none) if not steps[k] else (np.log(1 - none) if none < 1 else -np.inf)
+            if steps[k]:
+                state, sd[f"step{k}"] = {**state, f"step{k}": 1.0}, p["step_sd"]
+            chance += np.log(WRONG if wrong[k] else 1 - WRONG)
+            rows.append(state)
+            begun = t[k]
+        if chance == -np.inf:
+            continue
+        columns = list(sd)
+        A = np.array([[row.get(name, 0.0) for name in columns] for row in [*rows, rows[-1], {"rate": 1.0}]])
+        B = np.array([[u * (a == name) for name in names] for u, a in zip(of.u_artefact, of.artefact, strict=True)])
+        full = np.block([[A, np.vstack([B, np.zeros((2, len(names)))])]])
+        S = full @ np.diag([*(sd[name] ** 2 for name in columns), *[1.0] * len(names)]) @ full.T
+        own = of.u**2 - of.u_artefact**2 + np.array(wrong) * (WRONG_TIMES**2 - 1) * of.u**2
+        S[:n, :n] += np.diag(own)
+        mean = A[:, columns.index("rate")] * p["rate"]
+        gain = np.linalg.solve(S[:n, :n], S[:n, n:]).T
+        log.append(chance + multivariate_normal(mean[:n], S[:n, :n]).logpdf(of.value))
+        means.append(mean[n:] + gain @ (of.value - mean[:n]))
+        covariances.append(S[n:, n:] - gain @ S[:n, n:])
+    weights = np.exp(np.array(log) - np.logaddexp.reduce(log))
+    whole = np.einsum("t,ti->i", weights, means)
+    off = np.array(means) - whole
+    return (
+        float(np.logaddexp.reduce(log)),
+        whole,
+        np.einsum("t,tij->ij", weights, covariances) + np.einsum("t,ti,tj->ij", weights, off, off),
+    )

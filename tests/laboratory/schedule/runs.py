@@ -1,0 +1,92 @@
+"""Scheduled runs whose reports cost nothing: a report writes what a real one does, or fails as it is told to."""
+
+from __future__ import annotations
+
+import datetime as dt
+import hashlib
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.laboratory.schedule.found import Found
+from cmm_uq.laboratory.schedule.notices import Notice
+from cmm_uq.laboratory.schedule.outbox import Outbox
+from cmm_uq.laboratory.schedule.run import Clock, Run
+from cmm_uq.laboratory.schedule.settings import RunTable
+from cmm_uq.laboratory.schedule.state import InFolder, State
+from cmm_uq.laboratory.schedule.work import Work
+from tests.laboratory.schedule.told import Kept
+
+JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
+
+
+def made(root: Path, name: str, recording: str = "1,2\n", id: str = "") -> Path:  # noqa: A002
+    """A job folder; its recording says what comes of it, see :meth:`Jobs.report`."""
+    folder = root / name
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "job.toml").write_text(JOB.format(id=id or name))
+    (folder / "points.csv").write_text(recording)
+    return folder
+
+
+@dataclass(eq=False)
+class Jobs:
+    """Runs over a folder, one after another.
+
+    A recording that says ``fail`` is decided so; whatever else happens, ``before`` decides: it is asked of each job.
+    """
+
+    root: Path
+    channel: Kept = field(default_factory=Kept)
+    before: Callable[[Found], None] = lambda job: None
+    settings: dict[str, Any] = field(default_factory=dict)
+    now: dt.datetime = field(default_factory=lambda: dt.datetime.now(dt.UTC) + dt.timedelta(minutes=10))
+    state: State | None = None
+    due: Callable[[dt.date], Iterable[Notice]] = lambda on: ()
+    folders: list[Path] = field(default_factory=list)
+    reported: list[str] = field(default_factory=list)
+    slept: list[float] = field(default_factory=list)
+    lines: list[dict[str, Any]] = field(default_factory=list)
+    logged: list[str] = field(default_factory=list)
+    asleep: Callable[[], None] = lambda: None
+
+    @property
+    def out(self) -> Path:
+        return self.root / "reports"
+
+    def report(self, job: Found) -> bytes:
+        self.before(job)
+        inputs = {name: (job.folder / name).read_bytes() for name in ("job.toml", "points.csv")}
+        word = inputs["points.csv"].decode().strip()
+        decision = word if word in ("fail", "incomplete") else "pass"
+        hashes = {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
+        data = {"job": {"id": job.id, "machine": "CMM 3", "inputs_sha256": hashes},
+                "conformity": [{"standard": "S", "characteristic": "E0", "decision": decision}],
+                "diagnosis": {"verdict": "explained" if word == "mismatch" else "consistent"}}  # fmt: skip
+        results = json.dumps(data).encode()
+        with staged(self.out / job.id, Owner("report", job.id)) as place:
+            place.write({"results.json": results, "certificate.html": word.encode()})
+        self.reported.append(job.id)
+        return results
+
+    def run(self, *, dry: bool = False) -> int:
+        self.lines.clear()
+        self.reported.clear()
+        state = self.state or InFolder(self.out)
+        clock = Clock(lambda: self.now, lambda: sum(self.slept), self._sleep)
+        outbox = Outbox(self.out, [self.channel], state, clock.moment)
+        settings = RunTable(**{"back_off_s": 1.0, **self.settings})
+        work = Work(self.out, state, self.report, outbox.add)
+        return Run(self.folders or [self.root], settings, work, outbox, self.due, self.lines.append, self.logged.append,
+                   clock, dry).through()  # fmt: skip
+
+    def _sleep(self, seconds: float) -> None:
+        self.slept.append(seconds)
+        self.asleep()
+
+    def states(self) -> dict[str, str]:
+        """Of each job of the last run, by id or name of the folder."""
+        return {line["job"] or Path(line["folder"]).name: line["state"] for line in self.lines if "state" in line}

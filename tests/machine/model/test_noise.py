@@ -1,0 +1,112 @@
+"""The components that recordings could show, against the covariance of noise drawn at the points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import artefact_facts, artefact_of, kind_of
+from cmm_uq.base.points import Floats
+from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.noise import mean_and_contrasts, noise_of
+from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
+from tests.artefacts.constructions import plate
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+def example(name: str, repeats: int = 1, *, timed: bool = False) -> MeasurementModel:
+    """The model of an example, each row read so many times, perhaps one a minute."""
+    job = read_job(EXAMPLES / name)
+    points = job.points
+    rows = np.tile(np.arange(len(points)), repeats)
+    columns = {key: values[rows] for key, values in points.columns.items()}
+    columns |= {"time_s": 60.0 * np.arange(len(rows))} if timed else {}
+    repeat = points.repeat[rows] + points.repeat.max() * np.repeat(np.arange(repeats), len(points))
+    read = replace(
+        points, xyz=points.xyz[rows], measurement=points.measurement[rows], point=points.point[rows], repeat=repeat,
+        columns=columns, lines=np.arange(len(rows)),
+    )  # fmt: skip
+    model, _ = screened_model(job)
+    observe = kind_of(job).observing("tested")
+    return MeasurementModel(observe(job.facts.artefact, read, where="recording"), model.effects)
+
+
+def seen(model: MeasurementModel, noise: Noise, draws: int) -> Floats:
+    """Observations (draws, m), mm, of noise drawn at the points."""
+    random = np.random.default_rng(8)
+    each = np.stack([noise.drawn(model.artefact.points, random) for _ in range(draws)], axis=2)
+    return model.artefact.project(model.placed(model.estimate().least_squares.value), each).T
+
+
+@pytest.mark.parametrize(
+    "name", ["iota-1102-20C", "step-gauge-simulated", "plate-simulated", "sphere-simulated", "digitizer-simulated"]
+)
+def test_the_covariance_of_observations_is_that_of_noise_at_the_points(name: str) -> None:
+    """Readings by axis, twice each, and set-up offsets; over 4000 drawings, in units of each variance."""
+    model = example(name, 2)
+    drawn = seen(model, Noise((1e-3, 2e-3, 3e-3), placing=1.5e-3), 4000)
+    sizes = Sizes(np.array([[1e-3, 2e-3, 3e-3]]), np.array([1.5e-3]), np.zeros(1), np.zeros(1), np.ones(1))
+    repeated = noise_of(model).repeated(sizes, 4000, np.random.default_rng(9))[0]
+    chosen = np.linspace(0, drawn.shape[1] - 1, 60).astype(int)
+    wanted, found = (np.cov(values[:, chosen], rowvar=False) for values in (drawn, repeated))
+    scale = np.sqrt(np.diag(wanted))
+    assert np.abs((found - wanted) / np.outer(scale, scale)).max() < 0.16  # five standard errors of a difference of two
+
+
+def test_only_what_can_show_is_reckoned_with() -> None:
+    assert noise_of(example("iota-1102-20C")).possible == (AXES,)
+    assert noise_of(example("iota-1102-20C", 2)).possible == (AXES, PLACING)
+    assert noise_of(example("iota-1102-20C", 2, timed=True)).possible == (AXES, PLACING, SLOW)
+    assert GROWTH in noise_of(example("step-gauge-simulated")).possible
+
+
+def test_the_order_of_the_rows_says_nothing_without_a_time() -> None:
+    model = example("plate-simulated", 2)
+    assert noise_of(model).slow.shape[1] == 0
+
+
+@pytest.mark.parametrize(("name", "cosines"), [("plate-simulated", 3 * 73), ("sphere-simulated", 3 * 25)])
+def test_observations_along_one_axis_each_see_more_cosines_than_those_along_several(name: str, cosines: int) -> None:
+    assert noise_of(example(name, 2, timed=True)).slow.shape[1] == cosines
+
+
+@pytest.mark.parametrize(("side", "grows"), [(3, False), (4, True)])
+def test_the_last_digits_of_a_square_plate_do_not_decide_whether_noise_may_grow(side: int, *, grows: bool) -> None:
+    """Its longest distance from a corner is √2 and 1.5 times the median one, whatever noise and order it is read with."""
+    points = plate([(0.0, 0.0, 0.0), (0.0, 0.0, 90.0)], side=side)
+    twice = replace(
+        points, xyz=np.tile(points.xyz, (2, 1)), measurement=np.tile(points.measurement, 2), point=np.tile(points.point, 2),
+        repeat=np.repeat([1, 2], len(points)), columns={k: np.tile(v, 2) for k, v in points.columns.items()},
+        lines=np.arange(2 * len(points)),
+    )  # fmt: skip
+    random, facts = np.random.default_rng(3), artefact_facts(kind="plate", nominal=True)
+    for sd in (0.0, 1e-6, 1e-3, 1e-2):
+        order = random.permutation(len(twice))
+        read = replace(
+            twice, xyz=(twice.xyz + random.normal(0, sd, twice.xyz.shape))[order], measurement=twice.measurement[order],
+            point=twice.point[order], repeat=twice.repeat[order], columns={k: v[order] for k, v in twice.columns.items()},
+        )  # fmt: skip
+        possible = noise_of(MeasurementModel(artefact_of(facts, read), ())).possible
+        assert (GROWTH in possible) is grows, sd
+
+
+def test_turning_keeps_every_length() -> None:
+    turn = noise_of(example("plate-simulated", 2)).turn.toarray()
+    assert np.allclose(turn @ turn.T, np.eye(len(turn)), atol=1e-12)
+
+
+@pytest.mark.parametrize("repeats", [1, 2, 7, 100, 101, 137, 1000])
+def test_repeats_are_turned_to_their_mean_and_what_is_orthogonal_to_it(repeats: int) -> None:
+    turn = mean_and_contrasts(repeats)
+    np.testing.assert_allclose((turn @ turn.T).toarray(), np.eye(repeats), atol=1e-12)
+    np.testing.assert_allclose(turn[[0]].toarray()[0], 1 / np.sqrt(repeats), atol=1e-14)
+
+
+def test_ten_thousand_repeats_take_no_square_matrix() -> None:
+    assert mean_and_contrasts(10_000).nnz < 3 * 100 * 10_000

@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.maths.geometry import fit_cone, fit_cylinder
+
+SHAPES = {
+    "countersink": (5.0, 4.0, 2 * np.pi, np.pi / 4),
+    "slender taper": (20.0, 100.0, 2 * np.pi, 0.02),
+    "small cone, half round": (1.5, 2.0, np.pi, 0.5),
+    "flat cone": (30.0, 6.0, 2 * np.pi, 1.3),
+    "third of a cone": (25.0, 30.0, 2 * np.pi / 3, 0.3),
+}
+
+
+def cone_surface(radial, height, radius, psi):
+    """Surface, normals and growth (of the distance from the axis, of the half angle) of a cone that widens along +z."""
+    f = radius + height * np.tan(psi)
+    surface = f[:, None] * radial + height[:, None] * [0, 0, 1]
+    normals = np.cos(psi) * radial - np.sin(psi) * np.array([0, 0, 1.0])
+    growth = np.column_stack([np.ones_like(f), f * np.sin(psi) + height * np.cos(psi)])
+    return surface, normals[:, None, :], growth[:, None, :]
+
+
+@pytest.mark.parametrize("far", [0.0, 10_000.0])
+@pytest.mark.parametrize(("radius", "length", "angle", "psi"), SHAPES.values(), ids=SHAPES.keys())
+def test_a_reference_set_gives_its_cone_to_a_picometre(place, arc, radius, length, angle, psi, far):
+    radial, height = arc(angle, length, 150, seed=31)
+    placed = place(*cone_surface(radial, height, radius, psi), form=5e-4, seed=32, far=far)
+    cone = fit_cone(placed.points)
+    along = (cone.point - placed.origin) @ placed.axis
+    # one way of the angle is one way of the radius over the length of the cone
+    assert abs(cone.half_angle - psi) * length < 1e-9
+    assert abs(cone.radius - (radius + along * np.tan(psi))) < 1e-9
+    assert np.linalg.norm(cone.direction - placed.axis) * length < 1e-9
+    assert np.linalg.norm(np.cross(cone.point - placed.origin, placed.axis)) < 1e-9
+
+
+def test_the_apex_lies_where_the_surface_ends(arc):
+    radial, height = arc(2 * np.pi, 10.0, 60, seed=2)
+    cone = fit_cone(cone_surface(radial, height, 8.0, 0.5)[0], u_point=1e-3)
+    np.testing.assert_allclose(cone.apex, [0, 0, -8.0 / np.tan(0.5)], atol=1e-10)
+
+
+def test_the_covariance_is_that_of_repeated_measurement(arc):
+    radial, height = arc(2 * np.pi, 30.0, 40, seed=1)
+    surface, normals, _ = cone_surface(radial, height, 20.0, 0.4)
+    rng = np.random.default_rng(2)
+    fits = [fit_cone(surface + rng.normal(scale=1e-3, size=(40, 1)) * normals[:, 0], u_point=1e-3) for _ in range(200)]
+    # a variance from 200 fits has a relative standard uncertainty of 10 %; four of them. The point follows the
+    # centroid of each set, so radii are compared at one height
+    level = fits[0].point[2]
+    values = [[*f.direction[:2], f.radius + (level - f.point[2]) * np.tan(f.half_angle), f.half_angle] for f in fits]
+    np.testing.assert_allclose(np.var(values, axis=0), np.diag(fits[0].covariance)[[3, 4, 6, 7]], rtol=0.4)
+
+
+def test_a_cylinder_is_no_cone(arc):
+    radial, height = arc(2 * np.pi, 40.0, 80, seed=3)
+    points = 10 * radial + height[:, None] * [0, 0, 1] + np.random.default_rng(1).normal(scale=1e-3, size=(80, 3))
+    with pytest.raises(CmmUqError, match="within their scatter the points lie on a cylinder"):
+        fit_cone(points, u_point=5e-2)
+    assert fit_cylinder(points).radius == pytest.approx(10, abs=1e-3)
+
+
+def test_six_points_are_the_least():
+    with pytest.raises(CmmUqError, match=r"5 points are too few\. Measure at least 6"):
+        fit_cone(np.eye(5, 3))

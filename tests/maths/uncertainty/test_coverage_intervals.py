@@ -1,0 +1,177 @@
+"""Coverage intervals of JCGM 101:2008 7.7: against brute force, whatever the number of draws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cmm_uq.maths.uncertainty.coverage_intervals import (
+    Tails,
+    both_intervals,
+    inner_draws,
+    settled_shortest_interval,
+    shortest_interval,
+    symmetric_interval,
+)
+
+
+def by_definition(draws: np.ndarray, p: float) -> list[float]:
+    """7.7.1 to 7.7.4, numbering the draws from one."""
+    y, M = np.concatenate([[np.nan], np.sort(draws)]), len(draws)
+    q = int(p * M) if float(p * M).is_integer() else int(p * M + 0.5)
+    lengths = [y[r + q] - y[r] for r in range(1, M - q + 1)]
+    shortest = int(np.argmin(lengths)) + 1
+    r = (M - q) // 2 if (M - q) % 2 == 0 else (M - q + 1) // 2
+    return [y[shortest], y[shortest + q], y[r], y[r + q]]
+
+
+@given(
+    draws=st.lists(st.floats(-1e3, 1e3), min_size=100, max_size=150),
+    p=st.sampled_from([0.5, 0.68, 0.8, 0.9, 0.95]),
+)
+def test_both_intervals_are_those_of_the_definition(draws: list[float], p: float) -> None:
+    assert both_intervals(np.sort(draws), p).tolist() == by_definition(np.array(draws), p)
+
+
+@pytest.mark.parametrize("p", [0.3, 0.6827, 0.95, 0.99])
+def test_keeping_the_tails_only_changes_nothing(p: float) -> None:
+    draws = np.random.default_rng(1).gamma(2.0, size=333_333)
+    tails = Tails(p)
+    for block in np.array_split(draws, 40):
+        tails.add(np.sort(block))
+    ordered = np.sort(draws)
+    outer = len(draws) - inner_draws(len(draws), p)
+    lowest, highest = ordered[:outer], ordered[-outer:]
+    expected = [*settled_shortest_interval(lowest, highest), *symmetric_interval(lowest, highest)]
+    assert tails.intervals().tolist() == expected
+
+
+def test_q_is_rounded_to_the_nearest_integer() -> None:
+    # 7.7.1: q = pM, or the integer part of pM + 1/2
+    assert inner_draws(10_000, 0.95) == 9500
+    assert inner_draws(101, 0.95) == 96
+    assert inner_draws(110, 0.95) == 105
+    assert inner_draws(10_000, 0.95004985) == 9500
+
+
+@pytest.mark.parametrize(("outer", "first"), [(1, 0), (2, 0), (3, 1), (4, 1), (5, 2)])
+def test_the_symmetric_interval_leaves_as_many_draws_on_either_side(outer: int, first: int) -> None:
+    """7.7.2: r = (M − q)/2, or (M − q + 1)/2 where that is no integer, counted from one."""
+    lowest = np.arange(float(outer))
+    assert symmetric_interval(lowest, 100.0 + lowest) == (first, 100.0 + first)
+
+
+def test_an_interval_that_holds_all_draws_runs_from_the_first_to_the_last() -> None:
+    """95 % of five draws are five."""
+    draws = np.array([1.0, 2.0, 4.0, 8.0, 16.0])
+    assert both_intervals(draws, 0.95).tolist() == [1.0, 16.0] * 2
+    tails = Tails(0.95)
+    tails.add(draws)
+    assert tails.intervals().tolist() == [1.0, 16.0] * 2
+
+
+def test_draws_that_are_all_the_same_have_an_interval_of_no_length() -> None:
+    assert both_intervals(np.full(200, 3.0), 0.95).tolist() == [3.0] * 4
+
+
+def ends_of(draws: np.ndarray, p: float) -> tuple[np.ndarray, np.ndarray]:
+    ordered, outer = np.sort(draws), len(draws) - inner_draws(len(draws), p)
+    return ordered[:outer], ordered[-outer:]
+
+
+@pytest.mark.parametrize("p", [0.95, 0.99])
+def test_the_settled_interval_scatters_less_about_the_same_ends_and_is_hardly_longer(p: float) -> None:
+    # a normal output: the shortest interval is the symmetric one, known exactly
+    from scipy import special
+
+    rng, k = np.random.default_rng(4), float(special.ndtri((1 + p) / 2))
+    exact, settled = [], []
+    for _ in range(100):
+        lowest, highest = ends_of(rng.standard_normal(100_000), p)
+        exact.append(shortest_interval(lowest, highest))
+        settled.append(settled_shortest_interval(lowest, highest))
+    by_definition, smooth = np.array(exact), np.array(settled)
+    assert np.all(smooth.std(axis=0) < 0.75 * by_definition.std(axis=0))
+    assert np.all(np.abs(smooth.mean(axis=0) - [-k, k]) < 5 * smooth.std(axis=0) / 10)
+    lengths = np.diff(smooth)[:, 0] / np.diff(by_definition)[:, 0]
+    assert np.all((lengths >= 1) & (lengths < 1.01))
+
+
+def test_a_density_that_only_falls_has_its_shortest_interval_at_the_edge() -> None:
+    lowest, highest = ends_of(np.random.default_rng(5).standard_exponential(200_000), 0.95)
+    assert settled_shortest_interval(lowest, highest) == shortest_interval(lowest, highest)
+    assert settled_shortest_interval(lowest, highest)[0] < 1e-3
+
+
+def test_where_all_intervals_are_equally_short_it_is_the_symmetric_one() -> None:
+    lowest, highest = ends_of(np.random.default_rng(6).random(300_000), 0.95)
+    assert settled_shortest_interval(lowest, highest) == symmetric_interval(lowest, highest)
+    skewed = ends_of(np.random.default_rng(6).gamma(4.0, size=300_000), 0.95)
+    assert settled_shortest_interval(*skewed) != symmetric_interval(*skewed)
+
+
+def bent(n: int, at: int, dip: int, depth: float = 1e-6) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths that are a parabola over ln((r + ½)/(n − r − ½)) with its least at one draw, and shorter still at another."""
+    r = np.arange(n)
+    odds = np.log((r + 0.5) / (n - r - 0.5))
+    lengths = 1000.0 + 100.0 * (odds - odds[at]) ** 2
+    lengths[dip] = 1000.0 / (1 + depth)
+    lowest = 100.0 * r / n
+    return lowest, lowest + lengths
+
+
+def place(ends: tuple[np.ndarray, np.ndarray], n: int) -> int:
+    """Which draw the settled interval begins with."""
+    return round(settled_shortest_interval(*ends)[0] * n / 100.0)
+
+
+@pytest.mark.parametrize(("n", "at", "dip"), [(1001, 500, 504), (1001, 300, 304), (1001, 700, 696)])
+def test_a_single_short_length_does_not_move_the_place_where_the_curve_is_least(n: int, at: int, dip: int) -> None:
+    ends = bent(n, at, dip)
+    assert shortest_interval(*ends)[0] == pytest.approx(100.0 * dip / n)
+    assert place(ends, n) == at
+    low, high = settled_shortest_interval(*ends)
+    assert high - low == pytest.approx(1000.0)
+
+
+@pytest.mark.parametrize(
+    ("n", "at", "dip", "depth", "settles"),
+    [
+        (500, 200, 303, 0.001, True),  # five hundred lengths are enough for a curve
+        (499, 200, 303, 0.001, False),
+        (10_000, 300, 101, 0.001, True),  # a hundredth from the edge there is something to follow on both sides
+        (10_000, 300, 100, 0.001, False),
+        (100_000, 3000, 1003, 0.001, True),
+        (10_000, 9700, 9899, 0.001, True),
+        (10_000, 9700, 9900, 0.001, False),
+        (10_000, 3000, 4701, 0.00998, True),  # by a hundredth longer than the very shortest, and no more
+        (10_000, 3000, 4701, 0.01002, False),
+    ],
+)
+def test_where_the_shortest_interval_may_be_settled(n: int, at: int, dip: int, depth: float, settles: bool) -> None:
+    # the curve is looked at in steps of 0.0015, which are up to four of ten thousand places
+    assert place(bent(n, at, dip, depth), n) == (pytest.approx(at, abs=max(2, n // 20_000)) if settles else dip)
+
+
+@pytest.mark.parametrize(
+    ("n", "where", "longer", "alike"),
+    [
+        # between 1/20 and 19/20 of 5000 places, 4499 apart, single draws scatter 10·4499/√5000 = 636.3
+        (5000, 2500, 636.0, True),
+        (5000, 2500, 637.0, False),
+        (5000, 249, 5000.0, True),
+        (5000, 250, 5000.0, False),
+        (5000, 4749, 5000.0, False),
+        (5000, 4750, 5000.0, True),
+        (4999, 2500, 1.0, False),  # too few to say
+    ],
+)
+def test_lengths_that_differ_by_scatter_alone_are_all_alike(n: int, where: int, longer: float, alike: bool) -> None:
+    lowest = np.arange(float(n))
+    lengths = np.full(n, 9000.0)
+    lengths[where] += longer
+    lengths[10] -= 1e-6  # the very shortest is at the edge
+    found = settled_shortest_interval(lowest, lowest + lengths)
+    assert found == (symmetric_interval if alike else shortest_interval)(lowest, lowest + lengths)

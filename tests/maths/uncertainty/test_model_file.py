@@ -1,0 +1,278 @@
+"""A measurement model in a file: what it may say, what comes out, and what is refused with file and key."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.maths.uncertainty.budget_results import comparison_rows, results_of, statement, summary_rows
+from cmm_uq.maths.uncertainty.model_file import ModelFile, read_model_file
+
+Read = Callable[[str], ModelFile]
+
+LOSS = """
+[model]
+outputs = { y = "x1**2 + x2**2" }
+coverage = 0.95
+method = "auto"
+digits = 2
+seed = 1
+[inputs.x1]
+distribution = "normal"
+value = 0.05
+u = 0.005
+unit = "1"
+source = "certificate 123"
+[inputs.x2]
+distribution = "normal"
+value = 0.0
+u = 0.005
+[correlation]
+"x1,x2" = 0.9
+"""
+
+BRIDGE = """
+[model]
+outputs = { R = "V/I*cos(phi)", X = "V/I*sin(phi)", Z = "V/I" }
+units = { Z = "ohm" }
+[inputs.V]
+samples = [5.007, 4.994, 5.005, 4.990, 4.999]
+unit = "V"
+simultaneous = "bridge"
+[inputs.I]
+samples = [19.663e-3, 19.639e-3, 19.640e-3, 19.685e-3, 19.678e-3]
+unit = "A"
+simultaneous = "bridge"
+[inputs.phi]
+samples = [1.0456, 1.0438, 1.0468, 1.0428, 1.0433]
+unit = "rad"
+simultaneous = "bridge"
+"""
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Read:
+    def read(text: str) -> ModelFile:
+        path = tmp_path / "model.toml"
+        path.write_text(text, encoding="utf-8")
+        return read_model_file(path)
+
+    return read
+
+
+def test_results_have_the_fields_of_the_contract(read: Read) -> None:
+    results = results_of(read(LOSS).evaluate())
+    assert results["schema"] == "cmm-uq/budget/1"
+    y = results["outputs"]["y"]
+    keys = {
+        "value",
+        "u",
+        "dof",
+        "interval",
+        "coverage_factor",
+        "method",
+        "reason",
+        "first",
+        "second",
+        "monte_carlo",
+        "budget",
+    }
+    assert keys <= set(y)
+    assert set(y["first"]) == set(y["second"]) == {"value", "u", "dof", "interval"}
+    assert {"value", "u", "interval", "symmetric_interval", "trials"} <= set(y["monte_carlo"])
+    assert all({"input", "sensitivity", "contribution", "share"} <= set(line) for line in y["budget"])
+    assert sum(line["share"] for line in y["budget"]) == pytest.approx(1)
+    assert results["output_correlation"] == [[1.0]]
+    json.dumps(results, allow_nan=False)
+
+
+def test_the_seed_makes_the_bytes(read: Read) -> None:
+    model = read(LOSS)
+    first, again, other = (json.dumps(results_of(model.evaluate(seed))) for seed in (None, 1, 2))
+    assert first == again
+    assert first != other
+
+
+def test_the_correlated_power_loss(read: Read) -> None:
+    # zᵀz for z normal with mean m and covariance V: mean mᵀm + tr V, variance 4 mᵀVm + 2 tr V²
+    y = results_of(read(LOSS).evaluate())["outputs"]["y"]
+    exact = np.sqrt((0.1 * 0.005) ** 2 + 4 * 0.005**4 * (1 + 0.9**2))
+    assert y["second"]["value"] == pytest.approx(2550e-6)
+    assert y["second"]["u"] == pytest.approx(exact, rel=1e-9)
+    assert y["monte_carlo"]["u"] == pytest.approx(exact, rel=5e-3)
+    assert y["method"] == "monte_carlo"
+
+
+def test_simultaneous_readings_bring_correlation_and_degrees_of_freedom(read: Read) -> None:
+    model = read(BRIDGE)
+    evaluation = model.evaluate()
+    results = results_of(evaluation)
+    outputs = results["outputs"]
+    assert {name: y["method"] for name, y in outputs.items()} == {"R": "first", "X": "first", "Z": "first"}
+    half = {name: (y["interval"][1] - y["interval"][0]) / 2 for name, y in outputs.items()}
+    assert half == pytest.approx({"R": 0.197, "X": 0.821, "Z": 0.656}, abs=5e-4)
+    assert results["output_correlation"][0] == pytest.approx([1, -0.588, -0.485], abs=5e-4)
+    assert [outputs[name]["unit"] for name in outputs] == ["V/A", "V/A", "ohm"]
+    assert outputs["R"]["budget"][0]["source"] == "repeats"
+    assert statement(evaluation, "Z") == (
+        "Z = 254.26 ohm ± 0.66 ohm, the expanded uncertainty U = k u with u = 0.24 ohm and k = 2.78 for ν = 4, "
+        "coverage probability 95 %."
+    )
+    assert summary_rows(evaluation)[0] == (
+        "R", "127.732", "0.071", "V/A", "[127.535, 127.929]", "2.78", "4", "first order",
+    )  # fmt: skip
+    assert [row[0] for row in comparison_rows(evaluation, "R")] == ["First order", "Second order", "Monte Carlo"]
+
+
+def test_the_statement_of_a_monte_carlo_result_gives_the_interval(read: Read) -> None:
+    assert statement(read(LOSS).evaluate(), "y").startswith(
+        "y = 0.00255 with standard uncertainty 0.00050; the shortest"
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "u", "dof"),
+    [
+        ('distribution = "normal"\nvalue = 1\nu = 0.5', 1, 0.5, np.inf),
+        ('distribution = "normal"\nvalue = 1\nexpanded = 1\ncoverage_factor = 2', 1, 0.5, np.inf),
+        ('distribution = "normal"\nvalue = 1\nu = "5 µm"\nunit = "mm"', 1, 0.005, np.inf),
+        ('distribution = "normal"\nsamples = [1, 2, 3]', 2, 1 / np.sqrt(3), 2),
+        ('distribution = "t"\nvalue = 1\nu = 0.5\ndof = 7', 1, 0.5, 7),
+        ("samples = [1, 2, 3]", 2, 1 / np.sqrt(3), 2),
+        ('distribution = "rectangular"\nlow = -1\nhigh = 3', 1, 2 / np.sqrt(3), np.inf),
+        ('distribution = "rectangular"\nvalue = 1\nhalf_width = 2', 1, 2 / np.sqrt(3), np.inf),
+        ('distribution = "rectangular"\nvalue = 1\nu = 2', 1, 2, np.inf),
+        ('distribution = "rectangular"\nvalue = 0\nhalf_width = 0.05\ndof = 2', 0, 0.05 / np.sqrt(3), 2),
+        ('distribution = "rectangular_uncertain"\nlow = -1\nhigh = 1\nhalf_width = 0.1', 0, 1 / np.sqrt(3), 50),
+        ('distribution = "rectangular_uncertain"\nlow = -1\nhigh = 1\nlimit = 0.1', 0, 1 / np.sqrt(3), 50),
+        ('distribution = "rectangular_uncertain"\nvalue = 0\nhalf_width = 1\nbeta = 0.1', 0, 1 / np.sqrt(3), 50),
+        ('distribution = "rectangular_uncertain"\nvalue = 0\nhalf_width = 1\ndof = 50', 0, 1 / np.sqrt(3), 50),
+        ('distribution = "trapezoidal"\nlow = 0\nhigh = 6\nbeta = 0.5', 3, 6 * np.sqrt(1.25 / 24), np.inf),
+        ('distribution = "trapezoidal"\nvalue = 3\nu = 2\nbeta = 0.5', 3, 2, np.inf),
+        ('distribution = "triangular"\nlow = 0\nhigh = 6', 3, 6 / np.sqrt(24), np.inf),
+        ('distribution = "arcsine"\nvalue = 0\nhalf_width = 0.5', 0, 0.5 / np.sqrt(2), np.inf),
+        ('distribution = "exponential"\nvalue = 0.7', 0.7, 0.7, np.inf),
+        ('distribution = "gamma"\nvalue = 4', 5, np.sqrt(5), np.inf),
+        ('distribution = "gamma"\nsamples = [2, 3, 4]', 10 / 3, np.sqrt(10) / 3, np.inf),
+        ('distribution = "sampled"\nsamples = [1, 2, 3]', 2, 1, np.inf),
+        ('distribution = "constant"\nvalue = 3', 3, 0, np.inf),
+    ],
+)
+def test_every_distribution_can_be_written(read: Read, keys: str, value: float, u: float, dof: float) -> None:
+    given = read(f'[model]\noutputs = {{ y = "x" }}\n[inputs.x]\n{keys}').model.inputs["x"]
+    assert (given.mean, given.u, given.dof) == pytest.approx((value, u, dof))
+
+
+X = '[model]\noutputs = { y = "x" }\n[inputs.x]\n'
+NORMAL = 'distribution = "normal"\nvalue = 1\nu = 0.5'
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "problem"),
+    [
+        ("[model", "", "is not TOML"),
+        ("[inputs.x]\n" + NORMAL, "", r"\[model\] is missing"),
+        ('[model]\noutputs = { y = "x" }', "", r"\[inputs\] is missing"),
+        ('[model]\noutputs = { y = "x" }\n[inputs]', "", "no inputs"),
+        ('[model]\noutputs = {}\n[inputs.x]\n' + NORMAL, "[model]", "no outputs"),
+        ('[model]\noutputs = { y = "x" }\n[input.x]\n' + NORMAL, "", "Did you mean 'inputs'"),
+        ('[model]\noutputs = { y = "z" }\n[inputs.x]\n' + NORMAL, "[model] outputs.y", "no input 'z'"),
+        ('[model]\noutputs = { y = 3 }\n[inputs.x]\n' + NORMAL, "[model] outputs.y", "is not text"),
+        ('[model]\noutputs = { x = "x" }\n[inputs.x]\n' + NORMAL, "[model] outputs.x", "also an input"),
+        ('[model]\noutputs = { y = "x" }\nmethd = "auto"\n[inputs.x]\n' + NORMAL, "[model]", "Did you mean 'method'"),
+        ('[model]\noutputs = { y = "x" }\nmethod = "best"\n[inputs.x]\n' + NORMAL, "[model]", "no method 'best'"),
+        ('[model]\noutputs = { y = "x" }\ncoverage = 95\n[inputs.x]\n' + NORMAL, "[model]", "coverage probability"),
+        ('[model]\noutputs = { y = "x" }\ndigits = 1.5\n[inputs.x]\n' + NORMAL, "[model] digits", "not an integer"),
+        ('[model]\noutputs = { y = "x" }\nseed = true\n[inputs.x]\n' + NORMAL, "[model] seed", "not a finite number"),
+        (X + 'value = 1', "[inputs.x]", "'distribution' is missing"),
+        (X + 'distribution = "normal"\nvalue = 1', "[inputs.x]", "'u' is missing"),
+        (X + NORMAL.replace("0.5", "nan"), "[inputs.x] u", "finite number"),
+        (X + NORMAL.replace("0.5", "-0.5"), "[inputs.x]", "u is -0.5"),
+        (X + NORMAL.replace("0.5", '"a"'), "[inputs.x] u", "no number"),
+        (X + NORMAL + "\nlow = 0", "[inputs.x]", "does not belong"),
+        (X + NORMAL + "\nuu = 0", "[inputs.x]", "no key 'uu'"),
+        (X + NORMAL + '\nunit = "foo"', "[inputs.x] unit", "no known unit"),
+        (X + NORMAL + "\nunit = 3", "[inputs.x]", "unit is not text"),
+        (X + NORMAL.replace("normal", "nromal"), "[inputs.x]", "'normal'"),
+        ('[model]\noutputs = { y = "x" }\n[inputs."a-b"]\n' + NORMAL, "[inputs.a-b]", "is no name"),
+        ('[model]\noutputs = { y = "x" }\n[inputs]\nx = 3', "[inputs]", "not a table"),
+        (X + 'distribution = "t"\nvalue = 1\nu = 1\ndof = 0.5', "[inputs.x]", "0.5 degrees"),
+        (X + 'samples = [1, 2]\nvalue = 3', "[inputs.x]", "contradict"),
+        (X + 'samples = [1, 2]\ndof = 3', "[inputs.x]", "number of readings"),
+        (X + 'samples = 3', "[inputs.x] samples", "not a list"),
+        (X + 'samples = [1, "2"]', "[inputs.x] samples", "finite number"),
+        (X + 'distribution = "rectangular"\nlow = 0\nhigh = 1\nvalue = 0.4', "[inputs.x]", "middle"),
+        (X + 'distribution = "rectangular"\nlow = 0', "[inputs.x]", "'high' is missing"),
+        (X + NORMAL + '\n[correlation]\n"x" = 0.5', "[correlation]", "not a pair"),
+        (X + NORMAL + '\n[correlation]\n"x,z" = 0.5', "correlation x,z", "no input 'z'"),
+        (BRIDGE + '[correlation]\n"I,V" = 0.5', "[correlation]", "simultaneous readings"),
+        (LOSS.replace("0.9", "1.9"), "correlation x1,x2", "coefficient of 1.9"),
+    ],
+)  # fmt: skip
+def test_mistakes_name_file_and_key(read: Read, text: str, where: str, problem: str) -> None:
+    with pytest.raises(CmmUqError, match=problem) as caught:
+        read(text)
+    assert caught.value.where is not None
+    assert "model.toml" in caught.value.where
+    assert where in caught.value.where
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    with pytest.raises(CmmUqError, match=r"none\.toml: no such file"):
+        read_model_file(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b'title = "\xe4"')
+    with pytest.raises(CmmUqError, match="not UTF-8"):
+        read_model_file(tmp_path / "latin.toml")
+
+
+def test_a_model_that_fails_for_some_trials_says_how_many(read: Read) -> None:
+    model = read('[model]\noutputs = { y = "log(x)" }\n[inputs.x]\ndistribution = "normal"\nvalue = 1\nu = 0.4')
+    with pytest.raises(CmmUqError, match=r"no finite y in \d+ of \d+ trials"):
+        model.evaluate()
+
+
+def test_a_joint_sample_is_drawn_row_by_row(read: Read) -> None:
+    draws = ", ".join(str(i) for i in range(40))
+    text = (
+        '[model]\noutputs = { y = "a - b" }\n[inputs.a]\ndistribution = "sampled"\nsimultaneous = "chain"\n'
+        f'samples = [{draws}]\n[inputs.b]\ndistribution = "sampled"\nsimultaneous = "chain"\nsamples = [{draws}]'
+    )
+    model = read(text).model
+    assert model.correlation_matrix[0, 1] == pytest.approx(1.0)
+    from cmm_uq.maths.uncertainty.monte_carlo import simulate
+
+    assert simulate(model, 1000).u[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a = " + "[" * 3000, "line 1: is nested too deeply"),
+        (LOSS.replace("0.05\n", "9" * 400 + "\n", 1), "has 400 characters"),
+        (LOSS.replace("x1**2", "x1**2 + " + "9" * 5000), "a number is too large, or a name too long"),
+        (LOSS.replace("x1**2", "x1 * 10**400.0"), "finite|range of numbers"),
+        (LOSS.replace("x1**2", "tan(x1 * 1e300)"), "inf cannot be stated"),
+        (LOSS + "".join(f'[inputs.z{i}]\nvalue = 1\ndistribution = "constant"\n' for i in range(500)), "502 entries"),
+    ],
+    ids=["depth", "digits", "expression", "overflow", "tangent", "inputs"],
+)
+def test_hostile_models_end_in_a_result_or_one_line(read: Read, text: str, says: str) -> None:
+    with pytest.raises(CmmUqError, match=says) as caught:
+        read(text).evaluate()
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_fourth_powers_of_large_inputs_do_not_overflow_the_degrees_of_freedom(read: Read) -> None:
+    """The same model in other units has the same degrees of freedom (JCGM 100 G.4.1 is a ratio)."""
+    text = '[model]\noutputs = {{ y = "a + b" }}\nmethod = "first"\n' + "".join(
+        f'[inputs.{name}]\ndistribution = "t"\nvalue = {{scale}}\nu = {{scale}}\ndof = {dof}\n'
+        for name, dof in (("a", 4), ("b", 9))
+    )
+    plain, large = (read(text.format(scale=scale)).evaluate().stated["y"].dof for scale in ("1.0", "1e69"))
+    assert plain == pytest.approx(4 / (1 / 4 + 1 / 9))
+    assert large == pytest.approx(plain, rel=1e-12)
