@@ -37,17 +37,17 @@ class RecordedSeries(Protocol):
     """
 
     @property
-    def day(self) -> NDArray[np.generic]: ...  # noqa: D102
+    def day(self) -> NDArray[np.generic]: ...
     @property
-    def value(self) -> NDArray[np.generic]: ...  # noqa: D102
+    def value(self) -> NDArray[np.generic]: ...
     @property
-    def u(self) -> NDArray[np.generic]: ...  # noqa: D102
+    def u(self) -> NDArray[np.generic]: ...
     @property
-    def u_artefact(self) -> NDArray[np.generic]: ...  # noqa: D102
+    def u_artefact(self) -> NDArray[np.generic]: ...
     @property
-    def artefact(self) -> NDArray[np.generic]: ...  # noqa: D102
+    def artefact(self) -> NDArray[np.generic]: ...
     @property
-    def adjusted_since(self) -> NDArray[np.generic]: ...  # noqa: D102
+    def adjusted_since(self) -> NDArray[np.generic]: ...
 
 
 @dataclass(frozen=True, eq=False)

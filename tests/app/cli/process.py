@@ -10,7 +10,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest import mock
 
-from cmm_uq import cli
+from cmm_uq.app import cli
 
 COMMAND = [sys.executable, "-m", "cmm_uq"]
 

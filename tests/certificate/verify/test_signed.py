@@ -11,9 +11,9 @@ import pytest
 pytest.importorskip("pyhanko")
 pytest.importorskip("signxml")
 
-from cmm_uq import signing
 from cmm_uq.app.commands.verify import verify
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate import sign as signing
 from cmm_uq.certificate.sign import sign_pdf, sign_xml, signer_of_file
 from cmm_uq.certificate.verify.again import Again
 from cmm_uq.certificate.verify.found import Inquiry

@@ -8,7 +8,7 @@ from inspect import getsource
 
 import pytest
 
-from cmm_uq import geometry
+from cmm_uq.maths import geometry
 
 TOLD = [(node.module, alias.name) for node in ast.walk(ast.parse(getsource(geometry)))
         if isinstance(node, ast.ImportFrom) and str(node.module).startswith("cmm_uq.") for alias in node.names]  # fmt: skip
