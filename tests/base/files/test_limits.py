@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from cmm_uq.base.files import limits, numbers
-from cmm_uq.jobs import recording, table
+from cmm_uq.base.files import limits, numbers, table
+from cmm_uq.jobs import recording
 from cmm_uq.jobs.machine import SHORTEST_TRAVEL_MM
 from tests.conftest import ROOT
 
