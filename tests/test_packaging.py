@@ -6,11 +6,16 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
+from itertools import chain
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
+from cmm_uq import __version__
 from cmm_uq.laboratory.live.instruments.library import ready
 from tests.catalogues import TRANSLATED
 from tests.conftest import ROOT
@@ -51,3 +56,21 @@ def test_it_reports_from_an_empty_folder(unpacked: Path, tmp_path: Path) -> None
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "reports" / "iota-1102-20C" / "certificate.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_locked_environment_has_whatever_the_package_asks_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    asked = [
+        Requirement(text) for text in (*project["dependencies"], *chain(*project["optional-dependencies"].values()))
+    ]
+    packages = tomllib.loads((ROOT / "pylock.toml").read_text(encoding="utf-8"))["packages"]
+    locked = {package["name"]: package["version"] for package in packages}
+    others = [wanted for wanted in asked if wanted.name != project["name"]]
+    missing = [
+        wanted for wanted in others if not wanted.specifier.contains(locked.get(canonicalize_name(wanted.name), ""))
+    ]
+    assert not missing
+
+
+def test_the_citation_names_this_version() -> None:
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

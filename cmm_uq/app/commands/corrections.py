@@ -125,12 +125,12 @@ def corrections() -> tuple[Correction, ...]:
     ------
     CmmUqError : the file is missing or no list of corrections.
     """
-    package = Path(__file__).resolve().parents[2]
-    for folder in (package, package.parent):
-        if (folder / FILE).is_file():
-            return _read((folder / FILE).read_text(encoding="utf-8"), str(folder / FILE))
-    raise CmmUqError("the list of corrections is missing", where=str(package),
-                     fix="Install cmm-uq again, from a whole wheel")  # fmt: skip
+    path = Path(__file__).resolve().parents[2] / FILE
+    if not path.is_file():
+        raise CmmUqError(
+            "the list of corrections is missing", where=str(path), fix="Install cmm-uq again, from a whole wheel"
+        )
+    return _read(path.read_text(encoding="utf-8"), str(path))
 
 
 def between(first: str, last: str) -> tuple[Correction, ...]:
