@@ -12,8 +12,20 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # typing alone would cost ten times as much as all of this
 if TYPE_CHECKING:
-    from cmm_uq.app.api.beginning import check, new
-    from cmm_uq.app.api.calls import budget, compensate, diagnose, job, part, plan, prove, read, report, simulate
+    from cmm_uq.app.api.calls import (
+        budget,
+        check,
+        compensate,
+        diagnose,
+        job,
+        new,
+        part,
+        plan,
+        prove,
+        read,
+        report,
+        simulate,
+    )
     from cmm_uq.app.api.recertification import due, history
     from cmm_uq.base.errors import CmmUqError
 
@@ -30,7 +42,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    places = {"CmmUqError": "cmm_uq.base.errors", "check": "cmm_uq.app.api.beginning", "new": "cmm_uq.app.api.beginning",
+    places = {"CmmUqError": "cmm_uq.base.errors", "check": "cmm_uq.app.api.calls", "new": "cmm_uq.app.api.calls",
               "due": "cmm_uq.app.api.recertification", "history": "cmm_uq.app.api.recertification"}  # fmt: skip
     found = getattr(import_module(places.get(name, "cmm_uq.app.api.calls")), name)
     globals()[name] = found

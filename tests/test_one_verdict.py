@@ -28,11 +28,11 @@ from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.app.cli.printing import conclude
 from cmm_uq.app.commands.batch_jobs import conforming
 from cmm_uq.app.commands.batch_table import COLUMNS, rows
+from cmm_uq.app.commands.certificates.release import release
 from cmm_uq.app.commands.due import due_in
+from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.fleet import _members
 from cmm_uq.app.commands.history import history_of
-from cmm_uq.app.commands.release import release
-from cmm_uq.app.commands.written import Written
 from cmm_uq.app.serve.certificate_page import _notices
 from cmm_uq.app.serve.due import by_rule
 from cmm_uq.app.serve.overview import groups

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.commands.new import known
+from cmm_uq.app.commands.jobs.new import known
 from cmm_uq.artefacts import kind_named
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.recording import OPTIONAL, REQUIRED

@@ -16,10 +16,10 @@ import pytest
 
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.screening.shape import Screening
-from cmm_uq.app.commands.plan import write_plan
+from cmm_uq.app.commands.jobs.simulate import write_simulation
+from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import CERTIFICATE, write_diagnosis, write_report
-from cmm_uq.app.commands.simulate import write_simulation
 from cmm_uq.artefacts import BUILT_IN, kind_named, names
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import file_name

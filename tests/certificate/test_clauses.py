@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from cmm_uq.app.commands.check import check_read
+from cmm_uq.app.commands.jobs.check import check_read
 from cmm_uq.base.messages import NOTHING, say
 from cmm_uq.certificate.certificate import certificate_of
 from cmm_uq.certificate.clauses import DRAFT, clauses, clauses_data, draft, missing

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.schemas import shipped
+from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.base.messages import Message, Text, Verbatim
 from cmm_uq.certificate.document import Document
 from tests.artefacts.simulated import document

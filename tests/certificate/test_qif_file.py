@@ -11,7 +11,7 @@ import pytest
 import xmlschema
 from defusedxml.ElementTree import fromstring
 
-from cmm_uq.app.commands.qif import write_qif
+from cmm_uq.app.commands.jobs.exchange import write_qif
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.certificate.qif_file import SPACE, qif
 from cmm_uq.jobs.reported import Reported

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import tomlkit
 
+from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.simulate import simulated_job
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.traceability_section import claimed

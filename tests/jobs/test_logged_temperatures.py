@@ -12,11 +12,11 @@ import numpy as np
 import pikepdf
 import pytest
 
-from cmm_uq.app.commands.compensate import write_compensated
-from cmm_uq.app.commands.plan import write_plan
+from cmm_uq.app.commands.jobs.compensate import write_compensated
+from cmm_uq.app.commands.jobs.simulate import write_simulation
+from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
-from cmm_uq.app.commands.simulate import write_simulation
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.temperature_log import parse_temperature_log
 from tests.app.commands.test_map_squareness import TABLE_7, at, stated, with_maps

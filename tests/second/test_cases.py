@@ -16,8 +16,8 @@ from benchmarks.second.artefacts import LENGTH, Placed, real_bars
 from benchmarks.second.cases import DESIGNS, KINDS, NOTHING, Case, Seen, baseline, case, job, seal, visible
 from benchmarks.second.maps import JUMPS, SQUARENESS, concealed, error, without_expansion
 from benchmarks.second.twins import fields
+from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recorded import recorded_model
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.physics.catalogue import CATALOGUE
 from cmm_uq.machine.physics.error_map import read_error_map

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.app.api.outcomes import Diagnosis, Plan, Proof, Report
-from cmm_uq.app.commands.reading import compared_with, in_language, read_job
+from cmm_uq.app.commands.jobs.check import Checked, check_job, check_read
+from cmm_uq.app.commands.jobs.folder import KEPT, PLAN
+from cmm_uq.app.commands.jobs.new import new_job, new_plan
+from cmm_uq.app.commands.reading import compared_with, in_language, job_of, read_job
 from cmm_uq.app.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import Code
@@ -18,7 +21,7 @@ from cmm_uq.jobs.job import Job
 if TYPE_CHECKING:
     import pandas as pd
 
-    from cmm_uq.app.api.part import Part
+    from cmm_uq.app.api.outcomes import Part
     from cmm_uq.jobs.part.job import PartJob
     from cmm_uq.machine.physics.map_interpolation import Beyond
     from cmm_uq.maths.uncertainty.distributions import Distribution
@@ -96,7 +99,7 @@ def job(
         "model": {"effects": list(effects), **tables.get("model", {})},
         "conformity": list(conformity),
     }
-    from cmm_uq.app.commands.frames import job_from_frames
+    from cmm_uq.app.commands.reading import job_from_frames
 
     return job_from_frames(points, told, files or {})
 
@@ -151,7 +154,7 @@ def diagnose(
     """
     read = in_language(_job(job), language)
     if against is not None:
-        from cmm_uq.app.commands.frames import compared_with_frame
+        from cmm_uq.app.commands.reading import compared_with_frame
 
         read = (
             compared_with(read, Path(against))
@@ -175,7 +178,7 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: 
     ------
     CmmUqError : the plan is impossible.
     """
-    from cmm_uq.app.commands.plan import plan_outcome
+    from cmm_uq.app.commands.plans.plan import plan_outcome
 
     return Plan(plan_outcome(in_language(_job(job), language), power=power, seed=seed))
 
@@ -214,7 +217,7 @@ def part(
     >>> cmm_uq.part("examples/part-plate-simulated")  # doctest: +SKIP
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
-    from cmm_uq.app.api.part import Part
+    from cmm_uq.app.api.outcomes import Part
     from cmm_uq.app.commands.part_written import Asked, found_of
     from cmm_uq.app.commands.part_written import in_language as told_in
     from cmm_uq.jobs.part.job import PartJob, read_part
@@ -271,7 +274,7 @@ def simulate(job: Job | str | Path, truth: Mapping[str, Any] | str | Path, *, se
     >>> drawn.origin
     'simulated'
     """
-    from cmm_uq.app.commands.simulate import simulated_job
+    from cmm_uq.app.commands.jobs.simulate import simulated_job
 
     return simulated_job(_job(job), truth if isinstance(truth, Mapping) else Path(truth), seed=seed)
 
@@ -288,7 +291,7 @@ def compensate(job: Job | str | Path, *, beyond: Beyond = "refuse") -> Job:
     ------
     CmmUqError : the job has no error map, or it does not serve these points.
     """
-    from cmm_uq.app.commands.compensate import compensated_job
+    from cmm_uq.app.commands.jobs.compensate import compensated_job
 
     return compensated_job(_job(job), beyond=beyond)
 
@@ -349,3 +352,42 @@ def budget(
 
 def _job(job: Job | str | Path) -> Job:
     return job if isinstance(job, Job) else read(job)
+
+
+def new(kind: str, *, id: str = "job", **tables: Mapping[str, Any]) -> Job:  # noqa: A002
+    """A new job of a kind, with a simulated recording at its usual set-ups; ``job.write(folder)`` makes it a folder.
+
+    Parameters
+    ----------
+    kind : of measurement, ``"shift_plate"``, or ``"plan"`` for a job without a recording.
+    id : of the job.
+    tables : what job.toml is to say in place of what the kind begins with, by table: ``artefact={"length_mm": 500.0}``.
+
+    Raises
+    ------
+    CmmUqError : no such kind, or what is given is refused by the readers of a job.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> cmm_uq.new("ballbar", machine={"name": "Bridge 7"}, artefact={"length_mm": 300.0})
+    <Job job: ballbar on Bridge 7, 40 points, simulated>
+    """
+    files = new_plan(tables, id=id) if kind == PLAN else new_job(kind, tables, id=id)
+    return job_of({name: content for name, content in files.items() if name not in KEPT}, recorded=kind != PLAN)
+
+
+def check(job: Job | str | Path) -> Checked:
+    """All that is wrong with a job, without computing.
+
+    Parameters
+    ----------
+    job : a job, or its folder.
+
+    Examples
+    --------
+    >>> import cmm_uq
+    >>> cmm_uq.check("examples/iota-1102-20C").sound
+    True
+    """
+    return check_read(job) if isinstance(job, Job) else check_job(Path(job))

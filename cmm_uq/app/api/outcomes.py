@@ -1,28 +1,75 @@
-"""What the calls of the API give: figures to compute with, something to look at in a notebook, and files when asked for."""
+"""What the calls give: figures to compute with, something to look at in a notebook, and files when asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from cmm_uq.app.api.tables import quantities, quantity_frame, shown
-from cmm_uq.app.commands.plan import PLAN
+from cmm_uq.app.commands.files import Form
+from cmm_uq.app.commands.part_written import written
+from cmm_uq.app.commands.plans.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
 from cmm_uq.app.commands.report import DIAGNOSE, REPORT
-from cmm_uq.app.commands.written import Form
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.notebook import html_table
+from cmm_uq.base.units import printed_unit
 from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.part.results import part_results
+from cmm_uq.certificate.part.summary import part_summary
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.maths.inference.draws import Draws
+from cmm_uq.maths.uncertainty.rounding import rounded
 
 if TYPE_CHECKING:
     import pandas as pd
+
+QUANTITY = ("value", "u", "lower", "upper", "unit")
+
+
+def quantities(results: Mapping[str, Any], units: Mapping[str, str]) -> pd.DataFrame:
+    """Estimates of results.json: of effects and other errors, of the artefact's sizes, of the noise where it is estimated.
+
+    Parameters
+    ----------
+    results : contents of results.json.
+    units : as printed, by name; of what is missing there, the unit is that in which its name ends.
+    """
+    owners: dict[str, Any] = {**results.get("estimates", {}), "artefact": results.get("artefact", {})}
+    stated = {key: item for key, item in results.get("noise", {}).items() if _is_quantity(item) and item["u"] > 0}
+    found = {
+        f"{owner}.{name}": item for owner, items in {**owners, "noise": stated}.items()
+        for name, item in items.items() if _is_quantity(item)
+    }  # fmt: skip
+    return quantity_frame(found, units)
+
+
+def quantity_frame(found: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]) -> pd.DataFrame:
+    """Quantities of results.json as rows of value, u, ends of the 95 % interval, and unit."""
+    import pandas as pd
+
+    rows = [
+        (item["value"], item["u"], *item["interval95"], units.get(name, printed_unit(name)))
+        for name, item in found.items()
+    ]
+    return pd.DataFrame(rows, index=pd.Index(list(found), name="quantity"), columns=list(QUANTITY))
+
+
+def _is_quantity(item: object) -> bool:
+    return isinstance(item, Mapping) and {"value", "u", "interval95"} <= item.keys()
+
+
+def shown(frame: pd.DataFrame) -> Iterator[tuple[str, ...]]:
+    """Rows of text of quantities: name, value ± U, unit; U is the larger part of the 95 % interval."""
+    for name, value, u, lower, upper, unit in frame.itertuples():
+        text, expanded = rounded(value, max(upper - value, value - lower)) if u > 0 else (f"{value:.6g}", "0")
+        yield str(name), f"{text} ± {expanded}", str(unit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -240,3 +287,89 @@ class Proof(Found):
     def _said(self) -> str:
         standings = (f"{each['figure']} {each['standing']}" for each in self.results["acceptance"])
         return ", ".join([f"{self.results['cases']} cases", *standings])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Part:
+    """What was found of a part; nothing is written before :meth:`write`.
+
+    Parameters
+    ----------
+    found : all of it.
+    """
+
+    found: PartFound
+
+    @property
+    def job(self) -> PartJob:
+        """The job that was asked for."""
+        return self.found.job
+
+    @cached_property
+    def results(self) -> Mapping[str, Any]:
+        """Contents of results.json, before rounding to ten digits."""
+        return part_results(self.found)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What must be known before a figure is used."""
+        return self.found.warnings
+
+    @property
+    def conforming(self) -> bool:
+        """Whether nothing that was decided is anything but a pass: what ``--strict`` on the command line asks."""
+        return self.found.conforming
+
+    @cached_property
+    def characteristics(self) -> pd.DataFrame:
+        """Every characteristic by its name: value, u, U, k, interval, limits, decision, probability, unit."""
+        import pandas as pd
+
+        rows = {
+            one["name"]: {
+                **{key: one[key] for key in ("what", "value", "u", "U", "k", "unit")},
+                "interval_lower": one["interval95"][0], "interval_upper": one["interval95"][1],
+                **{key: (one["limits"] or {}).get(key) for key in ("lower", "upper")},
+                **{key: (one["decision"] or {}).get(key) for key in ("outcome", "probability_conforming")},
+            }
+            for one in self.results["characteristics"]
+        }  # fmt: skip
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    @cached_property
+    def correlation(self) -> pd.DataFrame:
+        """Correlation between the errors of the characteristics."""
+        import pandas as pd
+
+        names = self.results["correlation"]["characteristics"]
+        return pd.DataFrame(self.results["correlation"]["matrix"], index=names, columns=names)
+
+    @cached_property
+    def budget(self) -> pd.DataFrame:
+        """Total shares of each characteristic's variance, a row a cause."""
+        import pandas as pd
+
+        shares = self.results["budget"]
+        rows = {each["cause"]: each["total"] for each in shares["causes"]}
+        return pd.DataFrame.from_dict(rows, orient="index", columns=shares["characteristics"])
+
+    def write(self, folder: str | Path | None = None, *, force: bool = False) -> dict[str, Path]:
+        """Write the files that ``cmm-uq part`` writes, all or none.
+
+        Parameters
+        ----------
+        folder : to write to; ``reports/<job id>`` where none is given.
+        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+        """
+        out = None if folder is None else Path(folder)
+        return dict(written(self.job, lambda: self.found, out, force=force).files)
+
+    def __repr__(self) -> str:
+        said = [f"{len(self.found.stated)} characteristics", *filter(None, [self.found.outcome])]
+        return f"<Part of {self.job.facts.job.id}: {', '.join(said)}>"
+
+    def _repr_html_(self) -> str:
+        short = part_summary(self.found)
+        warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
+        table = html_table("Summary", (), short.rows)
+        return f"<p>{escape(repr(self))}</p>{table}" + (f"<ul>{warned}</ul>" if warned else "")

@@ -14,7 +14,7 @@ from cmm_uq.app.cli.progress import shown
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.affected import Affected, Change
+    from cmm_uq.app.commands.certificates.affected import Affected, Change
 
 EXAMPLES = examples(
     "affected --version 0.4.0",
@@ -50,8 +50,8 @@ def command(
         raise CmmUqError("nothing is written of what is only listed", where="--list", fix="Leave out --list or --write")
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq import __version__
-        from cmm_uq.app.commands.affected import affected
-        from cmm_uq.app.commands.written import silent
+        from cmm_uq.app.commands.certificates.affected import affected
+        from cmm_uq.app.commands.files import silent
         from cmm_uq.laboratory.records import open_records
 
         last = __version__ if to is None else to

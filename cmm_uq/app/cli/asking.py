@@ -11,7 +11,7 @@ from cmm_uq.app.cli.new import value_of
 
 def answers(name: str) -> dict[str, dict[str, Any]]:
     """What the user says of a new job of a kind, by table and key; only what differs from what it begins with."""
-    from cmm_uq.app.commands.new import usual
+    from cmm_uq.app.commands.jobs.new import usual
 
     found: dict[str, dict[str, Any]] = {}
     for table, key, question, default in _questions(usual(name)):

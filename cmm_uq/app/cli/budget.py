@@ -42,7 +42,7 @@ def command(
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.budget import write_budget
-        from cmm_uq.app.commands.written import silent
+        from cmm_uq.app.commands.files import silent
 
         written = write_budget(file, out, seed=seed, force=force, stage=stage or silent, language=language or ENGLISH)
     if json:

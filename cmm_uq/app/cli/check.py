@@ -15,7 +15,7 @@ from cmm_uq.app.cli.printing import layout, put, put_data, show
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.check import Checked
+    from cmm_uq.app.commands.jobs.check import Checked
     from cmm_uq.certificate.in_short import Summary
 
 EXAMPLES = examples("check JOB", "check jobs/a jobs/b", "check JOB --clauses", "check JOB --json")
@@ -36,7 +36,7 @@ def command(
     What ISO/IEC 17025:2017, 7.8 asks for and a job does not state makes its certificate a draft, and is told with its key.
     """
     defer_scipy()
-    from cmm_uq.app.commands.check import check_job
+    from cmm_uq.app.commands.jobs.check import check_job
 
     found = [check_job(job) for job in jobs]
     if json:

@@ -45,8 +45,7 @@ def command(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own."""
-    from cmm_uq.app.commands.compensate import write_compensated
-    from cmm_uq.app.commands.compensate_cloud import write_compensated_cloud
+    from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud
     from cmm_uq.machine.physics.map_interpolation import Beyond
 
     beyond: Beyond = "extrapolate" if extrapolate else "refuse"

@@ -30,7 +30,9 @@ def kinds(incomplete: str) -> list[str]:
     from cmm_uq.app.cli.deferred import defer_scipy
 
     defer_scipy()
-    from cmm_uq.app.commands.new import BUDGET, PART, PLAN, known
+    from cmm_uq.app.commands.jobs.folder import BUDGET, PLAN
+    from cmm_uq.app.commands.jobs.new import known
+    from cmm_uq.app.commands.new_part import PART
 
     return [name for name in (*known(), PLAN, PART, BUDGET) if name.startswith(incomplete)]
 

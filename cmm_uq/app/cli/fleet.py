@@ -37,8 +37,8 @@ def command(
 ) -> None:  # fmt: skip
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.files import silent
         from cmm_uq.app.commands.fleet import fleet, write_fleet
-        from cmm_uq.app.commands.written import silent
 
         found = fleet(records, name or (), seed=seed, stage=stage or silent)
         files = {} if out is None else write_fleet(found, out, force=force)

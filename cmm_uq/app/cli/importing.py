@@ -62,7 +62,7 @@ def command(
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
     defer_scipy()
-    from cmm_uq.app.commands.importing import read_export, write_recording
+    from cmm_uq.app.commands.jobs.exchange import read_export, write_recording
 
     found = read_export(file, keys_of(column, key))
     if json:

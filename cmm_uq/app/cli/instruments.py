@@ -55,7 +55,7 @@ def _alone(context: typer.Context) -> None:
 @app.command("list", epilog=examples("instruments list", "instruments list --json"))
 def list_all(json: Json = False) -> None:
     """List the ready profiles and the serial ports of this computer."""
-    from cmm_uq.app.commands.instruments import listed
+    from cmm_uq.app.commands.laboratory.instruments import listed
 
     found = listed()
     if json:
@@ -173,7 +173,7 @@ def new(
     stop: Annotated[int, typer.Option(help="Stop bits.", metavar="N", min=1, max=2)] = 1,
 ) -> None:
     """Write a profile from an example line; on a terminal it asks for what no option says."""
-    from cmm_uq.app.commands.instruments import write_profile
+    from cmm_uq.app.commands.laboratory.instruments import write_profile
     from cmm_uq.laboratory.live.instruments.draft import Drafted, range_of
 
     settings = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
@@ -201,7 +201,7 @@ def simulate(
     ] = None,
 ) -> None:
     """Be an instrument without hardware, at a port that is printed, until it is interrupted."""
-    from cmm_uq.app.commands.instruments import simulating
+    from cmm_uq.app.commands.laboratory.instruments import simulating
 
     with simulating(profile, way) as port:
         say(port)
@@ -211,7 +211,7 @@ def simulate(
 
 def _attempt(profile: str, port: str, job: Path | None) -> Any:
     defer_scipy()
-    from cmm_uq.app.commands.instruments import Attempt
+    from cmm_uq.app.commands.laboratory.instruments import Attempt
 
     return Attempt(profile, port, job)
 

@@ -37,7 +37,7 @@ def new(
     The passphrase is asked for, or read from CMM_UQ_SIGN_PASSPHRASE_FILE or CMM_UQ_SIGN_PASSPHRASE. Whatever is signed with
     it says that it is a test key.
     """
-    from cmm_uq.app.commands.keys import new_test_key
+    from cmm_uq.app.commands.certificates.keys import new_test_key
     from cmm_uq.certificate.sign import TEST_NOTE
 
     made = new_test_key(file, name, lambda question: hidden(question, twice=True))

@@ -73,7 +73,9 @@ def command(
     tolerances, unless one of the options gives something.
     """
     defer_scipy()
-    from cmm_uq.app.commands.new import BUDGET, PART, check_empty, known, titles, write_new
+    from cmm_uq.app.commands.jobs.folder import BUDGET
+    from cmm_uq.app.commands.jobs.new import check_empty, known, titles, write_new
+    from cmm_uq.app.commands.new_part import PART
 
     if not kind:
         if json:
@@ -120,7 +122,7 @@ def _of_export(
     kind: str, export: Path, folder: Path, given: dict[str, dict[str, Any]], keys: ImportKeys, *, quiet: bool
 ) -> Mapping[str, Path]:  # fmt: skip
     """Show what is recognised of an export, then write the job around it."""
-    from cmm_uq.app.commands.importing import read_export, write_job_of_export
+    from cmm_uq.app.commands.jobs.exchange import read_export, write_job_of_export
 
     recognised = read_export(export, keys).recognised
     if not quiet:

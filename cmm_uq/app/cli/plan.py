@@ -37,7 +37,7 @@ def command(
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with shown(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.plan import write_plan
+        from cmm_uq.app.commands.plans.plan import write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage, language=language)
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

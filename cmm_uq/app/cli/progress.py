@@ -12,7 +12,7 @@ from cmm_uq.app.cli.printing import columns, styled
 from cmm_uq.base.output.interruption import speaking
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.written import Stage
+    from cmm_uq.app.commands.files import Stage
 
 
 @contextmanager

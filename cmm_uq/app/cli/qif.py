@@ -22,7 +22,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Write every value that a standard decided on, and the error factors, as QIF 3.0. Nothing is overwritten."""
-    from cmm_uq.app.commands.qif import write_qif
+    from cmm_uq.app.commands.jobs.exchange import write_qif
 
     file = write_qif(report, out)
     if not quiet:

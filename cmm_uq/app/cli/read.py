@@ -34,7 +34,7 @@ def command(
 
     Signatures are counted and not verified: cmm-uq verify does.
     """
-    from cmm_uq.app.commands.read import read_certificate
+    from cmm_uq.app.commands.jobs.exchange import read_certificate
     from cmm_uq.jobs.dcc.shown import data, shown
 
     found = [read_certificate(file, schema) for file in files]

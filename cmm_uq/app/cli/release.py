@@ -47,7 +47,7 @@ def command(
     """
     if withdraw and replaced_by is not None:
         raise CmmUqError("a certificate is withdrawn or replaced, not both", where="--withdraw", fix="Leave out one")
-    from cmm_uq.app.commands import release as releases
+    from cmm_uq.app.commands.certificates import release as releases
     from cmm_uq.laboratory.records import open_records
 
     with open_records(records) as opened:

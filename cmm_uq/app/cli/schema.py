@@ -20,6 +20,6 @@ def command(
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
     defer_scipy()
-    from cmm_uq.app.commands.schemas import as_text, schema_named
+    from cmm_uq.app.commands.jobs.schemas import as_text, schema_named
 
     put_json(as_text(schema_named(name)))

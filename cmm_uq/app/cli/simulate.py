@@ -38,7 +38,7 @@ def command(
     json: Json = False,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
-    from cmm_uq.app.commands.simulate import write_simulation
+    from cmm_uq.app.commands.jobs.simulate import write_simulation
 
     files = write_simulation(job, truth, out, seed=seed, force=force)
     conclude_derived(files, f"A recording of {job}, drawn from {truth}", json=json, quiet=quiet, verbose=verbose)

@@ -29,7 +29,7 @@ def command(
     Nothing is overwritten.
     """
     defer_scipy()
-    from cmm_uq.app.commands.standards import clauses_of, listed_standards, write_form
+    from cmm_uq.app.commands.certificates.standards import clauses_of, listed_standards, write_form
 
     if name is None:
         if form is not None:

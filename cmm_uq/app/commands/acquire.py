@@ -199,8 +199,8 @@ def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
         ((name, content),) = plan_file(job).items()
         read_recording(content, str(job.folder / name), job.points.machine)
         return content.decode("utf-8-sig"), []
-    from cmm_uq.app.commands.plan import recording_to_be
-    from cmm_uq.app.commands.planning import make_plan
+    from cmm_uq.app.commands.plans.plan import recording_to_be
+    from cmm_uq.app.commands.plans.planning import make_plan
 
     try:
         plan = make_plan(job, power=False)

@@ -21,9 +21,8 @@ from cmm_uq.app.commands.estimation import (
     with_doubt,
     with_noise,
 )
+from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recipe import recipe_of
-from cmm_uq.app.commands.refusals import OVERFLOW_FIX
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.certificate.compose import certified
@@ -117,7 +116,7 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
 
 
 def report_recipe(job: Job) -> Recipe:
-    """How a job is reported; see :func:`~cmm_uq.app.commands.recipe.recipe_of`.
+    """How a job is reported; see :func:`~cmm_uq.app.commands.model.recipe_of`.
 
     Raises
     ------

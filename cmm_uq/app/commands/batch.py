@@ -13,8 +13,7 @@ from cmm_uq.app.commands.batch_asked import Asked, Batch, Failed
 from cmm_uq.app.commands.batch_jobs import Wanted, jobs_in, results_of
 from cmm_uq.app.commands.batch_run import Run
 from cmm_uq.app.commands.batch_table import write_table
-from cmm_uq.app.commands.recording import opened
-from cmm_uq.app.commands.written import REPORTS, Stage, silent
+from cmm_uq.app.commands.files import REPORTS, Stage, opened, silent
 from cmm_uq.base.output import interruption
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.laboratory.schedule.parquet import check_parquet

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq import __version__
+from cmm_uq.app.commands.files import RESULTS
 from cmm_uq.app.commands.report import REPORT
-from cmm_uq.app.commands.written import RESULTS
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import ENGLISH
 from cmm_uq.base.output import Manifest, read_manifest, sha256_of

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.app.commands.batch_asked import Asked, Batch, Failed
 from cmm_uq.app.commands.batch_job import Task
 from cmm_uq.app.commands.batch_jobs import Listed, Wanted, conforming
+from cmm_uq.app.commands.files import RESULTS, Stage, ledger_of
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recording import ledger_of
 from cmm_uq.app.commands.report import REPORT
-from cmm_uq.app.commands.written import RESULTS, Stage
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import Ledger, Owner, staged
 from cmm_uq.jobs.job import Job

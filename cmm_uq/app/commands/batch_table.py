@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.app.commands.batch_jobs import verdict
-from cmm_uq.app.commands.recording import called
+from cmm_uq.app.commands.files import called
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.schedule.parquet import Row, write_parquet

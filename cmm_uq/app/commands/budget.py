@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.app.commands.written import Stage, silent
+from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import ENGLISH, Code
 from cmm_uq.base.output import Owner, staged

@@ -18,10 +18,8 @@ from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.analysis.screening.screened import Finding
 from cmm_uq.app.commands.against import Against, against_simulation
 from cmm_uq.app.commands.estimation import without_outliers
+from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of, recorded_model, refuse_planned
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recipe import recipe_of
-from cmm_uq.app.commands.recorded import recorded_model
-from cmm_uq.app.commands.refusals import OVERFLOW_FIX, refuse_planned
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.overflow import refusing_overflow
@@ -172,7 +170,7 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
 
 
 def _recipe(job: Job) -> Recipe:
-    """How a job is diagnosed; see :func:`~cmm_uq.app.commands.recipe.recipe_of`.
+    """How a job is diagnosed; see :func:`~cmm_uq.app.commands.model.recipe_of`.
 
     Raises
     ------
@@ -189,7 +187,7 @@ def _usual(kind: Kind) -> Recipe:
 
 
 def _outcome(found: Diagnosed) -> Outcome:
-    from cmm_uq.app.commands.simulate import to_fill_in
+    from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
     plan = found.next_plan
     files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cmm_uq.app.commands.written import Stage, silent
+from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.laboratory.due.drift import history
 from cmm_uq.laboratory.due.fleet import Fleet, Member, fit_fleet

@@ -8,8 +8,8 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
+from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.app.commands.new_part_answers import Answers
-from cmm_uq.app.commands.schemas import shipped
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES

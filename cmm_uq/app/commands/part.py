@@ -20,6 +20,7 @@ from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.reducing import ways
 from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.part_further import further_of
 from cmm_uq.app.commands.part_machine import machine_found, with_calibration, with_history
 from cmm_uq.app.commands.part_methods import methods_of
@@ -32,7 +33,6 @@ from cmm_uq.app.commands.part_plan import (
     refuse_out_of_reach,
     refuse_unfit,
 )
-from cmm_uq.app.commands.written import Stage, silent
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE

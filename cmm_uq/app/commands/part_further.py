@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from cmm_uq.analysis.parts.machine import FREE
-from cmm_uq.app.commands.planning import Plan, make_plan
+from cmm_uq.app.commands.plans.planning import Plan, make_plan
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml

@@ -20,11 +20,11 @@ from cmm_uq.analysis.parts.machine import MachineState
 from cmm_uq.analysis.parts.machine_stated import machine_stated
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.app.commands.estimation import with_noise
+from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.part_drift import with_drift
 from cmm_uq.app.commands.part_history import FILE as HISTORY
 from cmm_uq.app.commands.part_machine_warnings import machine_warnings, temperatures
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.written import Stage, silent
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, say

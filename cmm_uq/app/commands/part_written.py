@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.written import REPORTS, RESULTS, Finished, Stage, silent, unchanged
+from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, silent, unchanged
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import Code
 from cmm_uq.base.messages import Text, say

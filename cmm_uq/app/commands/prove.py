@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cmm_uq.app.commands.files import REPORTS, Form, Stage, Written, silent
 from cmm_uq.app.commands.reading import in_language, read_job
-from cmm_uq.app.commands.written import REPORTS, Form, Stage, Written, silent
 from cmm_uq.base.languages.language import Code
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.outcome import Outcome

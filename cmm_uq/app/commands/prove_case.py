@@ -13,7 +13,7 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.app.commands.diagnosing import diagnose_read
-from cmm_uq.app.commands.modelled import model_of
+from cmm_uq.app.commands.model import model_of
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError

@@ -13,10 +13,9 @@ import numpy as np
 from cmm_uq import __version__
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.app.commands.estimation import without_outliers
+from cmm_uq.app.commands.files import Stage, silent
+from cmm_uq.app.commands.model import OVERFLOW_FIX, recorded_model
 from cmm_uq.app.commands.prove_case import CaseSetting, model_on
-from cmm_uq.app.commands.recorded import recorded_model
-from cmm_uq.app.commands.refusals import OVERFLOW_FIX
-from cmm_uq.app.commands.written import Stage, silent
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import interruption
@@ -218,7 +217,7 @@ def _planned(job: Job, cte: float) -> tuple[Job, Design]:
 
 
 def _placings(job: Job) -> Points:
-    from cmm_uq.app.commands.planning import make_plan
+    from cmm_uq.app.commands.plans.planning import make_plan
 
     return make_plan(job, power=False).outlook.points
 

@@ -1,22 +1,30 @@
-"""Jobs of every kind there is, read from their folders or from memory."""
+"""Jobs of every kind there is, read from their folders, from memory or from tables."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import datetime as dt
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.conformity.standards import names as standard_names
 from cmm_uq.analysis.conformity.standards import standard_named
 from cmm_uq.artefacts import names, table_of
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.languages.language import Code
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.jobs import predicted, reading
 from cmm_uq.jobs.conformity import Standards
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.predicted import against
 from cmm_uq.jobs.reading import Nameable
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
 """Every kind and every standard that there is, of other packages too."""
@@ -77,3 +85,77 @@ def compared_with(job: Job, prediction: Path) -> Job:
     """
     content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
     return predicted.against(job, content, prediction.name, prediction)
+
+
+RECORDING, PREDICTION = "recording.csv", "predicted.csv"
+NO_DATE = dt.date(1970, 1, 1)
+"""Of a job that says none: the clock is never read."""
+
+NO_DATE_REMARK = "The date of the measurement was not given."
+
+
+def job_from_frames(
+    points: pd.DataFrame | None,
+    tables: Mapping[str, Mapping[str, Any] | Sequence[Mapping[str, Any]] | None],
+    files: Mapping[str, pd.DataFrame],
+) -> Job:
+    """The job that a job.toml with these tables and a recording with these rows would be.
+
+    Parameters
+    ----------
+    points : the recording, one row a point; ``None`` for a kind without one, or where it is still to be measured.
+    tables : of job.toml, by name; what is ``None`` or empty is left out.
+    files : further tables that job.toml names, such as error maps, by name.
+
+    Raises
+    ------
+    CmmUqError : job.toml or a table says something unknown, missing or contradictory, with the key, or line and column.
+    """
+    told = {name: table for name, table in tables.items() if table}
+    recording = dict(_mapping(told.get("recording", {}), "recording"))
+    contents = {name: as_csv(frame, name) for name, frame in files.items()}
+    if points is not None:
+        recording.setdefault("file", RECORDING)
+        contents[str(recording["file"])] = as_csv(points, str(recording["file"]))
+    job = dict(_mapping(told.get("job", {}), "job"))
+    if job.get("date") is None:
+        remarks = "\n".join(filter(None, (str(job.get("remarks", "")), NO_DATE_REMARK)))
+        job |= {"date": NO_DATE, "remarks": remarks}
+    whole = {"job": job, **{name: table for name, table in told.items() if name not in ("job", "recording")}}
+    if recording:
+        whole["recording"] = recording
+    return job_of({"job.toml": as_toml(whole, "job.toml"), **contents}, recorded=points is not None)
+
+
+def compared_with_frame(job: Job, prediction: pd.DataFrame) -> Job:
+    """A job that was read, to be compared with what a simulation predicts.
+
+    Raises
+    ------
+    CmmUqError : it is no prediction.
+    """
+    return against(job, as_csv(prediction, PREDICTION), PREDICTION)
+
+
+def as_csv(frame: pd.DataFrame, name: str) -> bytes:
+    """A table as CSV: each number in the fewest digits that give it back.
+
+    Raises
+    ------
+    CmmUqError : it is no table.
+    """
+    import pandas as pd
+
+    try:
+        text = pd.DataFrame(frame).to_csv(index=False, lineterminator="\n")
+    except (TypeError, ValueError) as error:
+        raise CmmUqError(
+            f"is no table: {error}", where=name, fix="Give a DataFrame with the columns of the file"
+        ) from None
+    return text.encode()
+
+
+def _mapping(table: Any, name: str) -> Mapping[str, Any]:
+    if not isinstance(table, Mapping):
+        raise CmmUqError("must be a table of keys", where=f"job.toml [{name}]", fix="Give a dict")
+    return table

@@ -11,8 +11,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cmm_uq.app.commands.files import content_of
 from cmm_uq.app.commands.reading import job_of
-from cmm_uq.app.commands.recording import content_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of as whole_file
 from cmm_uq.base.files.limits import TABLE_BYTES

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.app.commands import analysis, diagnosing
+from cmm_uq.app.commands.certificates.reissue import reissued, with_replaced
+from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.reading import compared_with, in_language, read_job
-from cmm_uq.app.commands.reissue import reissued, with_replaced
-from cmm_uq.app.commands.written import Form, Stage, Told, Written, silent
 from cmm_uq.base.languages.language import Code
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.next import TO_FILL_IN

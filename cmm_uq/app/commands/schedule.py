@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.app.commands.schemas import shipped
-from cmm_uq.app.commands.written import REPORTS
+from cmm_uq.app.commands.files import REPORTS
+from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import say
 from cmm_uq.base.output.new_file import write_new

@@ -28,7 +28,7 @@ from cmm_uq.certificate.verify.given import (
 from cmm_uq.certificate.verify.signed import check_signatures
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.written import Stage
+    from cmm_uq.app.commands.files import Stage
     from cmm_uq.jobs.job import Job
     from cmm_uq.jobs.part.job import PartJob
 

@@ -16,7 +16,7 @@ from cmm_uq.certificate.verify.found import AGAIN, Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.written import Stage
+    from cmm_uq.app.commands.files import Stage
     from cmm_uq.certificate.verify.again import Again
     from cmm_uq.jobs.job import Job
     from cmm_uq.jobs.part.job import PartJob
@@ -171,7 +171,7 @@ def _plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
 
 def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> None:
     """Say which corrections touch a certificate of another version, and compute its figures as they are now."""
-    from cmm_uq.app.commands.corrections import Inputs, between, order, said
+    from cmm_uq.app.commands.certificates.affected import Inputs, between, order, said
 
     if said(made) >= order(__version__):
         inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")

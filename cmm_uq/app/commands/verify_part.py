@@ -12,7 +12,7 @@ from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Finding, Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.written import Finished, Stage
+    from cmm_uq.app.commands.files import Finished, Stage
     from cmm_uq.jobs.part.job import PartJob
 
 TRUSTED = "whose signature the machine's certificate has"

@@ -11,8 +11,8 @@ import pytest
 from cmm_uq.analysis.conformity.clauses import CLAUSES, in_words
 from cmm_uq.analysis.conformity.standards import BUILT_IN, statement
 from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.app.commands.certificates.standards import form, write_form
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.standards import form, write_form
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from tests.analysis.conformity.recorded import gauge

@@ -19,7 +19,7 @@ from cmm_uq.analysis.parts.plan import Characteristic, Plan
 from cmm_uq.analysis.parts.recorded_noise import stated_noise
 from cmm_uq.analysis.parts.together import Together
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
-from cmm_uq.app.commands.recorded import recorded_model
+from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

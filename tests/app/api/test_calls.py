@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 import cmm_uq
-from cmm_uq.app.commands.compensate import write_compensated
-from cmm_uq.app.commands.simulate import write_simulation
+from cmm_uq.app.commands.jobs.compensate import write_compensated
+from cmm_uq.app.commands.jobs.simulate import write_simulation
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 

@@ -11,7 +11,7 @@ from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize(
-    ("module", "least"), [("cmm_uq", 3), ("cmm_uq.app.api.calls", 10), ("cmm_uq.app.api.beginning", 4)]
+    ("module", "least"), [("cmm_uq", 3), ("cmm_uq.app.api.calls", 10), ("cmm_uq.app.api.calls", 4)]
 )
 def test_the_examples_of_the_docstrings_hold(module: str, least: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)

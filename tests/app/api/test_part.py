@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.app.api.part import Part
+from cmm_uq.app.api.outcomes import Part
 from cmm_uq.jobs.part.beginning import TABLES
 from tests.part_machines import THERE, by_results, plate_of
 

@@ -42,7 +42,7 @@ def test_an_ambiguity_ends_with_the_key_that_settles_it_and_exit_code_2(tmp_path
 
 def test_a_text_table_is_read_without_the_libraries_of_workbooks() -> None:
     code = (
-        "import sys; from pathlib import Path; from cmm_uq.app.commands.importing import read_export; "
+        "import sys; from pathlib import Path; from cmm_uq.app.commands.jobs.exchange import read_export; "
         f"read_export(Path({str(SAMPLE)!r})); print(sorted({{'pandas', 'openpyxl', 'defusedxml'}} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

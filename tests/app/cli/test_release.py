@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.release import release
+from cmm_uq.app.commands.certificates.release import release
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records import open_records
 from tests.app.cli.laboratory import PLACE, kept

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.commands.check import Problem, check_job
+from cmm_uq.app.commands.jobs.check import Problem, check_job
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.app.commands.compensate_cloud import write_compensated_cloud
+from cmm_uq.app.commands.jobs.compensate import write_compensated_cloud
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.base.points import Floats
@@ -168,7 +168,7 @@ def test_what_was_written_says_where_it_comes_from(tmp_path: Path) -> None:
 
 def test_memory_does_not_grow_with_the_cloud(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job, peaks = square(tmp_path), []
-    monkeypatch.setattr("cmm_uq.app.commands.compensate_cloud.transform_cloud", in_blocks_of_2000())
+    monkeypatch.setattr("cmm_uq.app.commands.jobs.compensate.transform_cloud", in_blocks_of_2000())
     for n in (10_000, 100_000):
         np.save(tmp_path / "cloud.npy", np.resize(scanned(), (n, 5)))
         tracemalloc.start()

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.importing import own_format, read_export, write_job_of_export, write_recording
+from cmm_uq.app.commands.jobs.exchange import own_format, read_export, write_job_of_export, write_recording
+from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.simulate import simulated_job
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results_file import head

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.compensate import write_compensated
+from cmm_uq.app.commands.jobs.compensate import write_compensated
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND

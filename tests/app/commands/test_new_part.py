@@ -14,8 +14,9 @@ from cmm_uq.analysis.parts import plan
 from cmm_uq.analysis.parts.characteristics import Evaluation
 from cmm_uq.analysis.parts.machine import MachineState, StatedNoise
 from cmm_uq.analysis.parts.virtual import AtPose
-from cmm_uq.app.commands.check import check_job
-from cmm_uq.app.commands.new import write_new
+from cmm_uq.app.commands.jobs.check import check_job
+from cmm_uq.app.commands.jobs.new import write_new
+from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.app.commands.part_plan import (
     circumstances_of,
     clamping_of,
@@ -26,7 +27,6 @@ from cmm_uq.app.commands.part_plan import (
     surroundings_of,
 )
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.schemas import shipped
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
 from cmm_uq.jobs.part import characteristic, feature

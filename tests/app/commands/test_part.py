@@ -297,7 +297,7 @@ def test_temperatures_outside_of_the_calibrations_are_told() -> None:
 
 def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:
     """Of the machine's certificate too, without drawing anything."""
-    from cmm_uq.app.commands.check import check_job
+    from cmm_uq.app.commands.jobs.check import check_job
     from tests.part_machines import plate_files
 
     for name, content in plate_files(other_draws(), **THERE).items():
@@ -310,7 +310,7 @@ def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:
 
 
 def test_a_check_reaches_as_far_as_the_axes_of_the_certificate(tmp_path: Path) -> None:
-    from cmm_uq.app.commands.check import check_job
+    from cmm_uq.app.commands.jobs.check import check_job
     from tests.part_machines import plate_files
 
     for name, content in plate_files(by_certificate(), placing={"origin_mm": [850.0, 300.0, -500.0]}).items():
@@ -320,7 +320,7 @@ def test_a_check_reaches_as_far_as_the_axes_of_the_certificate(tmp_path: Path) -
 
 
 def test_a_machine_s_job_that_is_not_there_stops_the_check(tmp_path: Path) -> None:
-    from cmm_uq.app.commands.check import check_job
+    from cmm_uq.app.commands.jobs.check import check_job
     from tests.part_machines import plate_files
 
     for job, words in (("../nowhere", "no such file"), (".", "is the part's own job")):

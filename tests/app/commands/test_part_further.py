@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import cache
 
 from cmm_uq.app.commands.part_further import Planned, further_of
-from cmm_uq.app.commands.planning import make_plan
+from cmm_uq.app.commands.plans.planning import make_plan
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.found import Unseen

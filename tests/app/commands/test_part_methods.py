@@ -17,7 +17,7 @@ from benchmarks.examples.part_methods_job import FOLDER as EXAMPLE
 from benchmarks.examples.part_methods_job import files as example_files
 from cmm_uq.analysis.parts.by_method import ByMethod
 from cmm_uq.analysis.parts.result import evaluated
-from cmm_uq.app.commands.check import check_job
+from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.part import part_found
 from cmm_uq.app.commands.part_methods import lacking, methods_of
 from cmm_uq.app.commands.part_plan import plan_of

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.analysis import analyse_job
-from cmm_uq.app.commands.check import check_job
-from cmm_uq.app.commands.planning import RECORDED, Plan, make_plan
+from cmm_uq.app.commands.jobs.check import check_job
+from cmm_uq.app.commands.jobs.simulate import simulate
+from cmm_uq.app.commands.plans.planning import RECORDED, Plan, make_plan
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.simulate import simulate
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.truth import Truth

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.planning.ready import ready_plan
-from cmm_uq.app.commands.plan_page import plan_document
-from cmm_uq.app.commands.plan_results import plan_results
-from cmm_uq.app.commands.plan_words import combination
-from cmm_uq.app.commands.planning import Plan, make_plan
+from cmm_uq.app.commands.plans.page import plan_document
+from cmm_uq.app.commands.plans.plan import plan_results
+from cmm_uq.app.commands.plans.planning import Plan, make_plan
+from cmm_uq.app.commands.plans.words import combination
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.certificate.html import render_html
 from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmm_uq.app.commands.plan_words import combination
+from cmm_uq.app.commands.plans.words import combination
 from cmm_uq.base.messages import Message
 from cmm_uq.machine.model.measurement import ARTEFACT
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.planning import RECORDED, SPREAD, Plan, make_plan
+from cmm_uq.app.commands.plans.planning import RECORDED, SPREAD, Plan, make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from tests.conftest import ROOT

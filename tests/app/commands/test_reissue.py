@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.reissue import compared, refuse_denied
+from cmm_uq.app.commands.certificates.reissue import compared, refuse_denied
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.replaced import Replaced, denies_a_change
 from tests.app.cli.laboratory import PLACE, reported

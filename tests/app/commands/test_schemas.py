@@ -9,7 +9,7 @@ from typing import Any
 import jsonschema
 import pytest
 
-from cmm_uq.app.commands.schemas import SCHEMAS, as_text, schema_named
+from cmm_uq.app.commands.jobs.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.schema import keys_of

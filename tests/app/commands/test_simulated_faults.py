@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.simulate import simulated_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

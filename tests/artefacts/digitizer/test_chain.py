@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from cmm_uq.app.commands.compensate import write_compensated
-from cmm_uq.app.commands.compensate_cloud import write_compensated_cloud
+from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.artefacts import artefact_of

@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 
 from benchmarks.artefacts.digitizer_coverage import cases
+from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recorded import recorded_model
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.posterior import Density

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.app.commands.check import check_job
+from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Facts
 from tests.artefacts.simulated import blocks, recovered, table

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recorded import recorded_model
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE

@@ -1,4 +1,6 @@
-"""All that is wrong with a job, without computing: what its readers and its model refuse, and what an assessor would miss.
+"""All that is wrong with a job, without computing.
+
+All that is wrong with a job, without computing: what its readers and its model refuse, and what an assessor would miss.
 
 The rules are those of the commands: the same readers are asked, and go on behind a problem where they can.
 """
@@ -14,9 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.analysis.conformity.standards import decidable
+from cmm_uq.app.commands.model import recorded_model, refuse_unmeasured
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.recorded import recorded_model
-from cmm_uq.app.commands.refusals import refuse_unmeasured
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.content import content_of

@@ -1,4 +1,4 @@
-"""Instruments from the command line: which profiles there are, one tried at its port, a new one from an example line."""
+"""Instruments from the command line: ready profiles, one tried at its port, a new one from an example line."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cmm_uq.analysis.planning.identifiability import Determined, Identifiability
-from cmm_uq.app.commands.planning import RECORDED, Plan
+from cmm_uq.app.commands.plans.planning import RECORDED, Plan
 from cmm_uq.base.messages import DASH, Message, Text, Verbatim, listed, number, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model.measurement import ARTEFACT

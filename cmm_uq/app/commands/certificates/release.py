@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.reissue import refuse_denial, refuse_unlike
+from cmm_uq.app.commands.certificates.reissue import refuse_denial, refuse_unlike
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.jobs.verdicts import NONE, Verdicts
 from cmm_uq.laboratory.records.facts import STANDING, Certificate

@@ -1,25 +1,104 @@
-"""From an outcome to the files of a command: rendered, and written as one set."""
+"""From an outcome to the files of a command: rendered, written as one set, and recorded with that."""
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.recording import ledger_of, opened
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.saying import said_in
-from cmm_uq.base.output import Owner, staged
+from cmm_uq.base.output import Ledger, Owner, staged
 from cmm_uq.certificate.fonts import fonts_of
 from cmm_uq.certificate.in_short import Summary
 from cmm_uq.certificate.outcome import Found, Outcome
 from cmm_uq.jobs.job import Job
-from cmm_uq.laboratory.records.place import NONE
+from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
+from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, place_of
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.signing import Signing
+    from cmm_uq.laboratory.records.store import Records
+
+_UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")
+
+
+@contextlib.contextmanager
+def opened(where: str | Path | None, out: Path | None) -> Iterator[Records | None]:
+    """The records that a command writes to, made where there are none; ``None`` where there are to be none.
+
+    Parameters
+    ----------
+    where : option of the command.
+    out : folder that it writes to, where that is not the default.
+
+    Raises
+    ------
+    CmmUqError : they cannot be opened.
+    OutputError : they cannot be written to.
+    """
+    place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
+    if place is None:
+        yield None
+        return
+    from cmm_uq.laboratory.records.opening import open_records
+
+    with open_records(place, create=True) as records:
+        yield records
+
+
+def ledger_of(
+    records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
+) -> Ledger:
+    """For the files of an outcome, that are recorded as they are put in place.
+
+    Parameters
+    ----------
+    records : to be added to.
+    job : that the outcome is of.
+    command : report or diagnose.
+    folder : of the files.
+    files : contents by name.
+    results : name of results.json.
+    """
+    content = content_of(
+        records, files[results], job, command, folder, {name: sha256(data).hexdigest() for name, data in files.items()}
+    )
+    return records.ledger(kind_of_entry(content), content)
+
+
+def content_of(
+    records: Records, results: bytes, job: Job | None, command: str, folder: Path, files: Mapping[str, str]
+) -> dict[str, Any]:  # fmt: skip
+    """Content of the entry of a results.json; see :func:`cmm_uq.laboratory.records.content.certificate_content`."""
+    return certificate_content(
+        json.loads(results), None if job is None else job.facts, command=command, folder=folder_from(records.home, folder),
+        results_sha256=sha256(results).hexdigest(), files=files, named=called,
+    )  # fmt: skip
+
+
+@cache
+def called(name: str) -> str:
+    """How a value of results.json is called in the field: by its effect's title, else by its own name in words."""
+    from cmm_uq.machine.physics.catalogue import every
+
+    owner, _, own = name.partition(".")
+    effect = every().get(owner)
+    if effect is None:
+        words = own.split("_")
+        while len(words) > 1 and words[-1] in _UNITS_AT_THE_END:
+            words.pop()
+        said = " ".join(words)
+        return said[:1].upper() + said[1:]
+    title = str(effect.title)
+    what = next((str(one.what) for one in effect.reported if one.name == own and one.what), "")
+    return f"{title}, {what}" if what else title
+
 
 Stage = Callable[[str, float], None]
 """Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""

@@ -1,4 +1,4 @@
-"""The folder of a new job: job.toml with every other key as a comment, its schema, and what to do next."""
+"""The folder of a new job, or of a new budget: every other key as a comment, a schema, and what to do next."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import json
 from collections.abc import Collection, Mapping
 from typing import Any
 
+from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.app.commands.reading import job_of
-from cmm_uq.app.commands.schemas import shipped
 from cmm_uq.artefacts import kind_named, names
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.toml_file import as_toml
@@ -136,3 +136,45 @@ def _readme_text(job: Job, begin: Beginning) -> str:
             f"- Nothing is recorded yet: the plan writes `plan.csv`, to be filled in as `{facts.recording.file}`."
         )
     return "\n".join(lines) + "\n"
+
+
+BUDGET_FILE, BUDGET_SCHEMA, BUDGET_README = "budget.toml", ".cmm-uq/budget.schema.json", "README.md"
+
+_MODEL = {
+    "outputs": {"length": "indicated - gauge * cte * (temperature - 20)"}, "title": "Length at 20 °C",
+    "units": {"length": "mm"},
+}  # fmt: skip
+_INPUTS = {
+    "indicated": {"distribution": "normal", "value": 100.0021, "u": 0.0004, "unit": "mm", "source": "repeats"},
+    "gauge": {"distribution": "constant", "value": 100.0, "unit": "mm", "source": "drawing"},
+    "cte": {"distribution": "rectangular", "value": 11.5e-6, "half_width": 1e-6, "unit": "1/K", "source": "data sheet"},
+    "temperature": {
+        "distribution": "rectangular", "value": 20.4, "half_width": 0.2, "unit": "°C", "source": "thermometer",
+    },
+}  # fmt: skip
+
+
+def budget_files() -> dict[str, bytes]:
+    """Contents of every file of a new budget, by name; its figures are an example."""
+    schema = json.loads(shipped("budget"))
+    keys = schema["properties"]
+    one = keys["inputs"]["additionalProperties"]
+    inputs = [
+        commented({"properties": {f"inputs.{name}": {**one, "description": "An input of the model."}}},
+                  {f"inputs.{name}": given}, comment=i == 0)
+        for i, (name, given) in enumerate(_INPUTS.items())
+    ]  # fmt: skip
+    model = commented({"properties": {"model": keys["model"]}}, {"model": _MODEL})
+    head = (
+        f"#:schema ./{BUDGET_SCHEMA}\n# An example: put in your own model and figures. What stands behind # is the default, "
+        "or what may be said besides.\n"
+    )
+    correlation = f'# [correlation]  # {keys["correlation"]["description"]}\n# "indicated,temperature" = 0.0\n'
+    readme = (
+        "# A measurement model and its uncertainty\n\n"
+        f"`cmm-uq budget {BUDGET_FILE}` in this folder evaluates it by the law of propagation and by Monte Carlo.\n\n"
+        f"- `{BUDGET_FILE}`: outputs as expressions, and what is known of each input. The figures are an example.\n"
+        f"- Editors that know TOML schemas explain every key (`{BUDGET_SCHEMA}`).\n"
+    )
+    text = "\n".join([head, model, *inputs, correlation])
+    return {BUDGET_FILE: text.encode(), BUDGET_README: readme.encode(), BUDGET_SCHEMA: shipped("budget").encode()}

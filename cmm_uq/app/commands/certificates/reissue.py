@@ -1,5 +1,7 @@
 """A certificate that replaces another: both results compared, figure by figure as printed, and what differs said.
 
+A certificate that replaces another: both results compared, figure by figure as printed, and what differs said.
+
 The results of the replaced one are an input of the job: a file that it names, or what the records have of it.
 """
 
@@ -12,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.recording import called
+from cmm_uq.app.commands.files import called
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES

@@ -1,5 +1,7 @@
 """A new job: a folder that can be reported at once, with a simulated recording to be replaced by the laboratory's own.
 
+A new job: a folder that can be reported at once, with a simulated recording to be replaced by the laboratory's own.
+
 The set-ups are those of the kind's usual plan in the machine's volume, the readings are drawn from the model that the job
 names, and everything that is made of them says that they are simulated.
 """
@@ -15,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.app.commands.new_folder import (
+from cmm_uq.app.commands.jobs.folder import (
     BUDGET,
     KEPT,
     PLAN,
@@ -101,7 +103,7 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
         return job_files(kind.name, tables, begin.files(machine), example_keys(tables, given), begin=begin)
     planned = read_new(kind, {**tables, "plan": {**begin.plan, **tables.get("plan", {})}}, {})
     points = _drawn(planned, kind, begin)
-    from cmm_uq.app.commands.simulate import recording
+    from cmm_uq.app.commands.jobs.simulate import recording
 
     content = first_line("simulate", f"{PROGRAM} new", ": put in your own readings, and take this line away").encode()
     return job_files(
@@ -180,7 +182,7 @@ def write_new(
     check_empty(folder)
     id = job_id(folder, given, name)  # noqa: A001
     if name == BUDGET:
-        from cmm_uq.app.commands.new_budget import budget_files
+        from cmm_uq.app.commands.jobs.folder import budget_files
 
         if given:
             raise CmmUqError("a new budget has no machine, artefact or job", where="--set", fix="Leave it out")
@@ -283,7 +285,7 @@ def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
     if kind.observe is None:
         noise = np.random.default_rng(SEED).normal(0.0, begin.noise_um * MICROMETRE, points.xyz.shape)
         return points.at(points.xyz + noise)
-    from cmm_uq.app.commands.simulate import simulate
+    from cmm_uq.app.commands.jobs.simulate import simulate
 
     truth = Truth.model_validate({"seed": SEED, "noise": {"coordinate_um": begin.noise_um}})
     return simulate(replace(job, points=points, planned=True), truth)

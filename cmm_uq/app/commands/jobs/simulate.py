@@ -60,7 +60,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     points = replace(job.points, columns={**job.points.columns, **columns})
     observe = kind_of(job).observing("simulated")
     if not job.planned:
-        from cmm_uq.app.commands.recorded import refuse_unfit  # the screening, which a plan's coordinates need not pass
+        from cmm_uq.app.commands.model import refuse_unfit  # the screening, which a plan's coordinates need not pass
 
         refuse_unfit(job)
     artefact = observe(job.facts.artefact, points, where=job.recording_path)

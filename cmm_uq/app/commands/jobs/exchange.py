@@ -1,4 +1,4 @@
-"""A laboratory's export read without a job: shown, written in the project's own format, or made the beginning of a job."""
+"""Files of other programs: exports and digital certificates read, results written as QIF 3.0."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import TABLE_BYTES
-from cmm_uq.base.output.new_file import write_new
+from cmm_uq.base.files.limits import DCC_BYTES, TABLE_BYTES
+from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
+from cmm_uq.certificate.qif_file import qif
+from cmm_uq.jobs.dcc import Certificate, read
+from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.importing.imported import Imported, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.recording import WHOLE, points_of
+from cmm_uq.jobs.reported import Reported
+from cmm_uq.jobs.results_named import read_results
 
 _FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
 _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
@@ -98,7 +103,7 @@ def write_job_of_export(
     CmmUqError : the folder is not empty, or the readers of a job refuse the export or what is given.
     OutputError : the folder cannot be written to.
     """
-    from cmm_uq.app.commands.new import check_empty, job_id, job_of_export
+    from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export
     from cmm_uq.base.output import Owner, staged
 
     check_empty(folder)
@@ -112,3 +117,52 @@ def write_job_of_export(
     with staged(folder, Owner("new", name), expected=files, inputs=(export,)) as place:
         check_empty(folder, but=".unfinished-")
         return place.write(files)
+
+
+_FIX = "Name the results.json of a report, or the folder it lies in"
+
+
+def write_qif(report: Path, out: Path | None = None) -> Path:
+    """Write the results of a report as QIF.
+
+    Parameters
+    ----------
+    report : its results.json, or the folder it lies in.
+    out : file to write, ``<job id>.qif`` by default.
+
+    Returns
+    -------
+    the file.
+
+    Raises
+    ------
+    CmmUqError : it is no results.json of a report.
+    OutputError : the file is there already, or cannot be written.
+    """
+    path = report / RESULTS if report.is_dir() else report
+    found = read_results(Reported, content_of(path, TABLE_BYTES, _FIX), str(path), "results.json of a report", _FIX)
+    file = out or Path(f"{found.job.id}.qif")
+    refuse_taken(file)
+    write_new(file, qif(found))
+    return file
+
+
+def read_certificate(file: Path, schema: Path | None = None) -> Certificate:
+    """The certificate of a file.
+
+    Parameters
+    ----------
+    file : XML.
+    schema : folder of the schemas; ``None`` for our own checks alone.
+
+    Raises
+    ------
+    CmmUqError : it is missing, no DCC, or breaks the schema, with line and XPath.
+    """
+    content = content_of(file, DCC_BYTES, "Name a digital calibration certificate (.xml)")
+    certificate = read(content, str(file))
+    if schema is not None:
+        from cmm_uq.jobs.dcc.schema import checked_by_schema
+
+        checked_by_schema(content, schema, str(file))
+    return certificate

@@ -1,0 +1,204 @@
+"""From a job still to be measured to its plan: search and compose, then write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.analysis.planning.identifiability import Identifiability
+from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.app.commands.files import Form, Stage, Written, silent
+from cmm_uq.app.commands.plans.page import noise_data, placing_rows, to_measure_words, worth_data
+from cmm_uq.app.commands.plans.planning import Outlook, Plan
+from cmm_uq.app.commands.plans.words import STATUS, absorbed, combination, expected, named, pairs, unit_of
+from cmm_uq.app.commands.reading import in_language, read_job
+from cmm_uq.base.languages.language import Code
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.plugins import naming_package
+from cmm_uq.certificate.in_short import Figure, Summary, Verdict
+from cmm_uq.certificate.lettering import lettered_in
+from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.results_file import head
+from cmm_uq.jobs.job import Job
+
+TO_FILL_IN = "plan.csv"
+PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
+
+
+@naming_package()
+def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
+    """Plan a job that was read, whose recording may be missing; nothing is written.
+
+    Parameters
+    ----------
+    job : that was read.
+    power : whether to predict what the diagnosis would find, which takes most of the time.
+    seed : of the recordings drawn for that.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : the plan is impossible.
+    """
+    from cmm_uq.app.commands.plans.planning import make_plan
+
+    plan = make_plan(job, power=power, seed=seed, progress=stage)
+    from cmm_uq.app.commands.plans.page import plan_document
+
+    stage("Drawing the placings", 0.95)
+    with lettered_in(job.facts.job.language):
+        document = plan_document(plan)
+    return Outcome(
+        plan, lambda: document, plan_results(plan), plan_summary(plan), document.warnings,
+        {TO_FILL_IN: recording_to_be(plan)} if plan.to_measure else {},
+        in_order=all(condition.met for condition in plan.conditions),
+    )  # fmt: skip
+
+
+def write_plan(
+    job: Path,
+    out: Path | None = None,
+    *,
+    power: bool = True,
+    seed: int = 0,
+    force: bool = False,
+    stage: Stage | None = None,
+    language: Code | None = None,
+) -> Written:
+    """Plan a job and write ``plan.csv``, ``plan.html`` and ``results.json``, all or none.
+
+    ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
+    to measure.
+
+    Parameters
+    ----------
+    job : the job folder; its recording may be missing.
+    out : where to write; ``reports/<job id>/plan`` by default.
+    power : whether to predict what the diagnosis would find, which takes most of the time.
+    seed : of the recordings drawn for that.
+    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+    stage : told of progress.
+    language : of the page, instead of the job's.
+
+    Raises
+    ------
+    CmmUqError : the plan is impossible, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
+    """
+    read, tell = in_language(read_job(job, recorded=False), language), stage or silent
+    return PLAN.write(
+        read, lambda: plan_outcome(read, power=power, seed=seed, stage=tell), out, force=force, stage=tell
+    )
+
+
+def recording_to_be(plan: Plan) -> bytes:
+    """The placings that are still to be measured, as the CSV of a recording at nominal coordinates."""
+    from cmm_uq.app.commands.jobs.simulate import to_fill_in
+
+    wishes = plan.setting.plan
+    points = joined(
+        plan.to_measure, seconds_per_point=wishes.seconds_per_point, minutes_per_placing=wishes.minutes_per_placing,
+        first=plan.first,
+    )  # fmt: skip
+    return to_fill_in(points)
+
+
+SCHEMA = "cmm-uq/plan/1"
+
+
+def plan_results(plan: Plan) -> dict[str, Any]:
+    """results.json of a plan."""
+    better = None if plan.better is None or plan.scores is None else {
+        "criterion": plan.setting.plan.criterion, "score_before": plan.scores[0], "score_after": plan.scores[1],
+        "kept": plan.kept, "added": len(plan.better.placings) - plan.kept, **_outlook_data(plan.better),
+    }  # fmt: skip
+    return {
+        **head(plan.job, SCHEMA),
+        "noise": noise_data(plan),
+        "start": {"name": plan.name, "placings": len(plan.start.placings), **_outlook_data(plan.start)},
+        "better": better,
+        "repeats": worth_data(plan),
+        "free": list(plan.free),
+        "conditions": [
+            {"what": condition.what, "met": condition.met, "missing": list(condition.missing)}
+            for condition in plan.conditions
+        ],
+        "placings": [
+            {"measurement": number, "title": placing.title, "minutes": time,
+             "middle_mm": placing.middle.tolist(), "points": len(placing.points)}
+            for number, (placing, time) in enumerate(zip(plan.to_measure, plan.minutes, strict=True), plan.first)
+        ],
+        "minutes": sum(plan.minutes),
+    }  # fmt: skip
+
+
+def _outlook_data(outlook: Outlook) -> dict[str, Any]:
+    found = outlook.identifiability
+    if found is None:
+        return {}
+    return {
+        "determined": [
+            {
+                "effect": p.unknown.key[0],
+                "parameter": p.unknown.key[1],
+                "unit": p.unknown.unit,
+                "u": p.u,
+                "u_with_prior": p.u_with_prior,
+                "u_white": p.u_white,
+                "status": p.status,
+            }
+            for p in found.parameters
+        ],
+        "undetermined": [
+            {
+                "parameters": {f"{owner}.{name}": part for (owner, name), part in parts.items()},
+                "words": combination(parts),
+            }
+            for parts in found.free
+        ],
+        "singular_values": found.singular_values.tolist(),
+        "indistinguishable": [{"effects": [a, b], "cosine": cosine} for a, b, cosine in found.alike],
+        "absorbed": [{"effect": name, "as": list(others)} for name, others in found.absorbed],
+        "unseen": list(found.unseen),
+        "smallest": [
+            {
+                "effect": power.effect,
+                "parameter": power.parameter,
+                "unit": power.unit,
+                "detected": power.detectable,
+                "named": power.identifiable,
+            }
+            for power in outlook.powers
+        ],
+    }
+
+
+def plan_summary(plan: Plan) -> Summary:
+    """For the end of the command; its details are the placings, below their headings."""
+    found = plan.outlook.identifiability
+    met = tuple(
+        Verdict("MET", "good", one.what, ()) if one.met else Verdict("NOT MET", "open", one.what, ())
+        for one in plan.conditions
+    )
+    free = tuple(say("No reading shows: {what}.", what=text) for text in plan.free)
+    heads = (say("No."), say("Set up"), say("From → to / mm"), say("Points"), say("min"))
+    placings = tuple(placing_rows(plan))
+    return Summary(
+        to_measure_words(plan), verdicts=met, figures=() if found is None else _figures(found),
+        remarks=free if found is None else (*free, *_open(found)), details=(heads, *placings) if placings else (),
+    )  # fmt: skip
+
+
+def _figures(found: Identifiability) -> tuple[Figure, ...]:
+    return tuple(
+        (named(p), say("u = {u} {unit}", u=expected(p), unit=unit_of(p)), STATUS[p.status]) for p in found.parameters
+    )
+
+
+def _open(found: Identifiability) -> list[Text]:
+    """What the placings leave open."""
+    return [
+        *(say("Stays free: {what}.", what=combination(parts)) for parts in found.free),
+        *(say("Could not be told apart: {effects}.", effects=text) for text in pairs(found)),
+        *(say("Would be taken for what the job names: {effects}.", effects=text) for text in absorbed(found)),
+    ]
