@@ -12,7 +12,7 @@ from tests.conftest import ROOT
 from tests.test_layout import DOMAINS, MODULES, domain_of, imports
 
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
-WIDTH, BAND, LEFT, PER_LINE = 980, 64, 120, 0.036
+WIDTH, BAND, LEFT, PER_LINE = 980, 64, 120, 0.045
 STYLE = (
     "text{font:12px sans-serif;fill:#222}.domain{font-weight:bold;font-size:14px}.room{fill:#dbe7f3;stroke:#4a6f94}"
     ".arc{fill:none;stroke:#7a8896}.up{stroke:#c22}"
@@ -50,9 +50,8 @@ def drawn() -> str:
         for room, count in rooms:
             width = max(8.0, PER_LINE * count)
             name = room or "files"
-            parts.append(
-                f'<rect class="room" x="{left:.0f}" y="{top}" width="{width:.0f}" height="46"><title>{name}: {count} lines</title></rect>'
-            )
+            box = f'x="{left:.0f}" y="{top}" width="{width:.0f}" height="46"'
+            parts.append(f'<rect class="room" {box}><title>{name}: {count} lines</title></rect>')
             if width > 6.6 * len(name) + 6:
                 parts.append(f'<text x="{left + 5:.0f}" y="{top + 27}">{name}</text>')
             left += width + 4
