@@ -13,7 +13,6 @@ from benchmarks.drift import page
 from benchmarks.drift.study import HERE, RESULT, SEAL, hashes, seed_of
 from tests.conftest import ROOT
 
-
 SEALED_IMPORTS = """\
 from cmm_uq.recertification.crossing import DAYS, Crossings, crossings
 from cmm_uq.recertification.drift import History, side_by_side
