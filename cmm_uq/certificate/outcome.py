@@ -10,9 +10,9 @@ from typing import Any, Protocol
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.certificate.document import Document, Section
-from cmm_uq.certificate.in_short import Summary
-from cmm_uq.certificate.lettering import lettered_in
+from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import Origin
 from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts

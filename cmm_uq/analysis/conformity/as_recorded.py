@@ -1,5 +1,7 @@
 """Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
 
+Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
+
 A reading that misses the artefact by more than any machine's error spoils an estimate and is left out of it. For a decision it
 is a value outside: the machine, or whoever worked at it, indicated it. Copies of a whole (measurement, repeat) alone are no
 measurements.
@@ -28,7 +30,7 @@ _NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class OutsideReadings:
     """What of a recording the estimates do not hold.
 
     Parameters
@@ -50,7 +52,7 @@ class LeftOut:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, recording: Points, findings: Sequence[Finding], observe: Observed) -> LeftOut:
+    def of(cls, recording: Points, findings: Sequence[Finding], observe: Observed) -> OutsideReadings:
         """By what the screening found.
 
         Parameters
@@ -107,7 +109,7 @@ class AsRecorded(Artefact):
     left_out : what it is without.
     """
 
-    def __init__(self, own: Artefact, raw: Artefact, left_out: LeftOut) -> None:
+    def __init__(self, own: Artefact, raw: Artefact, left_out: OutsideReadings) -> None:
         self.own, self._raw, self._kept, self._xyz = own, raw, left_out.kept, left_out.xyz
         at = np.flatnonzero(self._kept)
         xyz = left_out.xyz.copy()

@@ -13,8 +13,7 @@ from functools import partial
 import numpy as np
 
 from cmm_uq.analysis.conformity.length_conditions import tip_offsets
-from cmm_uq.analysis.conformity.measurement_lines import position_of
-from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan
+from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan, position_of
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.analysis.conformity.uncertainty_lines import u_of_repeats

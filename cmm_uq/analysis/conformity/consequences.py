@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
-from cmm_uq.analysis.conformity.as_recorded import LeftOut
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
@@ -82,7 +82,7 @@ def consequences(
     observe: Observed,
     tested: Collection[str],
     seed: int,
-    left_out: LeftOut | None = None,
+    left_out: OutsideReadings | None = None,
 ) -> Consequences | None:
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
@@ -109,7 +109,8 @@ def consequences(
 
 
 def costs(
-    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int, left_out: LeftOut | None = None
+    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int,
+    left_out: OutsideReadings | None = None
 ) -> Costs | None:  # fmt: skip
     """Of the explanations that remain; ``None`` where none do, and for artefacts without lengths and statements.
 
@@ -199,7 +200,7 @@ class _Correction:
 
     def statements(
         self, job: Job, tested: Collection[str], artefact: Artefact, figures: Mapping[str, Quantity],
-        left_out: LeftOut | None,
+        left_out: OutsideReadings | None,
     ) -> tuple[Statement, ...]:  # fmt: skip
         """What the job asks for, of figures of this recording, or of it corrected."""
         recorded = None if artefact is self.model.artefact else self.model.artefact

@@ -8,8 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
-from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
+from cmm_uq.analysis.conformity.plans import (
+    OFFSET_TOLERANCE_MM,
+    PARALLELS,
+    SPACE_DIAGONALS,
+    Condition,
+    LengthPlan,
+    crossed_travel,
+    position_on,
+)
 from cmm_uq.base.messages import Text, Verbatim, at_key, commas, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact

@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.length_conditions import nominals, with_offset
-from cmm_uq.analysis.conformity.measurement_lines import position_on
-from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.remeasured import Again, with_standing
+from cmm_uq.analysis.conformity.plans import Condition, position_on
 from cmm_uq.analysis.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
 from cmm_uq.analysis.conformity.short_gauge import added_in_words
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
-from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.analysis.conformity.statement import Decided, Remeasurement, Statement, least_favourable, with_standing
 from cmm_uq.analysis.conformity.uncertainty_lines import LENGTH_LINES, WARM, away_from_20, u_of_repeats
 from cmm_uq.base.messages import NOTHING, Text, at_key, plural, say, semicolons
 from cmm_uq.base.points import Ints
@@ -61,7 +59,7 @@ def lines(artefact: Artefact, found: Indications) -> list[Text]:
     return [position_on(artefact.points.machine, m, d) for m, d in zip(middles, along, strict=True)]
 
 
-def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Again | None = None) -> Statement:
+def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Remeasurement | None = None) -> Statement:
     """Every error of indication against its own maximum permissible error.
 
     Parameters
@@ -239,7 +237,7 @@ def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:
     )
 
 
-def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]:
+def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> list[Text]:
     if again is None:
         return []
     told: list[Text] = []

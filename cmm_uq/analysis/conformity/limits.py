@@ -1,4 +1,6 @@
-"""Decisions on a value between limits of a drawing, with probabilities from draws of its error, by the rules for machines.
+"""Limits of a characteristic, and the decision on a value against them.
+
+Decisions on a value between limits of a drawing, with probabilities from draws of its error, by the rules for machines.
 
 The error need not be normal, and a limit may stand on either side or on one. The draws say what the measurement alone says of
 the true value (JCGM 106:2012, 7.2); with a prior each is weighted by it (JCGM 106:2012, 7.2.2, 8.3). Tails that the draws are
@@ -24,7 +26,7 @@ from cmm_uq.analysis.conformity.decision import (
     rule_name,
     rule_words,
 )
-from cmm_uq.analysis.conformity.risk import Known
+from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.conformity import Rule
@@ -45,7 +47,7 @@ _REACH = 8.0
 
 
 @dataclass(frozen=True)
-class Judged:
+class LimitDecision:
     """What follows from a value between limits.
 
     Parameters
@@ -205,7 +207,7 @@ class Limits:
         return np.searchsorted(self.errors, error, "right" if side == "right" else "left") / len(self.errors)
 
 
-def judge(limits: Limits, rule: Rule, value: float | None) -> Judged:
+def judge(limits: Limits, rule: Rule, value: float | None) -> LimitDecision:
     """Decide whether a value conforms.
 
     Parameters
@@ -216,12 +218,12 @@ def judge(limits: Limits, rule: Rule, value: float | None) -> Judged:
     """
     accepted = accepted_by(limits, rule)
     if value is None:
-        return Judged(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
+        return LimitDecision(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
     within, beyond = limits.knowing(value)
     if limits.zone:
         accepted = _accepted_near_zero(limits, rule, value, accepted)
     outcome = outcome_of(limits, rule, value, accepted)
-    return Judged(limits.lower, limits.upper, outcome, within, beyond, accepted, rule_words(rule))
+    return LimitDecision(limits.lower, limits.upper, outcome, within, beyond, accepted, rule_words(rule))
 
 
 def outcome_of(
@@ -292,7 +294,7 @@ def _wide(limits: Limits, rule: Rule) -> bool:
 
 
 def accepted_by(limits: Limits, rule: Rule) -> tuple[float | None, float | None] | None:
-    """Smallest and largest value that a rule accepts; see :class:`Judged`."""
+    """Smallest and largest value that a rule accepts; see :class:`LimitDecision`."""
     if least_ratio(rule) is not None:
         return (limits.lower, limits.upper) if _wide(limits, rule) else None
     if (risk := largest_risk(rule)) is not None:

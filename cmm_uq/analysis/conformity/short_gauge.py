@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.length_conditions import tip_offsets
-from cmm_uq.analysis.conformity.measurement_lines import ALIGNED
-from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition
+from cmm_uq.analysis.conformity.plans import ALIGNED, OFFSET_TOLERANCE_MM, Condition
 from cmm_uq.base.messages import NOTHING, Text, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.short_gauge import ShortGauge

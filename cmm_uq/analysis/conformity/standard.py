@@ -14,13 +14,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.as_recorded import LeftOut, numbered
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, numbered
 from cmm_uq.analysis.conformity.clauses import Clause, in_words
-from cmm_uq.analysis.conformity.copies import copies_in_words
-from cmm_uq.analysis.conformity.decision import Decision, decide, needs_uncertainty, rule_words
+from cmm_uq.analysis.conformity.decision import (
+    Decision,
+    PriorKnowledge,
+    Risks,
+    decide,
+    global_risks,
+    needs_uncertainty,
+    rule_words,
+)
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.rated import rated_conditions, rated_in_words
-from cmm_uq.analysis.conformity.risk import Known, Risks, global_risks
+from cmm_uq.analysis.conformity.rated import copies_in_words, rated_conditions, rated_in_words
 from cmm_uq.analysis.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.analysis.conformity.statement import Decided, Statement, counted, least_favourable
 from cmm_uq.analysis.conformity.uncertainty_lines import (
@@ -185,7 +191,7 @@ class Test:
     accuracy: Mapping[str, Quantity]
     key: str
     circumstances: Circumstances = field(default_factory=Circumstances)
-    left_out: LeftOut | None = None
+    left_out: OutsideReadings | None = None
 
     def set_aside(self, rows: Ints) -> NDArray[np.bool_]:
         """Which values (m,), each of several points (m, j), rest on a reading that the screening left out."""
@@ -276,12 +282,12 @@ class Test:
                     unit=budget.unit)  # fmt: skip
         return replace(budget, lines=[*budget.lines, more])
 
-    def prior(self, limit_um: float) -> Known | None:
+    def prior(self, limit_um: float) -> PriorKnowledge | None:
         """What the job says of an error with this limit beforehand."""
         given = self.facts.prior
         if given is None:
             return None
-        return Known(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
+        return PriorKnowledge(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
 
     def refuse_without_uncertainty(self, u: float, name: str) -> None:
         """Refuse a rule that needs an uncertainty where there is none.

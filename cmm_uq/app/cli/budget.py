@@ -13,7 +13,7 @@ from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_json
 from cmm_uq.base.languages.language import ENGLISH
 
 if TYPE_CHECKING:
-    from cmm_uq.certificate.in_short import Summary
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.evaluation import Evaluation
 
 EXAMPLES = examples("budget model.toml", "budget model.toml --seed 2 --out DIR", "budget model.toml --json --strict")
@@ -54,7 +54,8 @@ def command(
 def _summary(evaluation: Evaluation) -> Summary:
     """Each output as a certificate could state it; in full as the row of a table too."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
 
     names = tuple(evaluation.stated)

@@ -13,8 +13,8 @@ from cmm_uq.app.cli.terminal import BAD_INPUT, put, put_data, show
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.jobs.check import Checked
-    from cmm_uq.certificate.in_short import Summary
+    from cmm_uq.app.commands.check import Checked
+    from cmm_uq.certificate.wording import Summary
 
 EXAMPLES = examples("check JOB", "check jobs/a jobs/b", "check JOB --clauses", "check JOB --json")
 SCHEMA = "cmm-uq/check/1"
@@ -62,7 +62,8 @@ def _show_clauses(found: Checked) -> None:
 def _summary(found: Checked) -> Summary:
     """Whether anything would stop report, and all that is wrong."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
 
     count = len(found.problems)
     stops = plural(count, one=say("1 problem"), many=say("{count} problems", count=count))

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cmm_uq.base.messages import Text
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.selftest import Outcome
 
 EXAMPLES = examples("selftest", "selftest --verbose > selftest.txt", "selftest --json")
@@ -46,7 +47,7 @@ def _summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool) -> Summ
     """The count, what fails or all figures, and how many there are of each source."""
     from cmm_uq import __version__
     from cmm_uq.base.messages import NOTHING, Verbatim, say
-    from cmm_uq.certificate.in_short import Summary
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.selftest import as_text
 
     passed = sum(outcome.passed for outcome in outcomes)
@@ -69,6 +70,6 @@ def _summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool) -> Summ
 
 
 def _verdict(what: Text, passed: bool, remarks: tuple[Text, ...] = ()) -> Verdict:
-    from cmm_uq.certificate.in_short import Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
 
     return Verdict("PASS", "good", what, remarks) if passed else Verdict("FAIL", "bad", what, remarks)

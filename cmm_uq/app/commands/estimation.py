@@ -9,7 +9,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
-from cmm_uq.analysis.conformity.measurement_lines import ALIGNED
+from cmm_uq.analysis.conformity.plans import ALIGNED
 from cmm_uq.analysis.screening.copies import counted_with
 from cmm_uq.analysis.screening.finding import finding
 from cmm_uq.analysis.screening.moved import moved_stretches, recurring_points, words_of_point, words_of_stretch
@@ -17,7 +17,7 @@ from cmm_uq.analysis.screening.screened import Finding, gross_outliers
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction, Noise
+from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction, NoiseEstimate
 from cmm_uq.machine.model import Estimate, MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.display import of_last_digit
@@ -163,7 +163,7 @@ def noise(
     posterior: NoisyPosterior,
     stated_um: float | None,
     p_value: float | None,
-) -> Noise:
+) -> NoiseEstimate:
     """What the noise is, by component, and what it does to the uncertainties."""
     found = {
         name: Component(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
@@ -172,7 +172,7 @@ def noise(
     coordinate = found.pop("coordinate").size
     apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
     step = components.display / MICROMETRE
-    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
+    return NoiseEstimate(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
 
 
 def _wider(estimate: Estimate, posterior: Posterior) -> float:

@@ -10,8 +10,8 @@ from cmm_uq.app.serve import drawing
 from cmm_uq.app.serve.page import Chart, Page
 from cmm_uq.base.errors import printable
 from cmm_uq.base.messages import Text, say
-from cmm_uq.certificate import plot_style
-from cmm_uq.certificate.templates import template_folder
+from cmm_uq.certificate.plots import style as plot_style
+from cmm_uq.certificate.render.html import template_folder
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -15,9 +15,10 @@ from scipy import special
 
 from cmm_uq.base.languages.language import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.certificate.as_json import as_json
 from cmm_uq.certificate.clauses import certifies
 from cmm_uq.certificate.digital_certificate.administration import (
+    NOT_STATED,
+    SayIn,
     core_data,
     customer,
     formal_statements,
@@ -26,15 +27,23 @@ from cmm_uq.certificate.digital_certificate.administration import (
     mark_of,
     persons,
     ref_types,
+    speaking,
+    words_of,
 )
 from cmm_uq.certificate.digital_certificate.conformity import evidence, of_tolerances, statements
 from cmm_uq.certificate.digital_certificate.figures import Figures
 from cmm_uq.certificate.digital_certificate.measurement import conditions, equipment, metadata, methods, software
-from cmm_uq.certificate.digital_certificate.shapes import decimal, is_quantity, plain_name
-from cmm_uq.certificate.digital_certificate.uncertainty import P95
-from cmm_uq.certificate.digital_certificate.units import dsi_of, product, without_unit
-from cmm_uq.certificate.digital_certificate.words import NOT_STATED, SayIn, speaking, words_of
+from cmm_uq.certificate.digital_certificate.quantities import (
+    P95,
+    decimal,
+    dsi_of,
+    is_quantity,
+    plain_name,
+    product,
+    without_unit,
+)
 from cmm_uq.certificate.origin import file_name
+from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.jobs.dcc.certificate import Administrative, Certificate
 from cmm_uq.jobs.dcc.quantities import Column, Covariance, Ellipsoid, ExpandedList, RealList
 from cmm_uq.jobs.dcc.results import Data, Measurement, Quantity, Result

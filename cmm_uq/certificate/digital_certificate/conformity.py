@@ -14,10 +14,9 @@ from typing import Any
 
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import UNITS
+from cmm_uq.certificate.digital_certificate.administration import SayIn, english, one_line, rich_of, words_of
 from cmm_uq.certificate.digital_certificate.figures import Figures, Part
-from cmm_uq.certificate.digital_certificate.shapes import decimal
-from cmm_uq.certificate.digital_certificate.units import ONE, dsi_of, ratio
-from cmm_uq.certificate.digital_certificate.words import SayIn, english, one_line, rich_of, words_of
+from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, dsi_of, ratio
 from cmm_uq.certificate.wording import stated_row, stated_value
 from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Real, RealList
 from cmm_uq.jobs.dcc.results import Data, Quantity, QuantityList, Result, Statement

@@ -14,28 +14,32 @@ from typing import Any
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import Unit
-from cmm_uq.certificate.digital_certificate.shapes import (
+from cmm_uq.certificate.digital_certificate.administration import SayIn, english, rich_of, words_of
+from cmm_uq.certificate.digital_certificate.quantities import (
+    ONE,
+    P95,
     are_numbers,
     decimal,
     decimals,
+    dsi_of,
+    expanded_of,
+    interval_of,
+    intervals_of,
     is_budget,
     is_curve,
     is_matrix,
     is_number,
     is_quantity,
+    named_unit,
     plain_cell,
     plain_name,
-)
-from cmm_uq.certificate.digital_certificate.uncertainty import (
-    P95,
-    expanded_of,
-    interval_of,
-    intervals_of,
+    product,
+    ratio,
     spread_of,
     symmetric,
+    unit_of,
+    without_unit,
 )
-from cmm_uq.certificate.digital_certificate.units import ONE, dsi_of, named_unit, product, ratio, unit_of, without_unit
-from cmm_uq.certificate.digital_certificate.words import SayIn, english, rich_of, words_of
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.jobs.dcc.administrative import Characters
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList

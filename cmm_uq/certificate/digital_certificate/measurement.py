@@ -8,10 +8,17 @@ from typing import Any
 
 from cmm_uq.base.messages import Text, Verbatim, day, say
 from cmm_uq.base.units import MICROMETRE, UNITS, Unit
-from cmm_uq.certificate.conditions import TEMPERATURES
-from cmm_uq.certificate.digital_certificate.uncertainty import P_STANDARD
-from cmm_uq.certificate.digital_certificate.words import NOT_STATED, SayIn, english, one_line, rich_of, words_of
-from cmm_uq.certificate.stated import SIGN, UNCERTAINTY
+from cmm_uq.certificate.certificate import TEMPERATURES
+from cmm_uq.certificate.digital_certificate.administration import (
+    NOT_STATED,
+    SayIn,
+    english,
+    one_line,
+    rich_of,
+    words_of,
+)
+from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
+from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.artefact import CertificateFile
 from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.dcc.administrative import Hash, Identification, PrimitiveQuantity, Software, Somebody

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.conformity.plan_conditions import sphere_points
 from cmm_uq.analysis.conformity.plans import SpherePlan
-from cmm_uq.analysis.conformity.sphere_conditions import sphere_points
 from cmm_uq.base.points import Points
 
 

@@ -15,11 +15,10 @@ from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
 from cmm_uq.certificate.document import Document, Overview, Table
-from cmm_uq.certificate.fleet.data import fleet_csv, fleet_data
-from cmm_uq.certificate.fleet.page import fleet_document
-from cmm_uq.certificate.fleet.summary import fleet_summary
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.pages.fleet import fleet_document
+from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data, fleet_summary
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.laboratory.due.fleet_found import FleetFound
 from tests.certificate.fleets import alone, many, two
 from tests.certificate.saying import strangers
