@@ -87,14 +87,7 @@ def certificate_of(
 ) -> Document:
     """Sections and warnings between what every certificate has.
 
-    Parameters
-    ----------
-    job : that was analysed.
-    sections : of which the first page shows those that are marked.
-    told : warnings on the results; those on what the job does not state follow them.
-    produced_by : program, sampler and seed.
-    files : attached beside job and recording.
-    overview : what every statement of conformity comes to.
+    ``told``: warnings on the results; those on what the job does not state follow them.
     """
     facts = job.facts
     return in_words(Document(
@@ -176,7 +169,7 @@ CERTIFICATE_NUMBER = say("Certificate number")
 
 def identified(
     job: Identification, laboratory: Laboratory, origin: str, numbered: Text = CERTIFICATE_NUMBER
-) -> tuple[Row, ...]:  # fmt: skip
+) -> tuple[Row, ...]:
     """Number, by what it is called, customer, order and dates of any certificate or report."""
     measured = origin == MEASURED
     return (
@@ -204,19 +197,16 @@ def performed(job: Identification) -> tuple[Row, ...]:
 
 
 def issuer_of(laboratory: Laboratory) -> tuple[Text, ...]:
-    """Name and address, a line each."""
     return tuple(Verbatim(line) for line in (laboratory.name, *laboratory.address.splitlines()) if line)
 
 
 def signatures_of(laboratory: Laboratory) -> tuple[Signature, ...]:
-    """Who authorises, where it is stated."""
     if not laboratory.signatory:
         return ()
     return (Signature(Verbatim(laboratory.signatory), Verbatim(laboratory.signatory_role)),)
 
 
 def statements_of(job: Identification) -> tuple[Text, ...]:
-    """What stands before the signatures."""
     return (*STATEMENTS, NOT_OURS) if job.from_customer else STATEMENTS
 
 
@@ -271,13 +261,7 @@ def with_capability(result: Result) -> tuple[Result, Stating]:
 
 
 def certified(result: Result, page: Page) -> Outcome:
-    """What there is to write of a result: the certificate, complete but for its looks, and its figures.
-
-    Parameters
-    ----------
-    result : of the analysis.
-    page : what its kind adds.
-    """
+    """What there is to write of a result: the certificate, complete but for its looks, and its figures."""
     result, stating = with_capability(result)
     told = (*warnings(result), *stating.warnings())
     warned = (*told, *formal_warnings(result.job))

@@ -54,13 +54,10 @@ DRAFT = say("DRAFT, not complete by ISO/IEC 17025:2017, 7.8")
 class Requirement:
     """One thing that a clause asks for.
 
-    Parameters
-    ----------
-    clause : its number, with the letter where it has one.
-    asks : what for; a text that can be said in other languages where a certificate may have to name it.
-    status : whether the certificate has it.
-    stated : what satisfies it; empty where nothing does.
-    key : of job.toml, that states it or would; empty where the form of the certificate does.
+    ``clause``: its number, with the letter where it has one; ``asks``: what for; a text that can be said in other
+    languages where a certificate may have to name it; ``status``: whether the certificate has it; ``stated``: what
+    satisfies it; empty where nothing does; ``key``: of job.toml, that states it or would; empty where the form of the
+    certificate does.
     """
 
     clause: str
@@ -120,12 +117,10 @@ def replaced_certificate(replaced: Replaced) -> Text:
 
 
 def asked(clause: str, asks: str, stated: object, key: str = "") -> Requirement:
-    """Of every certificate."""
     return Requirement(clause, asks, "stated" if stated else "missing", _plain(stated), key)
 
 
 def _where(clause: str, asks: str, stated: object, key: str = "") -> Requirement:
-    """Where there is any."""
     return Requirement(clause, asks, "stated" if stated else "not applicable", _plain(stated), key)
 
 
@@ -162,10 +157,7 @@ def of_every_report(
 ) -> tuple[Requirement, ...]:
     """7.8.2.1 of any report.
 
-    Parameters
-    ----------
-    title : of the document.
-    item : what names the item (7.8.2.1 g).
+    ``item``: what names the item (7.8.2.1 g).
     """
     return (
         asked("7.8.2.1 a", "title", title),

@@ -59,7 +59,6 @@ def block_label(kind: str, number: int) -> Text:
 
 
 def attachment_title(name: str, *, outcome: bool) -> Text:
-    """What an attached file is."""
     if outcome:
         return say("Results in machine-readable form: {name}", name=Verbatim(name))
     return say("Input of this document: {name}", name=Verbatim(name))
@@ -283,7 +282,6 @@ def _parts(line: str, separator: str | None) -> list[str]:
 
 
 def _width(line: str) -> float:
-    """Of a line, roughly, in widths of a small letter."""
     return _wide(line) + sum(
         1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
     )

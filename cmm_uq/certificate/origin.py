@@ -46,14 +46,6 @@ def marked(document: Document, job: Job) -> Document:
 
 
 def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text]) -> Document:  # noqa: A002
-    """The same of any document.
-
-    Parameters
-    ----------
-    origin : of what was measured.
-    id : of the job.
-    told : warnings of where it comes from.
-    """
     warnings = (*told, *document.warnings)
     if origin == MEASURED:
         return replace(document, warnings=warnings)
@@ -85,7 +77,6 @@ def _of_such(title: Text, origin: str) -> Text:
 
 
 def came_about(job: Job) -> Text:
-    """The word before the date of a recording."""
     return say("simulated, dated") if job.origin == SIMULATED else say("measured on")
 
 

@@ -42,18 +42,12 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 class SimulatedTwin:
     """The simulation that a recording was compared with.
 
-    Parameters
-    ----------
-    files : with their SHA-256.
-    program : that made it, in the user's words.
-    maps : whether it is error maps.
-    u_um, u_common_um : of a predicted coordinate, root mean square, and of the artefact's size, as stated.
-    u_turned_um : what there is besides because the artefact was taken to lie in another direction, root mean square.
-    contains : effects that it contains.
-    refitted : those that were estimated anew.
-    shift_mm, turn_deg : of its frame against the recording's.
-    farthest_mm : from a recorded point to the predicted one.
-    rms_predicted_um : of the errors that it predicts, as the observations show them.
+    ``files``: with their SHA-256; ``program``: that made it, in the user's words; ``maps``: whether it is error maps;
+    ``u_um, u_common_um``: of a predicted coordinate, root mean square, and of the artefact's size, as stated;
+    ``u_turned_um``: what there is besides because the artefact was taken to lie in another direction, root mean square;
+    ``contains``: effects that it contains; ``refitted``: those that were estimated anew; ``shift_mm, turn_deg``: of its
+    frame against the recording's; ``farthest_mm``: from a recorded point to the predicted one; ``rms_predicted_um``: of
+    the errors that it predicts, as the observations show them.
     """
 
     files: Mapping[str, str]
@@ -75,13 +69,7 @@ class SimulatedTwin:
     ) -> SimulatedTwin:
         """As a job names it.
 
-        Parameters
-        ----------
-        facts : ``[simulation]``.
-        job : with its files.
-        found : of the prediction.
-        named : effects that it contains.
-        model : of the recording.
+        ``facts``: ``[simulation]``.
         """
         files = [given.file for given in facts.map] if facts.file is None else [facts.file]
         hashes = sha256(job.inputs)
@@ -95,12 +83,6 @@ class SimulatedTwin:
         )  # fmt: skip
 
     def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-        """For results.json.
-
-        Parameters
-        ----------
-        corrections : of the effects that were estimated anew, as data.
-        """
         return {
             "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
             "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
@@ -121,7 +103,6 @@ AtLeast = Callable[..., tuple[float, float]]
 def as_evaluated(
     name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
 ) -> tuple[float, float]:
-    """Nothing raised."""
     return expanded, factor
 
 
@@ -133,11 +114,8 @@ CAPABILITY_FACTOR = 2.0
 class StatedUncertainty:
     """States quantities of one certificate, and keeps what was raised.
 
-    Parameters
-    ----------
-    capability : of the laboratory, if it gives one.
-    length_mm : that the capability of lengths is taken at.
-    raised : by name, U as evaluated and as stated.
+    ``capability``: of the laboratory, if it gives one; ``length_mm``: that the capability of lengths is taken at;
+    ``raised``: by name, U as evaluated and as stated.
     """
 
     capability: Capability | None
@@ -163,11 +141,7 @@ class StatedUncertainty:
     ) -> tuple[float, float]:
         """U and k of a figure that is no :class:`Quantity`, U not below the capability, k = 2 where it is that.
 
-        Parameters
-        ----------
-        name : as in results.json.
-        expanded, factor : as evaluated; U in ``unit_``.
-        length_mm : that the capability is taken at; without it that of the certificate.
+        ``expanded, factor``: as evaluated; U in ``unit_``.
         """
         least = (
             self.capability.least(unit_, self.length_mm if length_mm is None else length_mm) if self.capability else 0.0
@@ -182,7 +156,6 @@ class StatedUncertainty:
         return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
 
     def warnings(self) -> list[Text]:
-        """That U was raised, and of what."""
         if not self.raised:
             return []
         return [
@@ -195,7 +168,6 @@ class StatedUncertainty:
         ]
 
     def data(self) -> dict[str, Any]:
-        """For results.json, where anything was raised."""
         return {"cmc": {"length_mm": self.length_mm, "raised": self.raised}} if self.raised else {}
 
 
@@ -215,16 +187,12 @@ class Component:
 class NoiseEstimate:
     """The noise of a recording, and what it does to the uncertainties.
 
-    Parameters
-    ----------
-    coordinate : standard deviation of one reading of one coordinate, root mean square of the axes, µm.
-    components : its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,
-        ``growth``, ``slow``.
-    axes_apart : probability that the axes differ.
-    wider : largest ratio of a parameter's standard uncertainty to what white noise would leave it.
-    stated_um : what the job states, if anything.
-    p_value : of the residuals' sum of squares under the stated noise (χ² test), if it is stated.
-    display_um : step in which coordinates are displayed, 0 where it is too fine to matter.
+    ``coordinate``: standard deviation of one reading of one coordinate, root mean square of the axes, µm;
+    ``components``: its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,;
+    ``growth``, ``slow``.; ``axes_apart``: probability that the axes differ; ``wider``: largest ratio of a parameter's
+    standard uncertainty to what white noise would leave it; ``stated_um``: what the job states, if anything;
+    ``p_value``: of the residuals' sum of squares under the stated noise (χ² test), if it is stated; ``display_um``:
+    step in which coordinates are displayed, 0 where it is too fine to matter.
     """
 
     coordinate: Quantity
@@ -255,16 +223,12 @@ class NoiseEstimate:
 class Diagnosed:
     """A job with its diagnosis.
 
-    Parameters
-    ----------
-    job, findings : what was read, and what the screening found.
-    diagnosis : what is missing.
-    suggestions : what to measure next.
-    consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
-    simulated : the simulation that the recording was compared with, if it was with one.
-    unseen : the smallest amplitude of each effect that the recording would have shown.
-    next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
-    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
+    ``job, findings``: what was read, and what the screening found; ``diagnosis``: what is missing; ``suggestions``:
+    what to measure next; ``consequences``: what correcting for what was found would change; ``None`` where nothing is
+    found or nothing depends on it; ``simulated``: the simulation that the recording was compared with, if it was with
+    one; ``unseen``: the smallest amplitude of each effect that the recording would have shown; ``next_plan``: the
+    fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any;
+    ``costs``: what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
     """
 
     job: Job
@@ -291,11 +255,8 @@ class ParameterDifference:
 class Contradiction:
     """A line along a machine axis that says something else of the axis than an average over explanations does.
 
-    Parameters
-    ----------
-    key : of the parameter, effect and name.
-    measurement : number of the line.
-    alone : the parameter by this line alone, all others as they are on average.
+    ``key``: of the parameter, effect and name; ``measurement``: number of the line; ``alone``: the parameter by this
+    line alone, all others as they are on average.
     """
 
     key: tuple[str, str]
@@ -377,12 +338,10 @@ class Result:
 
     @property
     def artefact(self) -> Artefact:
-        """The artefact with its recording."""
         return self.model.artefact
 
     @property
     def least_squares(self) -> LeastSquares:
-        """The least-squares estimate."""
         return self.estimate.least_squares
 
     @cached_property

@@ -131,12 +131,7 @@ def numbered(measurement: int, repeat: int | None) -> Text:
 def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, spec: str = ".1f") -> Text:
     """The sentence in place of a picture of deviations: their range as recorded, and after the fitted model.
 
-    Parameters
-    ----------
-    what : deviates, with a verb: ``12 lengths: as recorded they deviate``.
-    reference : from what; or nothing.
-    before_um, after_um : deviations, µm.
-    spec : of the figures.
+    ``what``: deviates, with a verb: ``12 lengths: as recorded they deviate``; ``before_um, after_um``: deviations, µm.
     """
     low, high, low_after, high_after = (
         number(float(end), spec) for end in (before_um.min(), before_um.max(), after_um.min(), after_um.max())
@@ -160,12 +155,8 @@ Figure = tuple[Text, Text, Text]
 class Headline:
     """A decision, or what a diagnosis comes to.
 
-    Parameters
-    ----------
-    word : the outcome in capitals.
-    standing : what that means for the machine.
-    subject : what was decided.
-    remarks : the figures it rests on, and what is missing.
+    ``word``: the outcome in capitals; ``standing``: what that means for the machine; ``subject``: what was decided;
+    ``remarks``: the figures it rests on, and what is missing.
     """
 
     word: str
@@ -178,14 +169,9 @@ class Headline:
 class Summary:
     """An outcome for the end of a command.
 
-    Parameters
-    ----------
-    subject, date : what was measured, and when.
-    verdicts : what it comes to.
-    figures : quantities with their uncertainty.
-    remarks : further sentences.
-    details : rows of a table that only who asks for everything wants to see.
-    warnings : what the reader must know before using a figure.
+    ``subject, date``: what was measured, and when; ``verdicts``: what it comes to; ``figures``: quantities with their
+    uncertainty; ``remarks``: further sentences; ``details``: rows of a table that only who asks for everything wants to
+    see; ``warnings``: what the reader must know before using a figure.
     """
 
     subject: Text = NOTHING

@@ -34,9 +34,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 REPORTED = sorted(
-    path.name for path in MACHINE_JOBS
-    if not path.name.startswith("plan-") and path.name != "iota-1102-maps"
-)  # fmt: skip
+    path.name for path in MACHINE_JOBS if not path.name.startswith("plan-") and path.name != "iota-1102-maps"
+)
 
 
 def report(name: str) -> Document:

@@ -34,10 +34,7 @@ _FEW = 400
 class Consequences:
     """Figures and statements of a recording, as it stands and corrected for what was left out.
 
-    Parameters
-    ----------
-    figures : by name, before and after.
-    statements : as the job asks for, before and after.
+    ``figures``: by name, before and after; ``statements``: as the job asks for, before and after.
     """
 
     figures: Mapping[str, tuple[Quantity, Quantity]]
@@ -48,11 +45,7 @@ class Consequences:
 class Cost:
     """What the recording comes to if one explanation that remains is the right one, and is corrected for.
 
-    Parameters
-    ----------
-    probability : of the explanation.
-    figures : by name.
-    statements : as the job asks for.
+    ``probability``: of the explanation; ``figures``: by name; ``statements``: as the job asks for.
     """
 
     probability: float
@@ -64,11 +57,8 @@ class Cost:
 class Costs:
     """Of every explanation that remains, the most probable first, and of all together.
 
-    Parameters
-    ----------
-    each : in the order of the explanations.
-    figures : averaged, by name.
-    decisions : of each statement, the probability of every outcome.
+    ``each``: in the order of the explanations; ``figures``: averaged, by name; ``decisions``: of each statement, the
+    probability of every outcome.
     """
 
     each: tuple[Cost, ...]
@@ -87,13 +77,6 @@ def consequences(
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
     The uncertainty of a corrected figure is that of repeated recordings with this correction.
-
-    Parameters
-    ----------
-    observe : makes the artefact of points.
-    tested : what of its kind a standard may be decided on.
-    seed : of the figures' repetitions.
-    left_out : what the screening left out.
     """
     found = {item.effect for item in diagnosis.effects}
     if not found or not _depends(job, diagnosis):
@@ -137,7 +120,6 @@ def costs(
 
 
 def _noise(diagnosis: Diagnosis) -> Components:
-    """That of all observations, used or not."""
     return noise_of(replace(diagnosis.after, used=np.ones_like(diagnosis.after.used)))
 
 
@@ -158,13 +140,8 @@ class _Drawn:
 class _Correction:
     """A recording, whole, and the same corrected for some effects of a model that was fitted to it.
 
-    Parameters
-    ----------
-    model : with all observations.
-    ours : (k,) which of its unknowns are corrected for.
-    value : (k,) by which values.
-    drawn : from its posterior.
-    corrected : the artefact.
+    ``model``: with all observations; ``ours``: (k,) which of its unknowns are corrected for; ``value``: (k,) by which
+    values; ``drawn``: from its posterior; ``corrected``: the artefact.
     """
 
     model: MeasurementModel
@@ -176,7 +153,7 @@ class _Correction:
     @classmethod
     def of(
         cls, fitted: MeasurementModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
-    ) -> _Correction:  # fmt: skip
+    ) -> _Correction:
         """For the effects of these names, by what a model estimates of them (k,)."""
         model = replace(fitted, used=np.ones_like(fitted.used))
         artefact = model.artefact

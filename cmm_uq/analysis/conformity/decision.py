@@ -45,9 +45,7 @@ _REACH = 9.0
 class PriorKnowledge:
     """A quantity before it is measured.
 
-    Parameters
-    ----------
-    mean, sd : of the normal distribution.
+    ``mean, sd``: of the normal distribution.
     """
 
     mean: float
@@ -59,7 +57,6 @@ class PriorKnowledge:
         return PriorKnowledge(self.mean + weight * (value - self.mean), u * float(np.sqrt(weight)))
 
     def within(self, limit: float, *, signed: bool) -> float:
-        """Probability of conforming."""
         high = float(special.ndtr((limit - self.mean) / self.sd))
         if signed:
             return max(0.0, high - float(special.ndtr((-limit - self.mean) / self.sd)))
@@ -79,10 +76,8 @@ class PriorKnowledge:
 class Risks:
     """Of all items that are tested alike.
 
-    Parameters
-    ----------
-    consumer : that an item does not conform and is accepted.
-    producer : that an item conforms and is not accepted.
+    ``consumer``: that an item does not conform and is accepted; ``producer``: that an item conforms and is not
+    accepted.
     """
 
     consumer: float
@@ -93,11 +88,7 @@ class Risks:
 def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledge, *, signed: bool) -> Risks:
     """Global risks of accepting values up to an acceptance limit (JCGM 106:2012, 9.5.3 and 9.5.4).
 
-    Parameters
-    ----------
-    acceptance : largest accepted size of a measured value; negative where none is accepted.
-    limit : of the quantity itself.
-    u : standard uncertainty of a measurement.
+    ``acceptance``: largest accepted size of a measured value; negative where none is accepted.
     """
     low = max(prior.mean - _REACH * prior.sd, -np.inf if signed else 0.0)
     high = max(prior.mean, 0.0) + _REACH * prior.sd
@@ -140,7 +131,6 @@ def _accepted(values: Floats, acceptance: float, u: float, *, signed: bool) -> F
 
 
 def _panels(edges: Floats) -> tuple[Floats, Floats]:
-    """Nodes and weights of a sum over panels between edges."""
     half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
     return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
 
@@ -164,14 +154,10 @@ UNCONDITIONAL = 0.02
 class Decision:
     """What follows from a value and a limit under a rule.
 
-    Parameters
-    ----------
-    outcome : ``undecided`` when neither conformity nor nonconformity is proved.
-    probability_conforming : that the quantity is within its limits; ``None`` without an uncertainty.
-    probability_beyond : the rest of it, kept apart since 1 − P loses what is small.
-    guard_band : how far the acceptance limit lies inside the limit, same unit; ``None`` when the uncertainty is too large for
-        any value to be accepted.
-    rule : in words.
+    ``outcome``: ``undecided`` when neither conformity nor nonconformity is proved; ``probability_conforming``: that the
+    quantity is within its limits; ``None`` without an uncertainty; ``probability_beyond``: the rest of it, kept apart
+    since 1 − P loses what is small; ``guard_band``: how far the acceptance limit lies inside the limit, same unit;
+    ``None`` when the uncertainty is too large for; any value to be accepted.; ``rule``: in words.
     """
 
     outcome: Outcome
@@ -230,7 +216,6 @@ def decide(
 def _decided(
     size: float, u: float, limit: float, rule: Rule, signed: bool, beyond: float, unstated: float
 ) -> tuple[Outcome, float | None]:
-    """Outcome and guard band, by rules that need no prior."""
     if (ratio := least_ratio(rule)) is not None:
         wide = (2 if signed else 1) * limit >= ratio * 2 * COVERAGE_FACTOR * u
         return (_by_band(size, limit, 0.0), 0.0) if wide else ("undecided", None)
@@ -280,28 +265,24 @@ def largest_risk(rule: Rule) -> float | None:
 
 
 def least_ratio(rule: Rule) -> float | None:
-    """N of an N : 1 rule."""
     if isinstance(rule, UncertaintyRatio):
         return rule.uncertainty_ratio
     return RATIO if rule_name(rule).startswith("ASME B89.7.3.1") else None
 
 
 def least_probability(rule: Rule) -> float | None:
-    """Least posterior probability of conforming."""
     if isinstance(rule, PosteriorProbability):
         return rule.posterior_probability
     return CONFORMANCE_PROBABILITY if rule_name(rule).startswith("JCGM 106") else None
 
 
 def largest_share(rule: Rule) -> float | None:
-    """Largest share of wrongly accepted items."""
     if isinstance(rule, UnconditionalRisk):
         return rule.max_unconditional_false_accept
     return UNCONDITIONAL if "Z540.3" in rule_name(rule) else None
 
 
 def guard_width(rule: Rule) -> float:
-    """Guard band in expanded uncertainties."""
     if isinstance(rule, GuardBand):
         return rule.guard_band
     return 1.0 if rule_name(rule).startswith("ILAC-G8") else 0.0
@@ -313,7 +294,6 @@ def needs_uncertainty(rule: Rule) -> bool:
 
 
 def rule_name(rule: Rule) -> str:
-    """The rule as job.toml names it."""
     if isinstance(rule, str):
         return rule
     ((key, value),) = rule.model_dump().items()
@@ -366,7 +346,6 @@ def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | No
 def _posterior_band(
     u: float, limit: float, risk: float, signed: bool, prior: PriorKnowledge, side: float
 ) -> float | None:
-    """The same with a prior, on the side of the value."""
 
     def excess(size: float) -> float:
         return prior.after(side * size, u).beyond(limit, signed=signed) - risk

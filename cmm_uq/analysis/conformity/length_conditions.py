@@ -79,7 +79,6 @@ def tip_offsets(points: Points) -> Floats | None:
 
 
 def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
-    """That a tip offset is recorded where the plan asks for one."""
     if not plan.offset_mm:
         return ()
     what = say(
@@ -128,7 +127,6 @@ class _Measured:
 
 
 def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
-    """By position and nominal length."""
     found = artefact.indications()
     if found is None:
         return

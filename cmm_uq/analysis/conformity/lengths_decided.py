@@ -39,7 +39,6 @@ def at_offset(offset_mm: float) -> Chosen:
 
 
 def on_lines(positions: Collection[Text]) -> Chosen:
-    """Lengths in some positions."""
     return lambda artefact, found: np.array([line in positions for line in lines(artefact, found)], dtype=bool)
 
 
@@ -54,20 +53,12 @@ def short(longest_mm: float) -> Chosen:
 
 
 def lines(artefact: Artefact, found: Indications) -> list[Text]:
-    """Position of each length in words."""
     middles, along = artefact.lines_of(found.rows)
     return [position_on(artefact.points.machine, m, d) for m, d in zip(middles, along, strict=True)]
 
 
 def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Remeasurement | None = None) -> Statement:
-    """Every error of indication against its own maximum permissible error.
-
-    Parameters
-    ----------
-    test : that is decided.
-    chosen : which lengths belong to it; all by default.
-    again : what may be measured again.
-    """
+    """Every error of indication against its own maximum permissible error."""
     found = test.indications()
     rows = _of_this_test(test, found, chosen)
     artefact, first = test.artefact, found.rows[:, 0]
@@ -221,7 +212,7 @@ def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
             "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
             "the length named; nothing else is stated.",
             u_um=worst.u_um,
-        )  # fmt: skip
+        )
     return NOT_STATED
 
 
@@ -263,7 +254,6 @@ def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> li
 
 
 def _unshown(test: Test, found: Indications) -> list[Text]:
-    """What neither job nor recording say, and would have to."""
     under = test.circumstances
     told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
     if test.artefact.bidirectional(found.rows) is None:

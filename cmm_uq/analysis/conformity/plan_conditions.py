@@ -176,14 +176,10 @@ _DIRECTIONS = 400
 
 def sphere_points(
     plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
-) -> tuple[Condition, ...]:  # fmt: skip
+) -> tuple[Condition, ...]:
     """How many points on each sphere, and whether they cover it.
 
-    Parameters
-    ----------
-    plan : of the standard.
-    points, directions : that were probed, and the outward direction (n, 3) of each from the middle of its sphere.
-    copies : groups that do not count.
+    ``points, directions``: that were probed, and the outward direction (n, 3) of each from the middle of its sphere.
     """
     lacking, bare = [], []
     for group, rows in enumerate(points.rows_of_groups):
@@ -231,14 +227,6 @@ def _farthest(normals: Floats) -> float:
 
 
 def conditions(plan: Plan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """All that a standard asks for.
-
-    Parameters
-    ----------
-    plan : of the standard.
-    artefact : with the points that were planned or recorded.
-    recorded : whether they were; then copies do not count.
-    """
     copies = artefact.points.copies if recorded else {}
     if isinstance(plan, LengthPlan):
         return lengths_measured(plan, artefact, copies)

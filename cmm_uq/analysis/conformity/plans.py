@@ -108,15 +108,10 @@ def _signed(u: Floats, counts: NDArray[np.bool_]) -> Text:
 class LengthPlan:
     """Calibrated lengths along lines through the volume.
 
-    Parameters
-    ----------
-    positions : of the lines, by name.
-    lengths : different ones in each position.
-    repeats : of each length in each position.
-    least_share : the longest length in a position over the travel along it.
-    shortest_mm : largest that the shortest length may be.
-    bidirectional : whether each length's ends are to be reached from opposite sides.
-    offset_mm : of the stylus tip across the ram; lengths measured with another do not count.
+    ``positions``: of the lines, by name; ``lengths``: different ones in each position; ``repeats``: of each length in
+    each position; ``least_share``: the longest length in a position over the travel along it; ``shortest_mm``: largest
+    that the shortest length may be; ``bidirectional``: whether each length's ends are to be reached from opposite
+    sides; ``offset_mm``: of the stylus tip across the ram; lengths measured with another do not count.
     """
 
     positions: tuple[Text, ...]
@@ -129,7 +124,6 @@ class LengthPlan:
 
     @property
     def total(self) -> int:
-        """Lengths in all."""
         return len(self.positions) * self.lengths * self.repeats
 
 
@@ -137,13 +131,10 @@ class LengthPlan:
 class BarPlan:
     """A ballbar in many positions.
 
-    Parameters
-    ----------
-    positions : how many in a nearly cubic volume.
-    directions : each of which some position has.
-    further : positions more for each further cube of a longer volume.
-    nearly_cubic : longest over shortest axis up to which a volume is taken as nearly cubic.
-    apart_mm : bars of which both ends are nearer than this to those of another are in the same place.
+    ``positions``: how many in a nearly cubic volume; ``directions``: each of which some position has; ``further``:
+    positions more for each further cube of a longer volume; ``nearly_cubic``: longest over shortest axis up to which a
+    volume is taken as nearly cubic; ``apart_mm``: bars of which both ends are nearer than this to those of another are
+    in the same place.
     """
 
     positions: int
@@ -166,11 +157,8 @@ class BarPlan:
 class SpherePlan:
     """Points on a test sphere.
 
-    Parameters
-    ----------
-    points : different ones on each sphere, or more.
-    reach_deg : no direction of the hemisphere is farther than this from the nearest point.
-    diameter_mm : least and largest of the sphere.
+    ``points``: different ones on each sphere, or more; ``reach_deg``: no direction of the hemisphere is farther than
+    this from the nearest point; ``diameter_mm``: least and largest of the sphere.
     """
 
     points: int
@@ -182,9 +170,7 @@ class SpherePlan:
 class RepeatPlan:
     """A sphere probed again and again in one place.
 
-    Parameters
-    ----------
-    repeats : of the same measurement.
+    ``repeats``: of the same measurement.
     """
 
     repeats: int
@@ -194,9 +180,7 @@ class RepeatPlan:
 class OffsetPlan:
     """A ballbar measured with the stylus tip to either side of the ram.
 
-    Parameters
-    ----------
-    positions : of the bar, by name.
+    ``positions``: of the bar, by name.
     """
 
     positions: tuple[Text, ...]
@@ -206,11 +190,7 @@ class OffsetPlan:
 class ShortLengthPlan:
     """A short gauge in several orientations.
 
-    Parameters
-    ----------
-    orientations : that differ by more than ``apart_deg``.
-    repeats : in each.
-    longest_mm : that is still short.
+    ``orientations``: that differ by more than ``apart_deg``; ``repeats``: in each; ``longest_mm``: that is still short.
     """
 
     orientations: int
@@ -239,7 +219,6 @@ class Condition:
 
     @property
     def met(self) -> bool:
-        """Whether nothing is missing."""
         return not self.missing
 
 

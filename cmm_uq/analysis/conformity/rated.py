@@ -30,10 +30,7 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
     if rated.difference_k is not None:
         found.append(_difference(points, rated.difference_k))
     used = circumstances.probe
-    for what, wanted, given in (
-        (say("probe"), rated.probe, used.name),
-        (say("stylus"), rated.stylus, used.stylus),
-    ):
+    for what, wanted, given in ((say("probe"), rated.probe, used.name), (say("stylus"), rated.stylus, used.stylus)):
         if wanted is not None:
             met = wanted == given
             asked = say("rated {what} {wanted}", what=what, wanted=Verbatim(wanted))
@@ -80,7 +77,6 @@ def _change(points: Points, most: float) -> Condition:
 
 
 def _largest_change(time_s: np.ndarray, values: np.ndarray) -> float:
-    """Largest difference of two readings within an hour, K."""
     order = np.argsort(time_s, kind="stable")
     time, value = time_s[order], values[order]
     ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")

@@ -203,21 +203,8 @@ def statement(
 ) -> Statement:
     """Compare what the standard asks for with its limit, and decide.
 
-    Parameters
-    ----------
-    facts : standard, limit and rule.
-    artefact : with its recording.
-    accuracy : figures with uncertainty.
-    key : of job.toml, for messages.
-    recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
-    tested : what of this kind of artefact a standard may be decided on.
-    circumstances : under which the test was carried out, by the job.
-    left_out : what the screening left out of the artefact.
-
-    Raises
-    ------
-    CmmUqError : there is no such standard, the recording is not what it is decided on, or the rule needs an uncertainty
-        that is not stated.
+    ``recorded``: the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a
+    measurement.
     """
     under = circumstances or Circumstances()
     standard, characteristic = decidable(facts, artefact.kind, key, tested, under)
@@ -233,19 +220,8 @@ def statement(
 
 def decidable(
     facts: ConformityFacts, kind: str, key: str, tested: Collection[str], under: Circumstances
-) -> tuple[Standard, Characteristic]:  # fmt: skip
-    """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement.
-
-    Parameters
-    ----------
-    facts, key, tested : see :func:`statement`.
-    kind : of measurement.
-    under : circumstances of the test.
-
-    Raises
-    ------
-    CmmUqError : there is no such standard, or it is for other artefacts or probes.
-    """
+) -> tuple[Standard, Characteristic]:
+    """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement."""
     standard = standard_named(facts.standard)
     if standard is None:
         raise CmmUqError(f"no standard {facts.standard!r} is decided", where=f"job.toml {key} standard",
@@ -262,12 +238,7 @@ def decidable(
 
 
 def standard_named(name: str) -> Standard | None:
-    """A standard by its name; ``None`` where there is none. A built-in one cannot be replaced.
-
-    Raises
-    ------
-    CmmUqError : another package offers it, but cannot be loaded, or two packages do.
-    """
+    """A standard by its name; ``None`` where there is none. A built-in one cannot be replaced."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     outside = named(offered(STANDARDS, Plugin), name)

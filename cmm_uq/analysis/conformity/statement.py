@@ -68,7 +68,6 @@ class Decided:
 
     @property
     def outcome(self) -> StatementFinding:
-        """What follows from it for the test."""
         if self.standing == "again":
             return "remeasure"
         return "fail" if self.set_aside else self.decision.outcome
@@ -139,32 +138,26 @@ class Statement:
 
     @property
     def value_um(self) -> float:
-        """Size of the named error."""
         return abs(self.named.error_um)
 
     @property
     def u_um(self) -> float:
-        """Its standard uncertainty."""
         return self.named.u_um
 
     @property
     def limit_um(self) -> float:
-        """Its limit."""
         return self.named.limit_um
 
     @property
     def decision(self) -> Decision:
-        """What follows from it alone."""
         return self.named.decision
 
 
 def counted(errors: Sequence[Decided]) -> tuple[Decided, ...]:
-    """Those that no further readings stand for."""
     return tuple(item for item in errors if item.standing != "replaced")
 
 
 def least_favourable(errors: Sequence[Decided]) -> Decided:
-    """See :attr:`Statement.named`; where the probabilities agree to the last digit, the farthest towards or over its limit."""
 
     def order(item: Decided) -> tuple[int, float, float, float]:
         decision, room = item.decision, item.limit_um - abs(item.error_um)
@@ -191,12 +184,7 @@ def by_tolerance(name: str, title: Text, quantity: Quantity, tolerance: float, *
     A pass or a fail where the whole 95 % interval is within or beyond it (with U as guard band on both sides, ISO 14253-1),
     undecided between, and where the recording does not determine the parameter.
 
-    Parameters
-    ----------
-    name, title : ``scale_x.ppm``, and in words.
-    quantity : its estimate.
-    tolerance : for either sign, in the quantity's unit.
-    determined : whether the recording determines it by itself.
+    ``name, title``: ``scale_x.ppm``, and in words.
     """
     if not determined:
         missing = (say("the recording does not determine it"),)
@@ -219,12 +207,8 @@ larger error would pass where a smaller one does not."""
 class Remeasurement:
     """What a standard lets be measured again.
 
-    Parameters
-    ----------
-    repeats : of each length in the test itself.
-    outside : of these may lie outside.
-    lengths : may have as many outside.
-    readings : more of each, all of which must lie inside.
+    ``repeats``: of each length in the test itself; ``outside``: of these may lie outside; ``lengths``: may have as many
+    outside; ``readings``: more of each, all of which must lie inside.
     """
 
     repeats: int
@@ -236,11 +220,8 @@ class Remeasurement:
 def with_standing(items: Sequence[Decided], nominal: Ints, again: Remeasurement) -> tuple[Decided, ...]:
     """The same, each with what it counts for.
 
-    Parameters
-    ----------
-    items : decided lengths; a length met twice in a repeat is outside there where either is.
-    nominal : (m,) which nominal length each is of.
-    again : what may be measured again.
+    ``items``: decided lengths; a length met twice in a repeat is outside there where either is; ``nominal``: (m,) which
+    nominal length each is of.
     """
     sets: dict[tuple[int | None, int], list[int]] = {}
     for i, item in enumerate(items):

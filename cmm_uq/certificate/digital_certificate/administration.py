@@ -66,7 +66,6 @@ def said(text: str, say_in: SayIn) -> tuple[Said, ...]:
 
 
 def words_of(text: str, say_in: SayIn) -> Words:
-    """A name."""
     return Words(said(text, say_in))
 
 
@@ -100,10 +99,7 @@ _NOBODY = say("nobody: nothing is certified")
 class Mark:
     """Why this is no certificate.
 
-    Parameters
-    ----------
-    word : that its identifier begins with.
-    banner : what is said of it.
+    ``word``: that its identifier begins with; ``banner``: what is said of it.
     """
 
     word: str
@@ -120,7 +116,6 @@ def mark_of(job: Job) -> Mark | None:
 
 
 def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
-    """Identifier, languages and dates."""
     facts = job.facts.job
     number, mark = one_line(facts.number or facts.id), mark_of(job)
     known = [
@@ -147,7 +142,6 @@ def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
 
 
 def items(job: Job, say_in: SayIn) -> Items:
-    """The machine."""
     machine = job.facts.machine
     serial = Identification(
         issuer="manufacturer",
@@ -169,7 +163,6 @@ def items(job: Job, say_in: SayIn) -> Items:
 
 
 def _travel(job: Job, say_in: SayIn) -> list[PrimitiveQuantity]:
-    """Lowest and highest scale reading of each axis."""
     found = []
     for axis in "xyz":
         travel = getattr(job.facts.machine.travel_mm, axis)
@@ -212,7 +205,6 @@ def persons(job: Job, say_in: SayIn) -> tuple[Person, ...]:
 
 
 def customer(job: Job, say_in: SayIn) -> Contact:
-    """For whom it was measured."""
     return _contact(job.facts.job.customer, job.facts.job.address, say_in)
 
 
@@ -265,7 +257,6 @@ def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tu
 
 
 def ref_types(say_in: SayIn) -> tuple[RefTypeDefinition, ...]:
-    """Whose names the refTypes are."""
     return (
         RefTypeDefinition(
             name=words_of(say("Good practice of the DCC: names that all fields of calibration share"), say_in),
@@ -287,6 +278,5 @@ def _contact(name: str, address: str, say_in: SayIn) -> Contact:
 
 
 def _location(address: str, say_in: SayIn) -> Location:
-    """As it is written: a job does not part street and city."""
     lines = [Verbatim(line.strip()) for line in address.splitlines() if line.strip()]
     return Location(further=(rich_of(lines or (NOT_STATED,), say_in),))

@@ -73,16 +73,8 @@ _MOST = 40
 
 def digital_certificate(
     results: Mapping[str, Any], job: Job, *, html: bytes | None, file: bytes | None = None
-) -> Certificate:  # fmt: skip
-    """The certificate, in the language that results.json names, and in English.
-
-    Parameters
-    ----------
-    results : as results.json has them.
-    job : whose they are.
-    html : the human-readable copy, which the certificate carries.
-    file : results.json itself, where it is at hand.
-    """
+) -> Certificate:
+    """The certificate, in the language that results.json names, and in English."""
     say_in = speaking(results["job"].get("language", ENGLISH))
     real, decided = certifies(job), results.get("conformity", ())
     figures = Figures(say_in, free(results), of_tolerances(Verdicts.of_results(results), say_in, certifies=real))
@@ -139,7 +131,6 @@ def free(results: Mapping[str, Any]) -> frozenset[str]:
 
 
 def _results(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> list[Result]:
-    """Every part of results.json that is one of the machine."""
     keys = [key for key in (*_TITLES, *results) if key in results and key not in _NOT_STATED_THERE]
     found = []
     for key in dict.fromkeys(keys):

@@ -104,7 +104,6 @@ def _reference(
     say_in: SayIn,
     quantities: tuple[PrimitiveQuantity, ...],
 ) -> Equipment:
-    """A measurement standard, with its certificate."""
     return Equipment(
         name=words_of(Verbatim(name), say_in), certificate=_certificate(job, chain, say_in),
         identifications=_serial(serial, say_in), quantities=quantities, ref_type=("basic_normalUsed",),
@@ -149,7 +148,6 @@ def _paper(number: str, say_in: SayIn) -> Hash:
 def _certified(
     owner: str, name: Text, length: float | None, u_um: float | None, cte: float, say_in: SayIn
 ) -> Iterator[PrimitiveQuantity]:
-    """Length and expansion as the job states them."""
     if length is not None:
         u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
         stated = (

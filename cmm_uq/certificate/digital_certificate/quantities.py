@@ -21,13 +21,6 @@ _PLAIN = ("k", "probability", "p_value", "share", "dof", "draws", "repeat", "mea
 
 
 def unit_of(key: str, above: Unit | None) -> Unit:
-    """Unit of a figure.
-
-    Parameters
-    ----------
-    key : the last of its path, the name of no single element of a list.
-    above : the unit that the key above it names, if it names one.
-    """
     if key in _PLAIN or key.endswith("_probability"):
         return ONE
     return named_unit(key) or above or ONE
@@ -56,7 +49,6 @@ def _foreign(text: str) -> str:
 
 
 def product(one: str, other: str) -> str:
-    """Unit of an element of a covariance matrix."""
     if "|" in one + other:
         return _foreign(f"{one}·{other}")
     if one == ONE.dsi:
@@ -65,7 +57,6 @@ def product(one: str, other: str) -> str:
 
 
 def ratio(one: str, other: str) -> str:
-    """Unit of a sensitivity."""
     if "|" in one + other:
         return _foreign(f"{one}/({other})")
     return ONE.dsi if one == other else product(one, _inverse(other))
@@ -76,7 +67,6 @@ _FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\toth
 
 
 def _inverse(unit: str) -> str:
-    """One over a unit: every power with the other sign."""
     if unit == ONE.dsi:
         return unit
     factors = ((name, -int(power or 1)) for name, power in _FACTOR.findall(unit))
@@ -92,17 +82,14 @@ _LINE = {"input", "value", "u", "unit", "distribution", "dof", "sensitivity", "c
 
 
 def decimal(value: float) -> Decimal:
-    """A number as results.json has it."""
     return Decimal(repr(value)) if isinstance(value, float) else Decimal(value)
 
 
 def plain_name(text: str) -> str:
-    """Without what an id cannot have."""
     return _ILLEGAL.sub("_", text)
 
 
 def is_number(value: object) -> bool:
-    """Whether it is one; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -152,7 +139,6 @@ def is_curve(value: Any, u: Any, interval: Any) -> bool:
 
 
 def decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
-    """Numbers as results.json has them."""
     return tuple(decimal(value) for value in values)
 
 

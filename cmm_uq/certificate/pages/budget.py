@@ -20,13 +20,6 @@ _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 
 
 def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name: str) -> Document:
-    """The page of an evaluated model file.
-
-    Parameters
-    ----------
-    file, evaluation : what was asked and what was found.
-    name : of the file.
-    """
     asked = evaluation.request
     summary = Table(
         say("Results"),

@@ -19,10 +19,7 @@ STATE_WORDS: Mapping[State, Text] = {
 def due_document(items: Sequence[Due], on: dt.date, within: dt.timedelta) -> Document:
     """The page of what is due.
 
-    Parameters
-    ----------
-    items : by day.
-    on, within : the day asked about, and how far ahead something is due soon.
+    ``items``: by day; ``on, within``: the day asked about, and how far ahead something is due soon.
     """
     machines = [one for one in items if one.item == "machine"]
     artefacts = [one for one in items if one.item == "artefact"]
@@ -113,7 +110,6 @@ def reason(one: Due) -> Text:
 
 
 def due_row(one: Due, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:
-    """An item for a terminal."""
     date = DASH if one.due is None else day(one.due)
     left = NOTHING if one.due is None else _left((one.due - on).days)
     what = say("machine {serial}", serial=Verbatim(one.serial)) if one.item == "machine" else (

@@ -32,14 +32,6 @@ from cmm_uq.laboratory.due.fleet_found import FleetFound, OfValue
 
 
 def fleet_plot(rows: Sequence[Usual], names: Sequence[Text], *, axis: Text, caption: Text, alternative: Text) -> Plot:
-    """One row each, from the first down.
-
-    Parameters
-    ----------
-    rows, names : groups of machines and what each is called.
-    axis : what the rates are, with their unit.
-    caption, alternative : of the picture.
-    """
     rate, low, high = (np.array([getattr(row, name) for row in rows]) for name in ("rate", "lower", "upper"))
     at = np.arange(len(rows), dtype=np.float64)
     with house_style():
@@ -113,7 +105,6 @@ def groups_shown(of: OfValue) -> tuple[Usual, ...]:
 
 
 def usual_table(of: OfValue) -> Table:
-    """What is usual for these."""
     spec, shown = digits(of), groups_shown(of)
     columns = (
         Column(say("Machines"), numeric=False), Column(say("Number")), Column(say("Rate"), per_year(of)),
@@ -224,7 +215,6 @@ def _day(when: dt.date | None) -> Text:
 
 
 def spreads_table(of: OfValue) -> Table:
-    """How much machines differ."""
     columns = (Column(say("Quantity"), numeric=False), Column(say("Median")), Column(say("95 % interval"), numeric=False),
                Column(say("Unit"), numeric=False))  # fmt: skip
     return Table(say("How machines differ"), columns, tuple(_spread(of, each) for each in of.fleet.spreads))

@@ -31,7 +31,6 @@ MOST_SERIALS = 12
 
 
 def counted(count: int) -> Text:
-    """So many machines."""
     return plural(count, one=say("one machine"), many=say("{count} machines", count=count))
 
 
@@ -49,12 +48,10 @@ def date_of(ordinal: float) -> Text:
 
 
 def called(of: OfValue) -> Text:
-    """A value, with its name in the records."""
     return say("{quantity} ({name})", quantity=Verbatim(of.quantity), name=Verbatim(of.name))
 
 
 def group_words(each: Usual) -> Text:
-    """What a group of machines is called."""
     if each.kind == "fleet":
         return say("Average machine")
     name = Verbatim(each.name) if each.name else say("not stated")
@@ -62,7 +59,6 @@ def group_words(each: Usual) -> Text:
 
 
 def per_year(of: OfValue) -> Text:
-    """Unit of rates."""
     return say("{unit}/year", unit=unit_as_written(of.unit) or Verbatim("1"))
 
 
@@ -73,19 +69,16 @@ def digits(of: OfValue) -> str:
 
 
 def signed_rate(rate: float, spec: str) -> Number:
-    """Without a sign where nothing is left of it."""
     text = format(rate, spec)
     return number(0.0, spec) if float(text) == 0 else signed(rate, spec)
 
 
 def rate_words(rate: float, U: float, of: OfValue) -> Text:
-    """A rate, its expanded uncertainty and unit."""
     spec = digits(of)
     return say("{rate} ± {U} {unit}", rate=signed_rate(rate, spec), U=number(U, spec), unit=per_year(of))
 
 
 def usual_rate(of: OfValue) -> Text:
-    """Of the average machine."""
     average = of.fleet.usual[0]
     return rate_words(average.rate, 1.96 * average.u, of)
 
@@ -131,7 +124,6 @@ def fleet_summary(found: FleetFound) -> Summary:
 
 
 def machines_of(found: FleetFound) -> set[str]:
-    """All, by name."""
     return {member.machine for of in found.values for member in of.members}
 
 
@@ -169,7 +161,6 @@ def _verdict(found: FleetFound) -> tuple[Text, Standing]:
 
 
 def _compared(found: FleetFound) -> Text:
-    """What the verdict rests on."""
     again = {member.machine for of in found.values for member in of.members if seen_again(member)}
     return plural(
         len(again), one=say("one machine of {total} has certificates of two days", total=len(machines_of(found))),
@@ -193,7 +184,6 @@ def _group(of: OfValue) -> Text:
 
 
 def _counts(of: OfValue, until: float) -> Text:
-    """Machines of a value, and how many of them matter."""
     unlike, beyond, soon = (int(which.sum()) for which in (~of.belongs, of.beyond, of.crosses_by(until)))
     parts = [
         counted(len(of.members)),

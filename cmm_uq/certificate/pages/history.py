@@ -67,7 +67,6 @@ STATE_WORDS: Mapping[str, Text] = {
 
 
 def value_row(history: MachineHistory, one: ValueHistory) -> tuple[Text, ...]:
-    """A value under :data:`HEADINGS`; U has k = 2."""
     series = one.series
     value, expanded = rounded(float(series.value[-1]), COVERAGE * float(series.u[-1]))
     limit = DASH if series.limit is None else limit_in_full(series.limit)
@@ -138,7 +137,6 @@ def terminal_note(history: MachineHistory) -> Text:
 
 
 def notes(history: MachineHistory) -> tuple[Text, ...]:
-    """What the columns of a history mean."""
     return (
         say("U has a coverage factor of 2, for 95 %."),
         say(
@@ -161,7 +159,6 @@ def summary_row(history: MachineHistory, one: ValueHistory) -> tuple[Text, ...]:
 
 
 def history_data(history: MachineHistory) -> dict[str, Any]:
-    """For other programs."""
     machine = history.machine
     return {
         "schema": SCHEMA,
@@ -218,13 +215,6 @@ _AHEAD = 2.0
 
 
 def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:
-    """One value over time.
-
-    Parameters
-    ----------
-    history : of the machine.
-    one : of its values.
-    """
     series = one.series
     x, y, U = _years(series.day), series.value, COVERAGE * series.u
     from matplotlib.ticker import MaxNLocator
@@ -256,7 +246,6 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:
 
 
 def _years(day: Floats | Ints) -> Floats:
-    """Ordinals as years with decimals."""
     dates = [dt.date.fromordinal(int(one)) for one in day]
     return np.array([one.year + (one.timetuple().tm_yday - 1) / (365 + _leap(one.year)) for one in dates])
 
@@ -317,12 +306,10 @@ def _legend(one: ValueHistory, *, adjusted: bool, checked: bool) -> Text:
 
 
 def _stated(series: Series, place: int) -> Text:
-    """A value, to the digits of its U."""
     return rounded(float(series.value[place]), COVERAGE * float(series.u[place]))[0]
 
 
 def _told(history: MachineHistory, one: ValueHistory) -> Text:
-    """The picture in a sentence."""
     series = one.series
     what = say(
         "{name}: {count} recordings, from {first} to {last} {unit}", name=Verbatim(series.quantity), count=len(series.day),
@@ -336,7 +323,6 @@ def _told(history: MachineHistory, one: ValueHistory) -> Text:
 
 
 def history_document(history: MachineHistory) -> Document:
-    """The page of a machine."""
     machine = history.machine
     return Document(
         title=say("History of a machine"),

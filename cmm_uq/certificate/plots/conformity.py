@@ -36,14 +36,9 @@ def trumpet(
 ) -> Plot:  # fmt: skip
     """Errors against their limits on both sides of zero.
 
-    Parameters
-    ----------
-    length_mm, error_um : (m,) of each length.
-    limit_um : (m,) its limit.
-    acceptance_um : (m,) largest size that is accepted; ``None`` where none is.
-    expanded_um : (m,) expanded uncertainty of each error, k = 2.
-    outside : (m,) errors to be marked: those that are not accepted.
-    quantity : label of the errors.
+    ``length_mm, error_um``: (m,) of each length; ``limit_um``: (m,) its limit; ``acceptance_um``: (m,) largest size
+    that is accepted; ``None`` where none is; ``expanded_um``: (m,) expanded uncertainty of each error, k = 2;
+    ``outside``: (m,) errors to be marked: those that are not accepted.
     """
     x = finite("length_mm", length_mm, (None,))
     y, top, U = (finite(name, values, x.shape) for name, values in
@@ -103,10 +98,8 @@ def tolerance_plot(
 ) -> Plot:
     """Parameters over their tolerances, one row each: inside the band is inside the tolerance.
 
-    Parameters
-    ----------
-    ratio : (n,) estimate over tolerance, signed.
-    low, high : (n,) ends of its coverage interval over the tolerance.
+    ``ratio``: (n,) estimate over tolerance, signed; ``low, high``: (n,) ends of its coverage interval over the
+    tolerance.
     """
     value = finite("ratio", ratio, (len(names),))
     ends = finite("low", low, value.shape), finite("high", high, value.shape)

@@ -62,18 +62,10 @@ def corner_plot(
 ) -> Plot:
     """Marginal and pairwise posterior densities.
 
-    Parameters
-    ----------
-    samples : (n, d) draws. Beyond twelve parameters the twelve with the strongest correlations are shown, and the
-        caption says so.
-    names, units : (d,) words over the densities.
-    estimates : (d,) drawn as lines and crosses; the medians where left out.
-    intervals95 : (d, 2) shaded; between the 2.5 % and 97.5 % quantiles where left out.
-    priors : by parameter, (x, density) of its prior, dashed in grey.
-
-    Raises
-    ------
-    CmmUqError : fewer than two draws, a draw that is not finite, a shape that does not fit.
+    ``samples``: (n, d) draws. Beyond twelve parameters the twelve with the strongest correlations are shown, and the;
+    ``names, units``: (d,) words over the densities; ``estimates``: (d,) drawn as lines and crosses; the medians where
+    left out; ``intervals95``: (d, 2) shaded; between the 2.5 % and 97.5 % quantiles where left out; ``priors``: by
+    parameter, (x, density) of its prior, dashed in grey.
     """
     draws = finite("samples", samples, (None, len(names)))
     if len(draws) < 2 or not len(names):
@@ -111,7 +103,6 @@ def _label(name: Text, unit: Text) -> Text:
 
 
 def _most_correlated(draws: Floats) -> NDArray[np.intp]:
-    """Indices of the parameters to show, in their own order."""
     dimension = draws.shape[1]
     if dimension <= READABLE:
         return np.arange(dimension)
@@ -180,7 +171,6 @@ class _Panels:
         return np.asarray(self.across(row, values) - row + self.count - 1 - row)
 
     def marginal(self, k: int) -> Floats:
-        """Smoothed counts of a parameter by bin."""
         index = self.bins[:, k]
         return _smooth(np.bincount(index[index >= 0], minlength=_BINS).astype(np.float64))
 
@@ -238,7 +228,6 @@ class _Panels:
         self.strokes(np.append(x - arm, x), np.append(x + arm, x), np.append(y, y - arm), np.append(y, y + arm), INK)
 
     def frames(self) -> None:
-        """Left and lower edge of every panel."""
         row, column = np.tril_indices(self.count)
         x, y = column.astype(np.float64), self.count - 1.0 - row
         self.strokes(np.append(x, x), np.append(x, x + _SCALE), np.append(y, y), np.append(y + _SCALE, y), MUTED)

@@ -20,7 +20,6 @@ _MM = 25.4 / 72  # of a point
 
 
 def width_mm(text: str, size: float, weight: str = "normal") -> float:
-    """Width of a text in the measuring font."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.textpath import TextPath
 
@@ -112,10 +111,7 @@ _LARGEST = 300
 def shown(sizes: Sequence[Floats], flagged: NDArray[np.bool_] | None = None, most: int = MOST) -> Ints:
     """Rows to draw, ascending: all where there are no more than ``most``.
 
-    Parameters
-    ----------
-    sizes : (n,) each; the largest of every one are drawn.
-    flagged : (n,) what is drawn before anything else.
+    ``sizes``: (n,) each; the largest of every one are drawn; ``flagged``: (n,) what is drawn before anything else.
     """
     count = len(sizes[0])
     if count <= most:

@@ -50,11 +50,7 @@ _TEXT_MM = 15.0
 def placing_pictures(placings: Sequence[Placing], box: Floats, first: int) -> list[Plot]:
     """Placings in the machine's volume seen from the front, three in a row.
 
-    Parameters
-    ----------
-    placings : to be drawn.
-    box : (3, 2) volume, scale readings, mm.
-    first : number of the first of them.
+    ``box``: (3, 2) volume, scale readings, mm.
     """
     rows = [placings[i : i + A_ROW] for i in range(0, len(placings), A_ROW)]
     return [_row(row, box, first + A_ROW * i) for i, row in enumerate(rows)]
@@ -167,12 +163,7 @@ def gain_plot(
 ) -> Plot:  # fmt: skip
     """Before and after for each effect, over the larger of the two; what has no finite value stands at the right edge.
 
-    Parameters
-    ----------
-    labels : of the effects.
-    before, after : smaller is better; ``None`` for infinitely large.
-    names : of the two plans.
-    quantity : what is drawn.
+    ``before, after``: smaller is better; ``None`` for infinitely large.
     """
     figures = [[v if v is not None and np.isfinite(v) else np.inf for v in series] for series in (before, after)]
     pairs = np.array(figures).T

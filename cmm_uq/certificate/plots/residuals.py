@@ -64,19 +64,13 @@ def length_plot(
 ) -> Plot:
     """Bar lengths by position, before and after the fitted model, as deviations from a reference length.
 
-    Parameters
-    ----------
-    position : (n,) number of each position; repeats carry the same number and are drawn side by side.
-    before_um, after_um : (n,) length minus reference, µm.
-    expanded_before_um, expanded_after_um : (n,) or one for all, expanded uncertainty of each length, µm.
-    reference : what zero is, with its figure, such as "certified length 404.2357 mm".
-    reference_expanded_um : expanded uncertainty of the reference, µm: the half width of the band about zero.
-    flagged : (n,) true where screening flagged the position.
+    ``position``: (n,) number of each position; repeats carry the same number and are drawn side by side; ``before_um,
+    after_um``: (n,) length minus reference, µm; ``expanded_before_um, expanded_after_um``: (n,) or one for all,
+    expanded uncertainty of each length, µm; ``reference``: what zero is, with its figure, such as "certified length
+    404.2357 mm"; ``reference_expanded_um``: expanded uncertainty of the reference, µm: the half width of the band about
+    zero; ``flagged``: (n,) true where screening flagged the position.
     """
-    series = (
-        (before_label, before_um, expanded_before_um, MUTED),
-        (after_label, after_um, expanded_after_um, ACCENT),
-    )
+    series = ((before_label, before_um, expanded_before_um, MUTED), (after_label, after_um, expanded_after_um, ACCENT))
     return _panels(position, series, (reference, reference_expanded_um), flagged, position_label, caption, alternative)
 
 
@@ -172,7 +166,6 @@ def _side_by_side(position: Floats) -> Floats:
 
 
 def _mark(ax: Axes, x: Floats, y: Floats, size: float) -> None:
-    """Rings about flagged values."""
     if len(x):
         ax.plot(x, y, ls="", marker="o", ms=size + 4, mfc="none", mec=DIVERGING[-1], mew=1.1, zorder=4)
 
@@ -199,12 +192,9 @@ def volume_plot(
     Sign and size show twice: by colour, and by a dot that is full for a positive residual, hollow for a negative one,
     and grows with it, so the picture also works in grey.
 
-    Parameters
-    ----------
-    start_mm : (n, 3) one end of each bar, or the points themselves.
-    residual_um : (n,) what is shown, in the unit that ``quantity`` names.
-    end_mm : (n, 3) the other ends; none for points.
-    travel_mm : (3, 2) the machine's volume in the same frame, drawn as an outline where given.
+    ``start_mm``: (n, 3) one end of each bar, or the points themselves; ``residual_um``: (n,) what is shown, in the unit
+    that ``quantity`` names; ``end_mm``: (n, 3) the other ends; none for points; ``travel_mm``: (3, 2) the machine's
+    volume in the same frame, drawn as an outline where given.
     """
     start = finite("start_mm", start_mm, (None, 3))
     end = start if end_mm is None else finite("end_mm", end_mm, (len(start), 3))
@@ -318,12 +308,7 @@ def curve_with_band(
 
 
 def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
-    """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first.
-
-    Raises
-    ------
-    CmmUqError : there is no source, or a share is no number.
-    """
+    """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first."""
     share = finite("shares", shares, (len(sources),))
     if not len(share):
         raise CmmUqError("a budget without a source has no picture")
@@ -353,7 +338,6 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
 
 
 def _two_lines(ax: Axes, row: int, lines: Sequence[Text]) -> None:
-    """Where the label of a row would stand."""
     from matplotlib import rcParams
 
     left = -rcParams["ytick.major.pad"] - rcParams["ytick.major.size"]
@@ -365,9 +349,7 @@ def _two_lines(ax: Axes, row: int, lines: Sequence[Text]) -> None:
 def residual_volume(result: Result, what: Text) -> Plot:
     """Residuals of observations of one point each, or of pairs of points (drawn as bars), over the scale readings.
 
-    Parameters
-    ----------
-    what : the points in words, as ``faces``.
+    ``what``: the points in words, as ``faces``.
     """
     artefact, residuals = result.artefact, result.residuals / MICROMETRE
     readings, travel = artefact.points.machine_xyz, artefact.points.machine.travel_mm
@@ -380,9 +362,6 @@ def residual_volume(result: Result, what: Text) -> Plot:
         travel_mm=travel if np.all(np.isfinite(travel)) else None,
         caption=say("Residuals after the fitted model in the machine's volume (scale readings)."),
         alternative=say(
-            "Three projections of the {what}; residuals of {low} to {high} µm.",
-            what=what,
-            low=low,
-            high=high,
+            "Three projections of the {what}; residuals of {low} to {high} µm.", what=what, low=low, high=high
         ),
     )

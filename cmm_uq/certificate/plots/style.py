@@ -50,12 +50,6 @@ _PACKAGE = "matplotlib_fontja"
 
 
 def japanese_font() -> Path:
-    """File of the Japanese font.
-
-    Raises
-    ------
-    CmmUqError : it is not installed.
-    """
     spec = find_spec(_PACKAGE)
     for folder in (spec.submodule_search_locations or ()) if spec else ():
         file = Path(folder) / "fonts" / "ipaexg.ttf"
@@ -68,12 +62,6 @@ def japanese_font() -> Path:
 
 
 def fonts_of(language: Code) -> list[Path]:
-    """Files of the fonts that a language needs.
-
-    Raises
-    ------
-    CmmUqError : one is not installed.
-    """
     return [japanese_font()] if language == "ja" else []
 
 
@@ -96,12 +84,7 @@ def lettered(text: Text) -> Text:
 
 
 def measuring_fonts() -> list[str]:
-    """Families that the room of a text is measured with.
-
-    Raises
-    ------
-    CmmUqError : the language needs a font that is not installed.
-    """
+    """Families that the room of a text is measured with."""
     return ["DejaVu Sans", _known_to_matplotlib()] if _LANGUAGE.get() == "ja" else ["DejaVu Sans"]
 
 
@@ -272,7 +255,6 @@ class _Words(dict[str, str]):
         return shorter
 
     def path(self, data: str) -> str:
-        """What a path draws."""
         said = " ".join(map(self.__getitem__, data.split()))
         alone = _ALONE.fullmatch(said)
         return f"M {alone[1]} {alone[2]} L {_shorter_of(float(alone[1]) + 0.01)} {alone[2]}" if alone else said
@@ -318,12 +300,7 @@ def drawn(figure: Figure, caption: Text, alternative: Text) -> Plot:
 
 
 def finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
-    """The values as floats of a shape (``None`` = any length), every one of them finite.
-
-    Raises
-    ------
-    CmmUqError : another shape, or a value that is not finite: a picture that leaves it out would mislead.
-    """
+    """The values as floats of a shape (``None`` = any length), every one of them finite."""
     array = np.asarray(values, dtype=np.float64)
     fits = array.ndim == len(shape) and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
     if not fits:

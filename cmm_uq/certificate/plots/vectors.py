@@ -46,11 +46,7 @@ def vector_plot(
 ) -> Plot:
     """Vectors in a plane, one panel a series, all magnified alike, with a scale arrow of a round length.
 
-    Parameters
-    ----------
-    position_mm : (n, 2) where each vector stands.
-    series : title and (n, 2) vectors in µm; one to three of them.
-    axis_labels : of the plane.
+    ``position_mm``: (n, 2) where each vector stands; ``series``: title and (n, 2) vectors in µm; one to three of them.
     """
     place = finite("position_mm", position_mm, (None, 2))
     vectors = [(title, finite("vectors", values, place.shape)) for title, values in series]
@@ -124,12 +120,7 @@ def residual_field_plot(
 
     What is longer than its expanded uncertainty is an arrow; what lies within it is a thin line without a head.
 
-    Parameters
-    ----------
-    field : to draw.
-    expanded_um : (q,) expanded uncertainty of the length of each vector, µm.
-    titles : of the columns; one alone draws what was before.
-    shade : where the mismatch lives.
+    ``expanded_um``: (q,) expanded uncertainty of the length of each vector, µm.
     """
     place, limit = finite("place", field.place, (None, 3)), finite("expanded_um", expanded_um, (len(field.place),))
     series = [finite("vectors", v, place.shape) for v in (field.before, field.after)[: len(titles)]]
@@ -167,7 +158,6 @@ def residual_field_plot(
 
 
 def _rows(series: list[Floats], lengths: bool) -> NDArray[np.int64]:
-    """Which are drawn; both ends of a length or none."""
     sizes = [np.linalg.norm(values, axis=1) for values in series]
     if not lengths:
         return shown(sizes)
@@ -217,7 +207,6 @@ def _shaded(ax: Axes, shade: Shade | None, a: int, b: int) -> None:
 
 
 def _lines(ax: Axes, ends: Floats) -> None:
-    """The lengths themselves, one path."""
     gaps = np.full((len(ends) // 2, 1), np.nan)
     for_x, for_y = (np.hstack([ends[::2, i : i + 1], ends[1::2, i : i + 1], gaps]).ravel() for i in (0, 1))
     ax.plot(for_x, for_y, color=RULE, lw=0.8, zorder=1)
@@ -269,11 +258,8 @@ def profile_plot(
 ) -> Plot:
     """A function with its band above, what each observation leaves below, the region where it matters shaded in both.
 
-    Parameters
-    ----------
-    curve : covariate, function in µm and its expanded uncertainty, each (p,).
-    data : lowest and highest covariate of each observation, and its residual in µm, each (m,).
-    region : of the covariate.
+    ``curve``: covariate, function in µm and its expanded uncertainty, each (p,); ``data``: lowest and highest covariate
+    of each observation, and its residual in µm, each (m,).
     """
     x = finite("x", curve[0], (None,))
     y, half = (finite("curve", values, x.shape) for values in curve[1:])

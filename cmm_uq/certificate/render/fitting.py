@@ -120,7 +120,6 @@ def _begun(document: Document, text: Text) -> Text:
 
 
 def _beginning(text: Text) -> Text:
-    """Its first sentence, or the first words of one that is long."""
     whole = str.__str__(text)
     if letters(whole) <= _LONG:
         return text
@@ -143,7 +142,6 @@ def _around(document: Document) -> tuple[list[Section], ...]:
 
 
 def _height(document: Document) -> float:
-    """Of the first page, with the picture as small as it may be."""
     return sum(_parts(document))
 
 
@@ -192,6 +190,5 @@ def _lines(text: str, mm: float, size: float) -> int:
 
 
 def _picture(plot: Plot) -> float:
-    """Its height at the width of the page."""
     _, _, width, height = map(float, re.findall(r'viewBox="([^"]*)"', plot.svg)[0].split())
     return 170 * height / width

@@ -24,12 +24,6 @@ if TYPE_CHECKING:
 
 
 def template_folder() -> Path:
-    """The folder of the templates.
-
-    Raises
-    ------
-    CmmUqError : neither an installed package nor a checkout has it.
-    """
     package = Path(__file__).resolve().parents[2]
     for folder in (package / "templates", package.parent / "templates"):
         if (folder / "document.html").is_file():
@@ -55,14 +49,7 @@ def render_html(document: Document) -> str:
 
 
 def style_sheet(heading: str, banner: str, language: str) -> str:
-    """The style sheet of a page, which says what stands at head and foot of its printed pages.
-
-    Parameters
-    ----------
-    heading : title and number of the document, with a space between.
-    banner : at the head of every page, if any.
-    language : of the document.
-    """
+    """The style sheet of a page, which says what stands at head and foot of its printed pages."""
     title, _, number = heading.partition(" ")
     document = {"title": title, "number": number, "banner": banner, "language": language}
     words = view_words(code_of(language))

@@ -50,14 +50,7 @@ _TYPES = {
 def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     """The document as PDF, with files embedded.
 
-    Parameters
-    ----------
-    attachments : by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the
-        document, others as its *source* (the relationships of ISO 19005-3).
-
-    Raises
-    ------
-    CmmUqError : Typst refuses the document, and what it says.
+    ``attachments``: by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the.
     """
     language = code_of(document.language)
     content = {
@@ -77,15 +70,7 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
 def picture(template: str, content: Mapping[str, Any], language: Code = "en") -> bytes:
     """A template alone as a PDF page without tags, to be shown inside another.
 
-    Parameters
-    ----------
-    template : its file name.
-    content : what it shows, as ``document``; characters that no font has become □.
-    language : of it.
-
-    Raises
-    ------
-    CmmUqError : Typst refuses it, and what it says.
+    ``content``: what it shows, as ``document``; characters that no font has become □.
     """
     compiled = partial(_compile, template=template, standards=("a-3b",), tagged=False)
     shown = {"document": content, "colour": COLOURS, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
@@ -187,7 +172,6 @@ _POINTS = 72 / 25.4
 
 
 def same(text: Text) -> Text:
-    """A text as it is."""
     return text
 
 
@@ -195,17 +179,6 @@ def seal(
     signer: Signer, at: dt.datetime, laboratory: Text, accreditation: Text, *, language: str = "en",
     said: Callable[[Text], Text] = same,
 ) -> Seal:  # fmt: skip
-    """The seal of a signer.
-
-    Parameters
-    ----------
-    signer : who signs.
-    at : time of signing, with its zone.
-    laboratory : that answers for the document; empty where it does not say.
-    accreditation : of the laboratory, as it is printed; empty where there is none.
-    language : of the document.
-    said : says a text in that language.
-    """
     time = Verbatim(at.astimezone(dt.UTC).strftime("%Y-%m-%d %H:%M UTC"))
     head = say("Electronically signed by {name}", name=Verbatim(signer.name))
     facts = commas([part for part in (laboratory, accreditation, time) if part])

@@ -34,14 +34,7 @@ SCHEMA = "cmm-uq/results/1"
 
 
 def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, Any]:
-    """What every results.json begins with: the schema, the program, and which job with which inputs of which origin.
-
-    Parameters
-    ----------
-    job : that was asked for.
-    schema : of the file.
-    effects : whether effects took part, and with them the packages that bring some.
-    """
+    """What every results.json begins with: the schema, the program, and which job with which inputs of which origin."""
     facts = job.facts.job
     derived = facts.derived_from
     return {
@@ -161,7 +154,6 @@ def _simulation(simulated: Simulated, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
-    """One effect that was left out."""
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
         "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),
@@ -171,7 +163,6 @@ def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
 
 
 def improvement_data(gain: Improvement) -> dict[str, Any]:
-    """Before and after."""
     return {
         "rms_before_um": gain.rms_before_um, "rms_after_um": gain.rms_after_um,
         "heldout_rms_before_um": gain.heldout_rms_before_um, "heldout_rms_after_um": gain.heldout_rms_after_um,
@@ -282,7 +273,6 @@ def _decided(item: Decided) -> dict[str, Any]:
 
 
 def finding_data(finding: Finding, file: str) -> dict[str, Any]:
-    """One finding of the screening."""
     return {
         "kind": finding.kind, "rows": [str(m) for m in finding.measurements], "lines": list(finding.lines),
         "file": file, "why": finding.why, "set_aside": finding.set_aside,

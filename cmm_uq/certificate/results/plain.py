@@ -54,7 +54,6 @@ class PosteriorFile:
 
 
 def posterior_name(origin: str) -> str:
-    """Of the file."""
     return file_name("posterior.npz", origin)
 
 

@@ -98,14 +98,9 @@ Record = dict[str, Any]
 class Behind:
     """What is behind a certificate, of whatever.
 
-    Parameters
-    ----------
-    command : of ``cmm-uq`` that made it.
-    said, laboratory : as its job has them.
-    origin : of the recording.
-    inputs : of the job, by name.
-    recording : its file; empty where there is none.
-    rests_on : number and laboratory of the certificate that it goes by, of the artefact or of the machine; empty for none.
+    ``command``: of ``cmm-uq`` that made it; ``said, laboratory``: as its job has them; ``origin``: of the recording;
+    ``inputs``: of the job, by name; ``recording``: its file; empty where there is none; ``rests_on``: number and
+    laboratory of the certificate that it goes by, of the artefact or of the machine; empty for none.
     """
 
     command: str
@@ -118,21 +113,12 @@ class Behind:
 
     @classmethod
     def of(cls, job: Job) -> Behind:
-        """Behind the certificate of a machine."""
         facts, chain = job.facts, job.facts.artefact.certificate
         known = ("", "") if chain is None else (chain.number, chain.laboratory)
         return cls("report", facts.job, facts.laboratory, facts.job.origin, job.inputs, facts.recording.file, known)
 
 
 def provenance(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> bytes:
-    """The file.
-
-    Parameters
-    ----------
-    job : that was reported.
-    results : contents of results.json.
-    outputs : what was made of it, by name.
-    """
     return provenance_of(Behind.of(job), results, outputs)
 
 
@@ -149,12 +135,7 @@ def provenance_of(job: Behind, results: Mapping[str, Any], outputs: Mapping[str,
 
 
 def same_but_for_the_platform(one: bytes, other: bytes) -> bool:
-    """Whether two provenances differ in the platform and the versions of other packages only.
-
-    Raises
-    ------
-    ValueError : one of them is no JSON.
-    """
+    """Whether two provenances differ in the platform and the versions of other packages only."""
     return _without_platform(one) == _without_platform(other)
 
 
@@ -184,11 +165,7 @@ def _entities(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, byt
     }
     found[PLATFORM] = {"prov:type": "platform"} | {f"cmm-uq:{name}": told for name, told in machine().items()}
     issued = {"cmm-uq:issued": _day(said.issued.isoformat())} if said.issued else {}
-    found[_CERTIFICATE] = {
-        "prov:type": _name("prov:Collection"),
-        "prov:label": said.number or said.id,
-        **issued,
-    }
+    found[_CERTIFICATE] = {"prov:type": _name("prov:Collection"), "prov:label": said.number or said.id, **issued}
     if replaced := said.replaces:
         found[_REPLACED] = {"prov:label": replaced.number, "cmm-uq:issued": _day(replaced.date.isoformat())}
     number, laboratory = job.rests_on
@@ -215,7 +192,6 @@ def _agents(job: Behind, results: Mapping[str, Any]) -> dict[str, Record]:
 
 
 def _relations(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, dict[str, Record]]:
-    """What used, made, and followed from what."""
     entities = _entities(job, results, outputs)
     behind = [name for name in entities if name.startswith("package:") or name in (PLATFORM, _ARTEFACT)]
     measured = (
@@ -261,5 +237,4 @@ def _linked(one: str, name: str, other: str, named: str) -> Record:
 
 
 def _numbered(letter: str, records: list[Record]) -> dict[str, Record]:
-    """By identifiers of their own, which PROV-JSON asks for."""
     return {f"_:{letter}{number}": record for number, record in enumerate(records, 1)}

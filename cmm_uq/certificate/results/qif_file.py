@@ -34,12 +34,9 @@ _DOCUMENTS = uuid.UUID("6f1a7c60-3f0e-5e1b-9f7d-0b1c5d2f4a10")
 class QifValue:
     """A value with its limits.
 
-    Parameters
-    ----------
-    definition : what is decided: standard and characteristic, or an effect's parameter.
-    item : where it was measured.
-    value, u, limit : in ``unit``; both signs are within the limit. ``None`` where there is none.
-    outcome : of the decision.
+    ``definition``: what is decided: standard and characteristic, or an effect's parameter; ``item``: where it was
+    measured; ``value, u, limit``: in ``unit``; both signs are within the limit. ``None`` where there is none;
+    ``outcome``: of the decision.
     """
 
     definition: str
@@ -67,12 +64,6 @@ class _Numbered:
 
 
 def qif(results: Reported) -> bytes:
-    """The document.
-
-    Parameters
-    ----------
-    results : of a report.
-    """
     values, numbered = (*_tested(results), *_factors(results)), _Numbered()
     limited = [one for one in values if one.limit is not None]
     for kind, alike in _alike(limited).items():
@@ -107,7 +98,6 @@ def qif(results: Reported) -> bytes:
 
 
 def _alike(values: Sequence[QifValue]) -> dict[tuple[str, float, Unit], list[QifValue]]:
-    """Values of one characteristic with one limit."""
     found: dict[tuple[str, float, Unit], list[QifValue]] = {}
     for one in values:
         found.setdefault((one.definition, one.limit or 0.0, one.unit), []).append(one)
@@ -115,7 +105,6 @@ def _alike(values: Sequence[QifValue]) -> dict[tuple[str, float, Unit], list[Qif
 
 
 def _tested(results: Reported) -> Iterator[QifValue]:
-    """Every value that a standard decided on."""
     for statement in results.conformity:
         named = " ".join(filter(None, (statement.standard, statement.characteristic)))
         for one in statement.errors:
@@ -126,7 +115,6 @@ def _tested(results: Reported) -> Iterator[QifValue]:
 
 
 def _factors(results: Reported) -> Iterator[QifValue]:
-    """Every error factor that is determined."""
     free = {name for combination in results.identifiability.undetermined for name in combination}
     limited = {one.name: one for one in _verdicts(results) if not one.by}
     for effect, parameters in results.estimates.items():
@@ -138,7 +126,6 @@ def _factors(results: Reported) -> Iterator[QifValue]:
 
 
 def _verdicts(results: Reported) -> Verdicts:
-    """Every statement of conformity."""
     return Verdicts.of_results(results.model_dump())
 
 

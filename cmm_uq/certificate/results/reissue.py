@@ -24,11 +24,7 @@ _NAMED = 6
 class ChangedFigure:
     """A decision or a figure that is not printed alike on both certificates.
 
-    Parameters
-    ----------
-    what : it is.
-    before, after : as printed; empty where a certificate does not have it.
-    unit : as printed.
+    ``what``: it is; ``before, after``: as printed; empty where a certificate does not have it; ``unit``: as printed.
     """
 
     what: Text
@@ -38,7 +34,6 @@ class ChangedFigure:
 
     @property
     def sentence(self) -> Text:
-        """Before and after, with the unit."""
         return say(
             "{what}: {before} → {after}", what=self.what, before=self._shown(self.before), after=self._shown(self.after)
         )
@@ -50,22 +45,16 @@ class ChangedFigure:
 
     @property
     def data(self) -> dict[str, str | None]:
-        """For results.json."""
-        return {
-            name: str.__str__(getattr(self, name)) or None for name in ("what", "before", "after", "unit")
-        }  # fmt: skip
+        return {name: str.__str__(getattr(self, name)) or None for name in ("what", "before", "after", "unit")}
 
 
 @dataclass(frozen=True)
 class Reissue:
     """The results of a certificate beside those of the one that it replaces.
 
-    Parameters
-    ----------
-    number : of the one that is replaced.
-    compared : how many decisions and figures both have, or the replaced one alone; ``None`` where its results are not at hand.
-    differences : decisions first, then figures.
-    added : figures that the replaced one does not state: no difference of the two results.
+    ``number``: of the one that is replaced; ``compared``: how many decisions and figures both have, or the replaced one
+    alone; ``None`` where its results are not at hand; ``differences``: decisions first, then figures; ``added``:
+    figures that the replaced one does not state: no difference of the two results.
     """
 
     number: str
@@ -112,7 +101,6 @@ class Reissue:
 
     @property
     def data(self) -> dict[str, Any]:
-        """For results.json."""
         return {
             "number": self.number, "compared": self.compared, "differences": [one.data for one in self.differences],
             "added": [one.data for one in self.added],

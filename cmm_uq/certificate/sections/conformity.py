@@ -20,10 +20,7 @@ from cmm_uq.maths.uncertainty.rounding import figure, limit_in_full, nominal, si
 def budget_table(measurand: Text, budget: Budget) -> Table:
     """What contributes and how much; a column, or a line, of which nothing is to be said is left out.
 
-    Parameters
-    ----------
-    measurand : in words.
-    budget : in mm or µm, of quantities alone.
+    ``budget``: in mm or µm, of quantities alone.
     """
     scale = 1 / MICROMETRE if budget.unit == unit("mm") else 1.0
     there = [(line, share) for line, share in zip(budget.lines, budget.shares, strict=True) if line.part]
@@ -106,7 +103,7 @@ def decision_block(statement: Statement) -> Decision:
         statement.outcome,
         sentences((*_what_follows(statement), *_chances(statement), *statement.remarks)),
         statement.missing,
-    )  # fmt: skip
+    )
 
 
 def named(statement: Statement) -> Text:
@@ -231,11 +228,7 @@ def _accepted(item: Decided) -> bool:
     return item.decision.outcome in ("pass", "conditional pass") and not item.set_aside
 
 
-_STANDING = {
-    "counts": NOTHING,
-    "again": say("to be measured again"),
-    "replaced": say("measured again"),
-}
+_STANDING = {"counts": NOTHING, "again": say("to be measured again"), "replaced": say("measured again")}
 
 
 def _table(statement: Statement) -> Table:
@@ -246,7 +239,7 @@ def _table(statement: Statement) -> Table:
             len(statement.errors),
             one=say("{count} value.", count=len(statement.errors)),
             many=say("{count} values.", count=len(statement.errors)),
-        ),
+        )
     ]
     if len(rows) > _LISTED:
         rows = sorted(rows, key=lambda row: min(item.limit_um - abs(item.error_um) for item in row))[:_LISTED]

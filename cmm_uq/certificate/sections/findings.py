@@ -25,7 +25,6 @@ _TOLD = 8
 
 
 def sentences(withheld: Sequence[Withheld]) -> list[Text]:
-    """A sentence on each."""
     return [
         say(
             "{title} (probability {probability}) is not asserted: {why}.",
@@ -45,11 +44,10 @@ def other_periods(item: LeftOut) -> Text:
         "The positions do not tell its period; a correction would hold where was measured, not between. "
         "Periods that fit: {periods}.",
         periods=_listed(item.modes),
-    )  # fmt: skip
+    )
 
 
 def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
-    """For results.json."""
     return [
         {
             "effect": item.effect, "probability": item.probability, "why": item.why,
@@ -60,7 +58,6 @@ def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
 
 
 def periods_data(modes: Sequence[Mode]) -> list[dict[str, Any]]:
-    """Every period that fits, for results.json."""
     return [
         {
             "value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
@@ -97,9 +94,7 @@ VERDICTS: Mapping[str, Text] = {
 }
 
 
-def corrections(
-    simulated: Simulated, model: MeasurementModel, posterior: Posterior
-) -> dict[str, dict[str, Quantity]]:  # fmt: skip
+def corrections(simulated: Simulated, model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
     """What the effects that were estimated anew differ by from what the simulation contains, by effect and parameter."""
     found: dict[str, dict[str, Quantity]] = {}
     for (owner, name), (values, of) in model.reported(posterior.draws, simulated.refitted).items():
@@ -163,11 +158,7 @@ def contained(simulated: Simulated | None, effect: str) -> Text:
 def improvement_table(gain: Improvement, rms: Text, heldout: Text, note: Text) -> Table:
     """Rms in µm, and the gain in log predictive density.
 
-    Parameters
-    ----------
-    gain : that was found.
-    rms, heldout : names of the rows.
-    note : what was held out, and what ± is.
+    ``note``: what was held out, and what ± is.
     """
     rows = (
         (rms, *alike(gain.rms_before_um, gain.rms_after_um, decimals=2), unit("µm")),

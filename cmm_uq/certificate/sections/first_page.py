@@ -63,7 +63,6 @@ def subject_of(one: Stated) -> Text:
 
 
 def tolerances_of(result: Result) -> list[Stated]:
-    """Statements by tolerances."""
     return [one for one in result.verdicts if not one.by]
 
 

@@ -22,10 +22,7 @@ _WIDER = 1.05
 def noise_found(noise: Noise, *, heavy_tails: bool) -> Text:
     """What was found, what could not show, and what it does to the uncertainties.
 
-    Parameters
-    ----------
-    noise : as estimated.
-    heavy_tails : whether the diagnosis found heavy tails, which are no component of the estimate.
+    ``heavy_tails``: whether the diagnosis found heavy tails, which are no component of the estimate.
     """
     there = _found(noise)
     if heavy_tails:
@@ -50,7 +47,6 @@ def noise_found(noise: Noise, *, heavy_tails: bool) -> Text:
 
 
 def _found(noise: Noise) -> list[Text]:
-    """The components that are probably there."""
     there: list[Text] = []
     components = noise.components
     if noise.axes_apart > _SHOWN:
@@ -100,7 +96,6 @@ def posterior_section(result: Result) -> Section:
 
 
 def method(result: Result) -> Section:
-    """The measurement model and how it was solved."""
     ls, posterior, noise = result.least_squares, result.posterior, result.noise
     sigma, (low, high) = noise.coordinate.value, noise.coordinate.interval95
     spread = (
@@ -177,7 +172,7 @@ def _stated(result: Result) -> Text:
             "as of an error that all set-ups share and as of one that each has by itself, whichever is larger; it is not in "
             "residuals, noise, least squares and the diagnosis",
             causes=listed(causes),
-        )  # fmt: skip
+        )
     if not result.job.circumstances.uncertainty.of_artefact:
         return NOTHING
     return say("what is stated of temperature, expansion, alignment and fixturing changes none of the estimates here")

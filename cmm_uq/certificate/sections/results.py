@@ -35,13 +35,6 @@ def stated_table(
     what: Text = say("Quantity"),
     value: Text = say("Value"),
 ) -> Table:
-    """A row for each quantity.
-
-    Parameters
-    ----------
-    named : each quantity with its name.
-    what, value : headings of the names and of the values.
-    """
     columns = (
         Column(what, numeric=False), Column(value), Column(say("U")), Column(say("k")), Column(say("Unit"), numeric=False),
     )  # fmt: skip
@@ -126,10 +119,7 @@ Left = tuple[str, str, Text, Quantity]
 def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict] = ()) -> Section:
     """Every quantity and every decision of both, side by side; without blocks where the job names nothing as found.
 
-    Parameters
-    ----------
-    left : quantities as left; the group of the figures of the lengths is ``accuracy``.
-    verdicts : what is stated of conformity, as left.
+    ``left``: quantities as left; the group of the figures of the lengths is ``accuracy``.
     """
     title, found = say("As found and as left"), job.as_found
     if found is None:
@@ -224,9 +214,4 @@ def tolerance_sections(result: Result) -> list[Section]:
         if out
         else say("No parameter is out of tolerance."),
     )
-    return [
-        Section(
-            title,
-            (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), tuple(notes))),
-        )
-    ]
+    return [Section(title, (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), tuple(notes))))]

@@ -27,13 +27,7 @@ if TYPE_CHECKING:
 
 
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
-    """The artefact and the statement of traceability.
-
-    Parameters
-    ----------
-    rows : of the artefact; those without a value are left out.
-    further : blocks after the statement.
-    """
+    """The artefact and the statement of traceability."""
     read = tuple((say("Imported file"), recognised.sentence) for recognised in job.imported)
     facts = Facts(tuple((label, text) for label, text in (*rows, *_thermometers(job), *read, *_acquired(job)) if text))
     said = (Paragraph(claimed(job).statement),) if job.origin == MEASURED else ()
@@ -49,7 +43,6 @@ def _thermometers(job: Job) -> list[tuple[Text, Text]]:
 
 
 def _acquired(job: Job) -> list[tuple[Text, Text]]:
-    """By what the recording was taken live, and what it lacks."""
     if job.acquired is None:
         return []
     return [
@@ -61,12 +54,6 @@ def _acquired(job: Job) -> list[tuple[Text, Text]]:
 
 
 def artefact_rows(job: Job, otherwise: Text) -> list[tuple[Text, Text]]:
-    """Name and serial number.
-
-    Parameters
-    ----------
-    otherwise : what an artefact without a name is.
-    """
     artefact = job.facts.artefact
     return [
         (say("Artefact"), Verbatim(artefact.name) if artefact.name else otherwise),
@@ -175,7 +162,6 @@ def _certified(size: Size) -> tuple[Text, Text]:
 
 
 def _with_u(value: Text, of: Unit, u_um: float) -> Text:
-    """What a certificate gives, in full, with its U."""
     if not u_um:
         return say("{value} {unit}, no uncertainty stated", value=value, unit=of)
     return say("{value} {unit}, U = {U} µm (k = 2)", value=value, unit=of, U=significant(2 * u_um))

@@ -19,7 +19,6 @@ IMPLAUSIBLE = 4.0
 
 
 def warnings(result: Result) -> tuple[Text, ...]:
-    """All warnings, the gravest first."""
     return tuple(
         text
         for texts in (
@@ -40,19 +39,13 @@ class Sampled(Protocol):
     """What a sampling says of itself."""
 
     @property
-    def converged(self) -> bool:
-        """Whether its draws may be used."""
-        ...
+    def converged(self) -> bool: ...
 
     @property
-    def ess_min(self) -> float:
-        """Least effective sample size."""
-        ...
+    def ess_min(self) -> float: ...
 
     @property
-    def rhat_max(self) -> float:
-        """Largest R-hat."""
-        ...
+    def rhat_max(self) -> float: ...
 
 
 def not_converged(sampled: Sampled) -> list[Text]:

@@ -50,7 +50,6 @@ def by_columns(d: Diagnosis) -> Text:
 
 
 def _reading(value: float) -> Number:
-    """To three digits, or to whole units."""
     return signed(value, ".0f" if abs(value) >= 100 else ".3g")
 
 
@@ -68,7 +67,6 @@ def where_section(d: Diagnosis) -> Section:
 
 
 def where_sentence(d: Diagnosis) -> Text:
-    """The first place, and what shows the same."""
     if not d.where and (told := by_columns(d)):
         return told
     if not d.where:
@@ -96,13 +94,13 @@ def field_picture(d: Diagnosis) -> Plot | None:
         "{what}, as far as it was observed, over the scale readings; arrows are longer than their U, shaded is where the "
         "evidence lies.",
         what=what,
-    )  # fmt: skip
+    )
     count = say("{before} of {all} vectors are longer than their U before", before=beyond[0], all=len(expanded))
     if d.effects:
         count = say("{count} and {after} after", count=count, after=beyond[1])
     return residual_field_plot(
         field, expanded, titles=titles, shade=_shade(d.where), caption=told, alternative=say("{count}.", count=count)
-    )  # fmt: skip
+    )
 
 
 def _shade(where: tuple[Place, ...]) -> Shade | None:

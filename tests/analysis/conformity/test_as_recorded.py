@@ -33,7 +33,7 @@ UNDER = replace(recorded.STATED, uncertainty=recorded.STATED.uncertainty.model_c
 
 def decided(
     points: Points, facts: ArtefactFacts, under: Circumstances = UNDER, aside: Sequence[int] = (), **wish: Any
-) -> Statement:  # fmt: skip
+) -> Statement:
     """A recording screened as every command does, and decided."""
     kind = kind_named(facts.kind)
     assert kind is not None

@@ -32,7 +32,7 @@ X, Y, Z = np.eye(3).tolist()
 
 def test_every_sphere_is_counted_and_named_by_its_measurement() -> None:
     assert missing(SpherePlan(3, 90.0), [X, Y, Z], [X, Y], [X, Y, Z, Z]) == [
-        "3 points on the sphere of measurement 4 (2 recorded, 2 different)",
+        "3 points on the sphere of measurement 4 (2 recorded, 2 different)"
     ]
     assert missing(SpherePlan(3, 90.0), [X, Y, Z], [X, Y], copies=[1]) == []
 

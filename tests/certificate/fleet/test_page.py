@@ -83,11 +83,7 @@ def test_one_table_has_all_values_and_how_many_machines_matter() -> None:
     """Day 0 and the 365 days after it have one crossing each."""
     (row,) = tables(fleet_document(many()))[ALL_VALUES].rows
     assert row == ("Scale (a.ppm)", "3000", "0.5 ± 0.2 ppm/year", "40", "20", "365")
-    assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == (
-        "not compared",
-        "–",
-        "–",
-    )
+    assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == ("not compared", "–", "–")
 
 
 def test_ten_times_the_machines_make_neither_the_page_nor_the_terminal_longer() -> None:
