@@ -13,7 +13,7 @@ from cmm_uq.app.cli.terminal import BAD_INPUT, put, put_data, show
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.check import Checked
+    from cmm_uq.app.commands.jobs.check import Checked
     from cmm_uq.certificate.wording import Summary
 
 EXAMPLES = examples("check JOB", "check jobs/a jobs/b", "check JOB --clauses", "check JOB --json")

@@ -53,8 +53,7 @@ def command(
 
 
 def _show(found: WhatIsDue, files: dict[str, Path]) -> None:
-    from cmm_uq.app.cli.files_told import folder_of
-    from cmm_uq.app.cli.layout import COLOURS, HEADING
+    from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of
     from cmm_uq.certificate.pages.due import counts, due_row
 
     told, standing = counts(found.items, found.on, found.within)

@@ -47,8 +47,7 @@ def command(
 
 
 def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> None:
-    from cmm_uq.app.cli.files_told import folder_of
-    from cmm_uq.app.cli.layout import COLOURS, HEADING
+    from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of
     from cmm_uq.certificate.pages.history import summary_row, terminal_note
 
     machine = found.machine

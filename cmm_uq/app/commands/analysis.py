@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.app.commands.diagnosing import diagnosed, screened_model
 from cmm_uq.app.commands.estimation import (
@@ -82,7 +82,7 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
     causes = causes_of(model.artefact, job.circumstances)
     figures = accuracy(model, estimate, posterior, causes, seed)
     made = partial(kind.observing("reported"), job.facts.artefact, where=job.recording_path)
-    left_out = OutsideReadings.of(job.points, findings, made)
+    left_out = LeftOut.of(job.points, findings, made)
     statements = [
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, left_out)
         for i, wish in enumerate(job.facts.conformity, 1)

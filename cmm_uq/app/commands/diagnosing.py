@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
 from cmm_uq.analysis.conformity.consequences import consequences, costs
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.power import ALLOWED
@@ -135,7 +135,7 @@ def diagnosed(
     diagnosis = diagnose(
         model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made
     )  # fmt: skip
-    left_out = OutsideReadings.of(job.points, findings, made)
+    left_out = LeftOut.of(job.points, findings, made)
     changes = consequences(job, diagnosis, made, kind.tested, seed, left_out)
     unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
     plan = _next(job, diagnosis, observe, _wanted(job, diagnosis, unseen) if show else ())

@@ -17,7 +17,8 @@ from cmm_uq.analysis.screening.screened import Finding, gross_outliers
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction, NoiseEstimate
+from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction
+from cmm_uq.certificate.result import NoiseEstimate as Noise
 from cmm_uq.machine.model import Estimate, MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.display import of_last_digit
@@ -163,7 +164,7 @@ def noise(
     posterior: NoisyPosterior,
     stated_um: float | None,
     p_value: float | None,
-) -> NoiseEstimate:
+) -> Noise:
     """What the noise is, by component, and what it does to the uncertainties."""
     found = {
         name: Component(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
@@ -172,7 +173,7 @@ def noise(
     coordinate = found.pop("coordinate").size
     apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
     step = components.display / MICROMETRE
-    return NoiseEstimate(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
+    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
 
 
 def _wider(estimate: Estimate, posterior: Posterior) -> float:

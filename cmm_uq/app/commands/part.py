@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import PriorKnowledge
-from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
+from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
+from cmm_uq.analysis.conformity.limits import LimitDecision as Judged
+from cmm_uq.analysis.conformity.limits import Limits, judge
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED
 from cmm_uq.analysis.parts.budget import Budget, budget
 from cmm_uq.analysis.parts.by_comparison import compared
@@ -142,7 +143,7 @@ def part_found(
     )  # fmt: skip
 
 
-def _together(together: float, decided: Iterable[LimitDecision | None]) -> float | None:
+def _together(together: float, decided: Iterable[Judged | None]) -> float | None:
     """The probability that all limits are kept, beside those of each as they are told: with a prior, and rare tails."""
     each = [one.probability for one in decided if one is not None and one.probability is not None]
     return within_bounds(together, np.array(each)) if each else None
@@ -206,7 +207,7 @@ def _unseen(virtual: Virtual, shares: Budget) -> tuple[Unseen, ...]:
 
 def judged(
     job: PartJob, plan: Plan, errors: Floats, measured: Floats | None
-) -> tuple[LimitDecision | None, ...]:  # fmt: skip
+) -> tuple[Judged | None, ...]:  # fmt: skip
     """What follows from each characteristic's limits, by the job's rule.
 
     Where nothing was measured, what would be accepted is told of a value that is not corrected for its mean error. A zone is
@@ -222,7 +223,7 @@ def judged(
     ------
     CmmUqError : the rule needs a prior that these limits cannot have.
     """
-    found: list[LimitDecision | None] = []
+    found: list[Judged | None] = []
     for i, (facts, one) in enumerate(zip(job.facts.characteristic, plan.characteristics, strict=True)):
         if one.lower is None and one.upper is None:
             found.append(None)
@@ -241,7 +242,7 @@ def judged(
 
 def _prior(
     job: PartJob, facts: CharacteristicFacts, lower: float | None, upper: float | None, *, zone: bool
-) -> PriorKnowledge | None:  # fmt: skip
+) -> Known | None:  # fmt: skip
     """What is known of the value beforehand: about the middle of its limits, of a zone about zero."""
     given = job.facts.decision.prior
     if given is None:
@@ -255,7 +256,7 @@ def _prior(
     else:
         middle, limit = 0.5 * (lower + upper), 0.5 * (upper - lower)
     if given.share_of_limit is not None:
-        return PriorKnowledge(middle, given.share_of_limit * limit)
+        return Known(middle, given.share_of_limit * limit)
     if facts.asks.limits == "angles":
         raise CmmUqError("a prior in µm is none of an angle", where=where, fix="Give share_of_limit")
-    return PriorKnowledge(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))
+    return Known(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))

@@ -23,7 +23,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import ENGLISH, code_of
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.job import Job, Recorded
+from cmm_uq.jobs.recording_file import header, is_own
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents
 from cmm_uq.laboratory.records.facts import STANDING, Certificate, Value

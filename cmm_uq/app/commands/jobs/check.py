@@ -25,7 +25,8 @@ from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.notebook import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradictions, missing
+from cmm_uq.certificate.clauses import Requirement as Clause
+from cmm_uq.certificate.clauses import certifies, clauses, contradictions, missing
 from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
@@ -98,7 +99,7 @@ class Checked:
     job: str
     problems: tuple[Problem, ...]
     warnings: tuple[Problem, ...]
-    clauses: tuple[Requirement, ...] = ()
+    clauses: tuple[Clause, ...] = ()
     command: str = "report"
 
     @property
@@ -188,7 +189,7 @@ def check_read(job: Job) -> Checked:
     return Checked(job.facts.job.id, problems, _once(warnings), _clauses(job))
 
 
-def _clauses(job: Job | None) -> tuple[Requirement, ...]:
+def _clauses(job: Job | None) -> tuple[Clause, ...]:
     return clauses(job) if job is not None and certifies(job) else ()
 
 
