@@ -20,7 +20,7 @@ from cmm_uq.base.files.sentences import unit_of
 from cmm_uq.certificate.part.results_keys import PART_RESULTS
 from cmm_uq.certificate.proof.results import KEYS as PROOF
 from cmm_uq.certificate.proof.results import RATE
-from cmm_uq.certificate.results.keys import QUANTITY, RESULTS
+from cmm_uq.certificate.results_keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
 from cmm_uq.jobs.part import drawing_dmis, drawing_qif

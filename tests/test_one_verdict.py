@@ -25,42 +25,39 @@ import typer
 
 from cmm_uq.analysis.conformity.decision import decide
 from cmm_uq.analysis.conformity.statement import Decided, Statement
-from cmm_uq.app.cli.summary import conclude
-from cmm_uq.app.commands.batch_jobs import conforming
-from cmm_uq.app.commands.batch_table import COLUMNS, rows
+from cmm_uq.app.cli.printing import conclude
 from cmm_uq.app.commands.certificates.release import release
-from cmm_uq.app.commands.due import due_in
 from cmm_uq.app.commands.files import Written
-from cmm_uq.app.commands.fleet import _members
-from cmm_uq.app.commands.history import history_of
+from cmm_uq.app.commands.laboratory.batch_jobs import COLUMNS, conforming, rows
+from cmm_uq.app.commands.laboratory.due import due_in
+from cmm_uq.app.commands.laboratory.fleet import _members
+from cmm_uq.app.commands.laboratory.history import history_of
 from cmm_uq.app.serve.certificate_page import _notices
-from cmm_uq.app.serve.due import by_rule
-from cmm_uq.app.serve.overview import groups
+from cmm_uq.app.serve.overview import by_rule, groups
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.certificate import certified
+from cmm_uq.certificate import first_page
+from cmm_uq.certificate.compose import certified
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
+from cmm_uq.certificate.history_page import overview_of
+from cmm_uq.certificate.html import render_html
 from cmm_uq.certificate.outcome import Outcome, Page
-from cmm_uq.certificate.pages.history import overview_of
-from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.qif_file import qif
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.certificate.results.qif_file import qif
-from cmm_uq.certificate.sections import first_page
-from cmm_uq.certificate.sections.first_page import subject_of
+from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.summary import subject_of
 from cmm_uq.certificate.verify.consistent import check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.jobs.dcc import written
 from cmm_uq.jobs.reported import Reported
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.laboratory.due.fleet_found import OfValue
+from cmm_uq.laboratory.due.fleet import FleetValue
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.content import certificate_content
 from cmm_uq.laboratory.records.listing import outcomes_of, standing_of_all
 from cmm_uq.laboratory.records.store import Records
-from cmm_uq.laboratory.schedule.found import Found
+from cmm_uq.laboratory.schedule.jobs import REPORTED, JobFolder, JobOutcome
 from cmm_uq.laboratory.schedule.notices import of_results
-from cmm_uq.laboratory.schedule.work import REPORTED, Ended
 from tests.app.cli.laboratory import CHAIN, STATED
 from tests.app.cli.process import run
 from tests.artefacts.simulated import analysed
@@ -237,7 +234,7 @@ def test_batches_and_scheduled_runs(seed: int) -> None:
     events = {{"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}.get(said, "undecided")
               for said in of.stated.values() if said != "pass"}  # fmt: skip
     assert {one.event for one in notices} == events
-    ended = Ended(Found(Path(), Path(), "job", {}), REPORTED, results=data, notices=notices)
+    ended = JobOutcome(JobFolder(Path(), Path(), "job", {}), REPORTED, results=data, notices=notices)
     assert ended.line()["decisions"] == [*of.stated.values()]
     assert ended.code == (0 if of.overall in ("pass", "none") else 1)
 
@@ -303,7 +300,7 @@ def test_the_fleet(seed: int, recorded: Callable[[int], Records]) -> None:
     nothing = SimpleNamespace(estimates=SimpleNamespace(crossing=None))
     for name, rows_ in frame.groupby("name"):
         members = tuple(_members(rows_, {}, stated))
-        found = OfValue(name, name, "", members, nothing, np.ones(1, bool), 0)
+        found = FleetValue(name, name, "", members, nothing, np.ones(1, bool), 0)
         if said := of.stated.get(str(name)):
             assert found.beyond.tolist() == [said in ("fail", "conditional fail")]
 

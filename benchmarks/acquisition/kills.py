@@ -17,11 +17,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from cmm_uq.app.commands import acquire
+from cmm_uq.app.commands.laboratory import acquire
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.laboratory.live.folder import read_story, sessions_in
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import SYSTEM
+from cmm_uq.laboratory.live.instruments.source import SYSTEM, Reading
 from cmm_uq.laboratory.live.journal import lines_in
 
 EACH = 40

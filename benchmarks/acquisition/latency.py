@@ -22,16 +22,16 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.laboratory.live.folder import read_story
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
-from cmm_uq.laboratory.live.instruments.simulated.line import simulated
-from cmm_uq.laboratory.live.instruments.simulated.speakers import Lines
+from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
+from cmm_uq.laboratory.live.instruments.simulated_line import simulated
+from cmm_uq.laboratory.live.instruments.speakers import Lines
 from tests.laboratory.live.session import job_folder
 
 TERMINAL = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "110", "LINES": "45"}
 
 
 def main(points: int) -> None:
-    machine, dice = SimulatedMachine(), random.Random(0)
+    machine, dice = SimulatedIppServer(), random.Random(0)
     with ExitStack() as stack, tempfile.TemporaryDirectory() as folder:
         loggers = [stack.enter_context(simulated(Lines(), "socket")) for _ in range(3)]
         more = f'[[acquire.source]]\nname = "cmm"\nprofile = "ipp"\nport = "{machine.url}"\n'

@@ -14,8 +14,8 @@ import time
 from pathlib import Path
 
 from benchmarks.batch.measuring import Watch
-from cmm_uq.app.commands.batch import Asked, write_batch
-from cmm_uq.app.commands.batch_job import reported
+from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
+from cmm_uq.app.commands.laboratory.batch_job import reported
 from cmm_uq.app.commands.reading import read_job
 from tests.conftest import ROOT
 
@@ -56,7 +56,7 @@ def main() -> None:
                 made = copies(given.count * workers, Path(folder) / "jobs")
                 before = resource.getrusage(resource.RUSAGE_CHILDREN)
                 with Watch() as watch:
-                    found = write_batch([made], Path(folder) / "out", Asked(workers, results_only=results_only),
+                    found = write_batch([made], Path(folder) / "out", BatchOptions(workers, results_only=results_only),
                                         records=Path(folder) / "records.db")  # fmt: skip
                 after = resource.getrusage(resource.RUSAGE_CHILDREN)
             own = watch.cpu_s / found.written

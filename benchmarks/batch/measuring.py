@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Self
 from unittest import mock
 
-from cmm_uq.laboratory.schedule.talking import Talk
+from cmm_uq.laboratory.schedule.processes import WorkerProcess
 
 PAGE_MB = os.sysconf("SC_PAGE_SIZE") / 2**20 if hasattr(os, "sysconf") else 4096 / 2**20
 
@@ -42,9 +42,9 @@ class Watch:
         self._thread = threading.Thread(target=self._look, daemon=True)
 
     def __enter__(self) -> Self:
-        ask = Talk.ask
+        ask = WorkerProcess.ask
 
-        def timed(talk: Talk, number: int, task: object) -> object:
+        def timed(talk: WorkerProcess, number: int, task: object) -> object:
             began = time.monotonic()
             try:
                 return ask(talk, number, task)
@@ -52,7 +52,7 @@ class Watch:
                 with self._lock:
                     self.busy_s += time.monotonic() - began
 
-        self._timed = mock.patch.object(Talk, "ask", timed)
+        self._timed = mock.patch.object(WorkerProcess, "ask", timed)
         self._timed.start()
         self.began, self.cpu_s = time.monotonic(), time.process_time()
         self._thread.start()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.laboratory.schedule.talking import serve
+from cmm_uq.laboratory.schedule.processes import serve
 
 if __name__ == "__main__":
     serve(lambda setting: lambda number, task: None)

@@ -15,11 +15,10 @@ from pathlib import Path
 
 from benchmarks.batch.cluster import local_cluster
 from benchmarks.batch.measuring import Watch
-from cmm_uq.app.commands import batch_asked
-from cmm_uq.app.commands.batch import Asked, write_batch
+from cmm_uq.app.commands.laboratory import batch as batch_asked
+from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
 from cmm_uq.laboratory.schedule.cluster import cluster_answers
-from cmm_uq.laboratory.schedule.pool import answers
-from cmm_uq.laboratory.schedule.talking import Work
+from cmm_uq.laboratory.schedule.processes import WorkerTask, answers
 from tests.laboratory.schedule.small_jobs import small_job
 
 NOTHING, CANNED = "benchmarks.batch.nothing", "tests.laboratory.schedule.canned"
@@ -27,7 +26,7 @@ NOTHING, CANNED = "benchmarks.batch.nothing", "tests.laboratory.schedule.canned"
 
 def nothing(count: int, workers: int, address: str | None) -> None:
     """Tasks that do nothing."""
-    work, tasks = Work(NOTHING, None), ((i, None) for i in range(count))
+    work, tasks = WorkerTask(NOTHING, None), ((i, None) for i in range(count))
     found = answers(work, tasks, workers) if address is None else cluster_answers(address, work, tasks, count)
     with Watch(0.5) as watch:
         done = sum(one.failure is None for one in found)
@@ -42,7 +41,7 @@ def jobs(what: str, count: int, workers: int, address: str | None, folder: Path,
             small_job(made / f"{i // 1000:03d}", f"plane-{i:06d}", shift_um=0.001 * (i % 997))
     if what == "around":
         batch_asked.PROGRAM = CANNED
-    asked = Asked(workers if address is None else None, address, results_only=True, resume=True, seconds=3600.0)
+    asked = BatchOptions(workers if address is None else None, address, results_only=True, resume=True, seconds=3600.0)
     out = folder / "reports"
     with Watch() as watch:
         found = write_batch(

@@ -21,7 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 from benchmarks.scheduled.scheduler import JOB, begin
-from cmm_uq.laboratory.schedule.state import InFolder
+from cmm_uq.laboratory.schedule.state import FolderState
 from tests.laboratory.schedule.servers import Taken, web_server
 
 PAUSE_S = 0.004
@@ -41,7 +41,7 @@ def begun(run: subprocess.Popen[bytes]) -> None:
 
 def judged(root: Path, taken: Taken) -> dict[str, int]:
     """What is there in the end."""
-    state, jobs = InFolder(root / "reports"), sorted((root / "jobs").iterdir())
+    state, jobs = FolderState(root / "reports"), sorted((root / "jobs").iterdir())
     whole = [job.name for job in jobs if state.reported(job.name) is not None]
     failing = {job.name for job in jobs if (job / "points.csv").read_text() == "fail"}
     keys = Counter(headers["Idempotency-Key"] for headers, _ in taken.requests)

@@ -18,7 +18,7 @@ from collections import Counter
 from pathlib import Path
 
 from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.schedule.state import InRecords
+from cmm_uq.laboratory.schedule.state import RecordsState
 from tests.conftest import ROOT
 from tests.laboratory.schedule.servers import Taken, web_server
 
@@ -54,7 +54,7 @@ def main(kills: int = 40, count: int = 3, seed: int = 1) -> None:
         again = start(jobs).wait()
         out = jobs / "reports"
         with open_records(out / "records.db") as records:
-            state = InRecords(records, out)
+            state = RecordsState(records, out)
             reports = Counter(entry.data["results_sha256"] for entry in records.entries(kind="report"))
             sent = Counter(entry.data["key"] for entry in records.entries(kind="sent"))
             whole = sum(state.reported(f"job-{i}") is not None for i in range(count))

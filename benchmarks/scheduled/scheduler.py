@@ -16,12 +16,11 @@ from pathlib import Path
 
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.schedule.channels import channels
-from cmm_uq.laboratory.schedule.found import Found
+from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.outbox import Outbox
-from cmm_uq.laboratory.schedule.run import Clock, Run
+from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.settings import RunTable, ScheduleFile
-from cmm_uq.laboratory.schedule.state import InFolder
-from cmm_uq.laboratory.schedule.work import Work
+from cmm_uq.laboratory.schedule.state import FolderState
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
 
@@ -38,12 +37,12 @@ def begin(root: Path, count: int, failing: int) -> None:
 def main(root: Path, port: int, pause_s: float) -> int:
     """One run; its exit code."""
     out = root / "reports"
-    state = InFolder(out)
+    state = FolderState(out)
     hook = {"url": f"http://localhost:{port}/", "timeout_s": 5.0}
-    clock = Clock(lambda: dt.datetime.now(dt.UTC), time.monotonic, time.sleep)
+    clock = RunClock(lambda: dt.datetime.now(dt.UTC), time.monotonic, time.sleep)
     outbox = Outbox(out, channels(ScheduleFile.model_validate({"webhook": [hook]}), root), state, clock.moment)
 
-    def report(job: Found) -> bytes:
+    def report(job: JobFolder) -> bytes:
         inputs = {name: (job.folder / name).read_bytes() for name in ("job.toml", "points.csv")}
         hashes = {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
         decided = [{"standard": "S", "decision": inputs["points.csv"].decode()}]
@@ -57,9 +56,9 @@ def main(root: Path, port: int, pause_s: float) -> int:
         return content
 
     print("begun", flush=True)
-    work = Work(out, state, report, outbox.add)
+    work = JobReporting(out, state, report, outbox.add)
     settings = RunTable(quiet_s=0.0, back_off_s=0.1)
-    return Run(
+    return ScheduledRun(
         [root / "jobs"], settings, work, outbox, lambda on: (), lambda line: None, lambda text: None, clock
     ).through()
 

@@ -8,8 +8,7 @@ from functools import cache
 import numpy as np
 
 from cmm_uq.laboratory.due.crossing import DAYS, Crossings
-from cmm_uq.laboratory.due.fleet import Estimates, Member, Usual, fit_fleet
-from cmm_uq.laboratory.due.fleet_found import FleetFound, OfValue, judged
+from cmm_uq.laboratory.due.fleet import Estimates, FleetMember, FleetResult, FleetValue, UsualRate, fit_fleet, judged
 from tests.laboratory.due.drifting import FIRST, machine
 
 LIMIT = 4.0
@@ -17,22 +16,23 @@ BEYOND, CROSSING, ODD, MODELS = 20, 2000, 40, 30
 
 
 @cache
-def alone() -> FleetFound:
+def alone() -> FleetResult:
     """One machine, all its certificates of one day, and no limit."""
-    only = Member("7", "", "", machine([0, 0], [1.0, 1.2]))
+    only = FleetMember("7", "", "", machine([0, 0], [1.0, 1.2]))
     return judged([("a.ppm", "Scale", "ppm", (only,), fit_fleet([only]), 2)], 1)
 
 
 @cache
-def two() -> FleetFound:
+def two() -> FleetResult:
     """One machine within its limit, one beyond it."""
     both = tuple(
-        Member(name, "", "", machine([0, 1, 2], [level] * 3, 0.1), LIMIT) for name, level in (("in", 0.0), ("out", 9.0))
+        FleetMember(name, "", "", machine([0, 1, 2], [level] * 3, 0.1), LIMIT)
+        for name, level in (("in", 0.0), ("out", 9.0))
     )
     return judged([("a.ppm", "Scale", "ppm", both, fit_fleet(both), 0)], 1)
 
 
-def many(count: int = 3000) -> FleetFound:
+def many(count: int = 3000) -> FleetResult:
     """Machines 0, 1, 2, … whose last certificates are all of day 0, ordinal ``FIRST``.
 
     The first twenty are beyond the limit, each farther than the one before; the others up to number 1999 cross it, number
@@ -41,7 +41,7 @@ def many(count: int = 3000) -> FleetFound:
     """
     of = two().values[0]
     seen = machine([-1, 0], [0.0, 0.0])
-    members = tuple(Member(f"{i}", f"{i % MODELS}", "Hall", seen, LIMIT) for i in range(count))
+    members = tuple(FleetMember(f"{i}", f"{i % MODELS}", "Hall", seen, LIMIT) for i in range(count))
     at = np.arange(count)
     probability = np.zeros((count, len(DAYS)))
     probability[:CROSSING, 1:] = 0.999
@@ -51,12 +51,12 @@ def many(count: int = 3000) -> FleetFound:
     one = np.ones(count)
     estimates = Estimates(
         one, one, one, one, 0.1 / (1.0 + at), Crossings(last, DAYS, probability, level, one, one, one)
-    )
+    )  # fmt: skip
     usual = (
-        Usual("fleet", "", count, 0.5, 0.1, 0.3, 0.7),
-        *(Usual("model", f"{m}", m, 0.5, 0.1, 0.3, 0.7) for m in range(1, MODELS + 1)),
-        Usual("place", "Hall", count, 0.5, 0.1, 0.3, 0.7),
+        UsualRate("fleet", "", count, 0.5, 0.1, 0.3, 0.7),
+        *(UsualRate("model", f"{m}", m, 0.5, 0.1, 0.3, 0.7) for m in range(1, MODELS + 1)),
+        UsualRate("place", "Hall", count, 0.5, 0.1, 0.3, 0.7),
     )
     names = tuple(member.machine for member in members)
     fleet = replace(of.fleet, estimates=estimates, usual=usual, machines=names)
-    return FleetFound((OfValue(of.name, of.quantity, of.unit, members, fleet, at < count - ODD, 0),), 1)
+    return FleetResult((FleetValue(of.name, of.quantity, of.unit, members, fleet, at < count - ODD, 0),), 1)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.pdf import render_pdf
 from tests.conftest import ROOT
 
 CLOCKS = {
@@ -29,14 +29,14 @@ READ = {
     "cmm_uq/app/commands/jobs/new.py": {"now"},
     "cmm_uq/app/commands/new_part.py": {"now"},
     "cmm_uq/laboratory/live/instruments/source.py": {"time_ns"},
-    "cmm_uq/laboratory/live/instruments/simulated/line.py": {"monotonic"},
+    "cmm_uq/laboratory/live/instruments/simulated_line.py": {"monotonic"},
     "cmm_uq/laboratory/records/entries.py": {"now"}, "cmm_uq/app/cli/records.py": {"now"},
-    "cmm_uq/app/commands/due.py": {"now"}, "cmm_uq/app/commands/history.py": {"now"},
-    "cmm_uq/app/commands/schedule.py": {"now"}, "cmm_uq/app/commands/scheduled.py": {"now"},
+    "cmm_uq/app/commands/laboratory/due.py": {"now"}, "cmm_uq/app/commands/laboratory/history.py": {"now"},
+    "cmm_uq/app/commands/laboratory/schedule.py": {"now"}, "cmm_uq/app/commands/laboratory/scheduled.py": {"now"},
     "cmm_uq/laboratory/schedule/run.py": {"now"}, "cmm_uq/laboratory/schedule/outbox.py": {"now", "time"},
-    "cmm_uq/laboratory/schedule/work.py": {"monotonic"}, "cmm_uq/laboratory/schedule/locks.py": {"monotonic"},
+    "cmm_uq/laboratory/schedule/jobs.py": {"monotonic"}, "cmm_uq/laboratory/schedule/locks.py": {"monotonic"},
     "cmm_uq/laboratory/schedule/cluster.py": {"monotonic"},
-    "cmm_uq/certificate/sign/clock.py": {"now"}, "cmm_uq/app/serve/checking.py": {"now"},
+    "cmm_uq/certificate/sign/clock.py": {"now"}, "cmm_uq/app/serve/view.py": {"now"},
     "cmm_uq/app/serve/server.py": {"monotonic"},
 }  # fmt: skip
 """How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job

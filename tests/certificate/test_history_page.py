@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.pages.due import due_document
-from cmm_uq.certificate.pages.history import history_data, history_document, meets, notes, overview_of, terminal_note
-from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.due_page import due_document
+from cmm_uq.certificate.history_page import history_document, overview_of
+from cmm_uq.certificate.history_words import history_data, meets, notes, terminal_note
+from cmm_uq.certificate.html import render_html
 from cmm_uq.laboratory.due.crossing import Crossing, crossing
-from cmm_uq.laboratory.due.due import Due, Known, artefact_due, machine_due
+from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import Rule
-from cmm_uq.laboratory.records import ArtefactRow
+from cmm_uq.laboratory.records.facts import ArtefactRow
 from tests.certificate.saying import strangers
 from tests.laboratory.due.made import FIRST, MACHINE, certificate, series, value
 
@@ -36,12 +37,14 @@ def history(*numbers: float, limit: float | None = 8.0) -> MachineHistory:
     return machine_history(MACHINE, made, {"scale_x.ppm": series(days, numbers, 0.5, limit=limit)}, ON)
 
 
-def items() -> list[Due]:
+def items() -> list[DueItem]:
     artefact = ArtefactRow("BB-7", "ballbar", "PTB 1", "PTB", None, dt.date(2026, 1, 1))
     rules = (None, {"every_months": 6}, {"method": "A3"}, {"method": "staircase"}, {"method": "control chart"})
-    known = [Known(MACHINE, Rule.of(rule), [certificate(FIRST)], False, ON) for rule in rules]
+    known = [CalibrationRecord(MACHINE, Rule.of(rule), [certificate(FIRST)], False, ON) for rule in rules]
     checked = [certificate(FIRST), certificate(FIRST + dt.timedelta(days=30), value(9.0), interim=True)]
-    made = [machine_due(one, {"BB-7": artefact}, ON, list) for one in [*known, Known(MACHINE, Rule(), checked)]]
+    made = [
+        machine_due(one, {"BB-7": artefact}, ON, list) for one in [*known, CalibrationRecord(MACHINE, Rule(), checked)]
+    ]
     return [*made, artefact_due(artefact)]
 
 

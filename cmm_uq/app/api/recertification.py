@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.due import WhatIsDue, what_is_due, write_due
-from cmm_uq.app.commands.history import history_of, write_history
+from cmm_uq.app.commands.laboratory.due import WhatIsDue, what_is_due, write_due
+from cmm_uq.app.commands.laboratory.history import history_of, write_history
 from cmm_uq.base.notebook import html_table
 from cmm_uq.laboratory.due.drift import PARTS
 from cmm_uq.laboratory.due.history import MachineHistory
@@ -53,7 +53,7 @@ class DueList:
         return f"<Due on {self.found.on.isoformat()}: {counts}>"
 
     def _repr_html_(self) -> str:
-        from cmm_uq.certificate.pages.due import due_row
+        from cmm_uq.certificate.due_page import due_row
 
         rows = [due_row(one, self.found.on, self.found.within) for one in self.found.items]
         return html_table(repr(self)[1:-1], ("Due", "State", "", "What", "Why"), rows)
@@ -127,7 +127,7 @@ class History:
         return f"<History of {found.machine.serial}: {len(found.certificates)} recordings, {len(found.values)} values>"
 
     def _repr_html_(self) -> str:
-        from cmm_uq.certificate.pages.history import HEADINGS, value_row
+        from cmm_uq.certificate.history_words import HEADINGS, value_row
 
         return html_table(repr(self)[1:-1], HEADINGS, [value_row(self.found, one) for one in self.found.values])
 

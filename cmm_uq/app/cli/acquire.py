@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Quiet, examples, job_folders
+from cmm_uq.app.cli.completion import job_folders
+from cmm_uq.app.cli.deferred import defer_scipy
+from cmm_uq.app.cli.options import Quiet, examples
 from cmm_uq.base.errors import CmmUqError
 
 EXAMPLES = examples("acquire JOB", "acquire examples/plan-ballbar --simulate --out trial", "acquire JOB --plain")
@@ -45,9 +47,9 @@ def command(
 
     Type help for the words; the same command goes on where the last session ended.
     """
+    defer_scipy()
     from cmm_uq.app.cli.operating import operated
-    from cmm_uq.app.commands.acquire import begin_acquisition
-    from cmm_uq.app.commands.acquire_trial import write_trial
+    from cmm_uq.app.commands.laboratory.acquire import begin_acquisition, write_trial
 
     if out is not None and not simulate:
         raise CmmUqError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from cmm_uq.laboratory.live.instruments.draft import numbers_in, range_of
+from cmm_uq.laboratory.live.instruments.library import numbers_in, range_of
 
 Asked = tuple[str, dict[int, str], dict[str, tuple[float, float]], str, str, dict[str, str | int]]
 

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, job_folders, out
-from cmm_uq.app.cli.summary import screen_layout
-from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, progress, put_data, show
+from cmm_uq.app.cli import BAD_INPUT, NOT_CONFORMING
+from cmm_uq.app.cli.completion import job_folders
+from cmm_uq.app.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
+from cmm_uq.app.cli.printing import layout, put_data, show
+from cmm_uq.app.cli.progress import shown
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.batch import Batch
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.app.commands.laboratory.batch import Batch
+    from cmm_uq.certificate.in_short import Summary
 
 EXAMPLES = examples(
     "batch jobs/2026",
@@ -74,15 +76,16 @@ def command(
     records: Records = None,
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.batch import Asked, write_batch
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.laboratory.batch import BatchOptions as Asked
+        from cmm_uq.app.commands.laboratory.batch import write_batch
 
         asked = Asked(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
         batch = write_batch(folders, out, asked, parquet=parquet, stage=stage, records=records)
     if json:
         put_data(batch.as_data())
     elif not quiet:
-        show(screen_layout(verbose=verbose).screen(_summary(batch, verbose=verbose)))
+        show(layout(verbose=verbose).screen(_summary(batch, verbose=verbose)))
     if batch.failed:
         raise typer.Exit(BAD_INPUT)
     if strict and batch.not_conforming:
@@ -92,8 +95,7 @@ def command(
 def _summary(batch: Batch, *, verbose: bool) -> Summary:
     """What came of it, and which jobs failed."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.in_short import Summary, Verdict
     from cmm_uq.laboratory.schedule.progress import duration, pace
 
     counted: list[Text] = [say("{count} written", count=batch.written)]

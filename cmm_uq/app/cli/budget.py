@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Settled, Verbose, examples, out, toml_files
-from cmm_uq.app.cli.summary import show_summary
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_json
+from cmm_uq.app.cli import NOT_CONFORMING
+from cmm_uq.app.cli.completion import toml_files
+from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Settled, Verbose, examples, out
+from cmm_uq.app.cli.printing import put_json, show_summary
+from cmm_uq.app.cli.progress import shown
 from cmm_uq.base.languages.language import ENGLISH
 
 if TYPE_CHECKING:
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.in_short import Summary
     from cmm_uq.maths.uncertainty.evaluation import Evaluation
 
 EXAMPLES = examples("budget model.toml", "budget model.toml --seed 2 --out DIR", "budget model.toml --json --strict")
@@ -38,7 +40,7 @@ def command(
     language: Language = None,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.budget import write_budget
         from cmm_uq.app.commands.files import silent
 
@@ -54,8 +56,7 @@ def command(
 def _summary(evaluation: Evaluation) -> Summary:
     """Each output as a certificate could state it; in full as the row of a table too."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.in_short import Summary, Verdict
     from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
 
     names = tuple(evaluation.stated)

@@ -7,15 +7,17 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Force, Json, Quiet, ReadRecords, Seed, Verbose, examples
-from cmm_uq.app.cli.summary import show_summary
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data
+from cmm_uq.app.cli import NOT_CONFORMING
+from cmm_uq.app.cli.options import Force, Json, Quiet, Seed, Verbose, examples
+from cmm_uq.app.cli.printing import put_data, show_summary
+from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.recording_options import Records
 
 EXAMPLES = examples("fleet", "fleet --name scale_x.ppm --out DIR", "fleet --records lab.db --json")
 
 
 def command(
-    records: ReadRecords = None,
+    records: Records = None,
     name: Annotated[
         list[str] | None,
         typer.Option(
@@ -34,18 +36,18 @@ def command(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.files import silent
-        from cmm_uq.app.commands.fleet import fleet, write_fleet
+        from cmm_uq.app.commands.laboratory.fleet import fleet, write_fleet
 
         found = fleet(records, name or (), seed=seed, stage=stage or silent)
         files = {} if out is None else write_fleet(found, out, force=force)
     if json:
-        from cmm_uq.certificate.pages.fleet_summary import fleet_data
+        from cmm_uq.certificate.fleet.data import fleet_data
 
         put_data(fleet_data(found))
     elif not quiet:
-        from cmm_uq.certificate.pages.fleet_summary import fleet_summary
+        from cmm_uq.certificate.fleet.summary import fleet_summary
 
         show_summary(fleet_summary(found), files, verbose=verbose)
     if strict and found.outsiders:

@@ -9,8 +9,10 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.options import Json, examples, profiles
-from cmm_uq.app.cli.terminal import put_data, say
+from cmm_uq.app.cli.completion import profiles
+from cmm_uq.app.cli.deferred import defer_scipy
+from cmm_uq.app.cli.options import Json, examples
+from cmm_uq.app.cli.printing import put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 app = typer.Typer(
@@ -172,7 +174,8 @@ def new(
 ) -> None:
     """Write a profile from an example line; on a terminal it asks for what no option says."""
     from cmm_uq.app.commands.laboratory.instruments import write_profile
-    from cmm_uq.laboratory.live.instruments.draft import Drafted, range_of
+    from cmm_uq.laboratory.live.instruments.library import ProfileDraft as Drafted
+    from cmm_uq.laboratory.live.instruments.library import range_of
 
     settings = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
     places = {_whole(text, name): name for name, text in _pairs(quantity, "--quantity", "temp_c=1")}
@@ -208,6 +211,7 @@ def simulate(
 
 
 def _attempt(profile: str, port: str, job: Path | None) -> Any:
+    defer_scipy()
     from cmm_uq.app.commands.laboratory.instruments import Attempt
 
     return Attempt(profile, port, job)

@@ -9,15 +9,15 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.cli.terminal import on_terminal, say, say_now
+from cmm_uq.app.cli.printing import on_terminal, say, say_now
 from cmm_uq.base.output.interruption import speaking
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from cmm_uq.app.commands.acquire import Acquisition
+    from cmm_uq.app.commands.laboratory.acquire import Acquisition
     from cmm_uq.base.messages import Text
-    from cmm_uq.laboratory.live.view import View
+    from cmm_uq.laboratory.live.screen import SessionView as View
 
 PROMPT = "> "
 _LINES = 12
@@ -39,7 +39,7 @@ def operated(acquisition: Acquisition, *, plain: bool, quiet: bool) -> None:
     ------
     OutputError : the disk fails, or nobody takes what is said.
     """
-    from cmm_uq.laboratory.live.running import Line
+    from cmm_uq.laboratory.live.running import OperatorLine as Line
 
     def typed(text: str | None) -> None:
         acquisition.items.put(Line(text))

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Verbose, examples, job_folders, out
-from cmm_uq.app.cli.summary import conclude
-from cmm_uq.app.cli.terminal import progress, say
+from cmm_uq.app.cli.completion import job_folders
+from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Verbose, examples, out
+from cmm_uq.app.cli.printing import conclude, say
+from cmm_uq.app.cli.progress import shown
 
 EXAMPLES = examples(
     "prove examples/iota-1102-20C", "prove JOB --cases 400 --workers 8", "prove examples/plan-ballbar --strict"
@@ -52,10 +53,10 @@ def command(
     language: Language = None,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.prove import write_proof
         from cmm_uq.app.commands.proving import Asked
-        from cmm_uq.laboratory.schedule.pool import processes
+        from cmm_uq.laboratory.schedule.processes import processes
 
         asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
         written = write_proof(

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
+from cmm_uq.app.cli import NOT_CONFORMING
 from cmm_uq.app.cli.options import Json, Quiet, Records, examples
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, helped, put_data, say
+from cmm_uq.app.cli.printing import helped, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 app = typer.Typer(
@@ -89,7 +90,7 @@ def import_reports(
     json: Json = False,
 ) -> None:
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
-    from cmm_uq.app.commands import records_kept
+    from cmm_uq.app.commands.laboratory import records as records_kept
     from cmm_uq.laboratory.records import open_records
 
     reports = records_kept.reports_in(folders)  # told before records are made for them
@@ -163,7 +164,7 @@ def retain(
 
     Entries are never removed. Only files that are as they were written are; years count from the day of the measurement.
     """
-    from cmm_uq.app.commands.records_kept import remove_retained, retention
+    from cmm_uq.app.commands.laboratory.records import remove_retained, retention
     from cmm_uq.laboratory.records import open_records
 
     with open_records(records, read_only=dry_run) as opened:

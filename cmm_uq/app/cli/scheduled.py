@@ -9,11 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.cli.terminal import put_json
+from cmm_uq.app.cli.printing import put_json
 from cmm_uq.base.errors import OutputError
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.scheduled import Asked
+    from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions as Asked
 
 
 STANDARD_OUTPUT = Path("-")
@@ -33,7 +33,7 @@ def run(asked: Asked, lines: Path | None) -> int:
     CmmUqError : the schedule is wrong.
     OutputError : the records cannot be written; or the lines could not be, after all else was done.
     """
-    from cmm_uq.app.commands.scheduled import run_scheduled
+    from cmm_uq.app.commands.laboratory.scheduled import run_scheduled
 
     failed: list[OutputError] = []
     write = _nowhere if lines is None else _printed if lines == STANDARD_OUTPUT else _added_to(lines)

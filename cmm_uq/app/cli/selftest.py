@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.app.cli import NOT_CONFORMING
 from cmm_uq.app.cli.options import Json, Verbose, examples
-from cmm_uq.app.cli.summary import screen_layout
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, show
+from cmm_uq.app.cli.printing import layout, put_data, show
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cmm_uq.base.messages import Text
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.in_short import Summary, Verdict
     from cmm_uq.maths.uncertainty.selftest import Outcome
 
 EXAMPLES = examples("selftest", "selftest --verbose > selftest.txt", "selftest --json")
@@ -38,7 +37,7 @@ def command(
         figures = [{**asdict(one), "got": float(one.got), "passed": bool(one.passed)} for one in outcomes]
         put_data({"schema": SCHEMA, "program": f"cmm-uq {__version__}", "passed": passed, "figures": figures})
     else:
-        show(screen_layout(verbose=verbose).screen(_summary(outcomes, quiet=quiet, verbose=verbose)))
+        show(layout(verbose=verbose).screen(_summary(outcomes, quiet=quiet, verbose=verbose)))
     if passed < len(outcomes):
         raise typer.Exit(NOT_CONFORMING)
 
@@ -47,7 +46,7 @@ def _summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool) -> Summ
     """The count, what fails or all figures, and how many there are of each source."""
     from cmm_uq import __version__
     from cmm_uq.base.messages import NOTHING, Verbatim, say
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.in_short import Summary
     from cmm_uq.maths.uncertainty.selftest import as_text
 
     passed = sum(outcome.passed for outcome in outcomes)
@@ -70,6 +69,6 @@ def _summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool) -> Summ
 
 
 def _verdict(what: Text, passed: bool, remarks: tuple[Text, ...] = ()) -> Verdict:
-    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.in_short import Verdict
 
     return Verdict("PASS", "good", what, remarks) if passed else Verdict("FAIL", "bad", what, remarks)

@@ -7,15 +7,16 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Quiet, ReadRecords, examples
-from cmm_uq.app.cli.terminal import say_now
+from cmm_uq.app.cli.options import Quiet, examples
+from cmm_uq.app.cli.printing import say_now
+from cmm_uq.app.cli.recording_options import Records
 from cmm_uq.base.output.interruption import keeping
 
 EXAMPLES = examples("serve", "serve --records lab.db --open", "serve --records postgresql://lab@db/records --port 9000")
 
 
 def command(
-    records: ReadRecords = None,
+    records: Records = None,
     port: Annotated[
         int, typer.Option(help="Port to listen on; 0 takes a free one.", metavar="N", min=0, max=65535)
     ] = 8765,
@@ -38,10 +39,14 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
-    from cmm_uq.app.serve import Server, Site
+    from cmm_uq.app.serve.server import RecordsServer
+    from cmm_uq.app.serve.site import Site
 
     site = Site(records)
-    with Server(site.answer, bind=bind, port=port, names=name or ()) as server, keeping(lambda: "the page is closed"):
+    with (
+        RecordsServer(site.answer, bind=bind, port=port, names=name or ()) as server,
+        keeping(lambda: "the page is closed"),
+    ):
         if not quiet:
             say_now(f"{site.place} at {server.url} until Ctrl-C")
             if not server.alone:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
-from cmm_uq.analysis.conformity.limits import LimitDecision as Judged
-from cmm_uq.analysis.conformity.limits import Limits, judge
+from cmm_uq.analysis.conformity.limits import Judged, Limits, judge
+from cmm_uq.analysis.conformity.risk import Known
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED
 from cmm_uq.analysis.parts.budget import Budget, budget
 from cmm_uq.analysis.parts.by_comparison import compared

@@ -54,7 +54,7 @@ def with_drift(
         found = aged(state, on)
         return Aged(found, _not_known(found))
     if kept is None:
-        from cmm_uq.app.commands.history import history_of
+        from cmm_uq.app.commands.laboratory.history import history_of
 
         kept = part_history.kept(history_of(serial, records, on=on), since)
     known = part_history.known_of(kept)

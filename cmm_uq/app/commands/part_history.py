@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.drift import History, history
+from cmm_uq.laboratory.due.drift import DriftHistory, history
+from cmm_uq.laboratory.due.drift_filter import change_since
 from cmm_uq.laboratory.due.history import MachineHistory
-from cmm_uq.laboratory.due.since import change_since
-from cmm_uq.laboratory.records import Series
+from cmm_uq.laboratory.records.facts import Series
 
 FILE = "machine-records/history.json"
 """By its name among the inputs of a part's report."""
@@ -46,7 +46,7 @@ class Known:
             return None
         series, adjusted_after = self.values[name]
         try:
-            of: History = history(series, adjusted_after)
+            of: DriftHistory = history(series, adjusted_after)
             return change_since(of, days, limit=series.limit)
         except CmmUqError:
             return None

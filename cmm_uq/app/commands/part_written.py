@@ -13,17 +13,17 @@ from cmm_uq.base.languages.language import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
+from cmm_uq.certificate.fonts import fonts_of
 from cmm_uq.certificate.origin import file_name
-from cmm_uq.certificate.plots.style import fonts_of
-from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
-from cmm_uq.certificate.results.provenance import Behind, provenance_of
+from cmm_uq.certificate.provenance import FILE as PROVENANCE
+from cmm_uq.certificate.provenance import Behind, provenance_of
 from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.part.job import PartJob, read_part
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Document
+    from cmm_uq.certificate.in_short import Summary
     from cmm_uq.certificate.part.found import PartFound
-    from cmm_uq.certificate.wording import Summary
 
 DOCUMENTS = ("part.html", "part.pdf")
 COMMAND = "part"
@@ -174,10 +174,10 @@ def contents_of(
     ------
     CmmUqError : an input has the name of a file that is written.
     """
+    from cmm_uq.certificate.as_json import as_json
+    from cmm_uq.certificate.html import render_html
     from cmm_uq.certificate.part.results import part_results
-    from cmm_uq.certificate.render.html import render_html
-    from cmm_uq.certificate.render.pdf import render_pdf
-    from cmm_uq.certificate.results.plain import as_json
+    from cmm_uq.certificate.pdf import render_pdf
 
     job = found.job
     if RESULTS in job.inputs:
@@ -204,10 +204,10 @@ def _behind(found: PartFound) -> Behind:
 
 def document_of(found: PartFound) -> Document:
     """The page, in the job's language, marked where nobody measured."""
-    from cmm_uq.certificate.document import translated as said
+    from cmm_uq.certificate.in_language import said
+    from cmm_uq.certificate.lettering import lettered_in
     from cmm_uq.certificate.origin import marked_as
     from cmm_uq.certificate.part.page import part_document
-    from cmm_uq.certificate.plots.style import lettered_in
 
     facts = found.job.facts.job
     with lettered_in(facts.language):

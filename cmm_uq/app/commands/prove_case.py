@@ -25,7 +25,7 @@ from cmm_uq.laboratory.proving.cases import Case
 from cmm_uq.laboratory.proving.design import Design
 from cmm_uq.laboratory.proving.judged import REFUSED
 from cmm_uq.laboratory.proving.running import Record
-from cmm_uq.laboratory.schedule.talking import serve
+from cmm_uq.laboratory.schedule.processes import serve
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.quantity import Quantity

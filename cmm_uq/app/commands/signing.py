@@ -23,7 +23,7 @@ from cmm_uq.certificate.sign import (
     trust_of,
 )
 from cmm_uq.certificate.sign.token import SCHEME, signer_of_token
-from cmm_uq.laboratory.schedule import credentials
+from cmm_uq.laboratory.schedule import channels as credentials
 
 PASSPHRASE, PASSPHRASE_FILE = "CMM_UQ_SIGN_PASSPHRASE", "CMM_UQ_SIGN_PASSPHRASE_FILE"
 
@@ -81,7 +81,7 @@ class Signing:
                 return sign_xml(data, self.signer, at=self.at, where=name)
             if not name.endswith(".pdf"):
                 return data
-            from cmm_uq.certificate.render.pdf import same, seal
+            from cmm_uq.certificate.seal import same, seal
 
             told = (Verbatim(str(laboratory.get(key) or "")) for key in ("name", "accreditation"))
             seen = seal(self.signer, self.at, *told, language=language, said=said or same)

@@ -1,11 +1,20 @@
 """What a browser asks, read and checked, and what it is answered: the only place that knows HTTP's words.
 
+What a browser asks, read and checked, and what it is answered: the only place that knows HTTP's words.
+
 An address that cannot be read is refused in words (:class:`Refused`), never guessed at.
+
+A dropped file as it comes from a form: read through once, its SHA-256 taken, nothing of it kept on the disk.
+
+The form has one field, so that its parts (RFC 7578) need no parser: the file is what stands between the first empty line
+and the last boundary. Only a file small enough to be a certificate is held in memory, to be asked what it says it is.
 """
 
 from __future__ import annotations
 
 import datetime as dt
+import hashlib
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
@@ -22,15 +31,8 @@ MOST_VALUES = 20
 LAST_PAGE = 10**6
 
 
-class Refused(Exception):  # noqa: N818 - what it is, in the words of the answer
-    """A request that is answered with a page in words instead of what it asked for.
-
-    Parameters
-    ----------
-    status : of the answer.
-    problem : what is wrong, a sentence.
-    fix : what to do.
-    """
+class RefusedRequest(Exception):  # noqa: N818 - what it is, in the words of the answer
+    """A request that is answered with a page in words instead of what it asked for."""
 
     def __init__(self, status: HTTPStatus, problem: Text, fix: Text = NOTHING) -> None:
         self.status, self.problem, self.fix = status, problem, fix
@@ -38,17 +40,8 @@ class Refused(Exception):  # noqa: N818 - what it is, in the words of the answer
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A request.
-
-    Parameters
-    ----------
-    method : GET, HEAD or POST.
-    path : of the address, as it was sent.
-    query : by name; each was given once.
-    headers : by name in small letters.
-    body : of a POST; ``length`` bytes of it.
-    """
+class Request:
+    """Its path as it was sent, each name of the query once, headers by name in small letters, ``length`` bytes of body."""
 
     method: str
     path: str
@@ -58,12 +51,7 @@ class Asked:
     length: int = 0
 
     def only(self, known: Iterable[str]) -> None:
-        """Refuse what this page does not know.
-
-        Raises
-        ------
-        Refused : a name in the query is none of them.
-        """
+        """Refuse what this page does not know."""
         names = tuple(known)
         for name in self.query:
             if name not in names:
@@ -75,12 +63,7 @@ class Asked:
         return self.query.get(name, "").strip()
 
     def one_of(self, name: str, allowed: Collection[str]) -> str:
-        """A value of a list, or nothing.
-
-        Raises
-        ------
-        Refused : another one.
-        """
+        """A value of a list, or nothing."""
         value = self.text(name)
         if value and value not in allowed:
             raise bad(say("{name} cannot be {value!r}", name=Verbatim(name), value=_short(value)),
@@ -88,12 +71,7 @@ class Asked:
         return value
 
     def count(self, name: str, default: int = 1) -> int:
-        """A whole number from 1.
-
-        Raises
-        ------
-        Refused : something else.
-        """
+        """A whole number from 1."""
         value = self.text(name)
         if not value:
             return default
@@ -103,12 +81,7 @@ class Asked:
         return int(value)
 
     def day(self, name: str) -> dt.date | None:
-        """A date, or nothing.
-
-        Raises
-        ------
-        Refused : something else.
-        """
+        """A date, or nothing."""
         value = self.text(name)
         if not value:
             return None
@@ -122,12 +95,7 @@ class Asked:
 
 
 def read_address(target: str) -> tuple[str, dict[str, str]]:
-    """Path and query of a request line.
-
-    Raises
-    ------
-    Refused : it is no address of this page, or gives a name twice.
-    """
+    """Path and query of a request line."""
     if not target.startswith("/") or not target.isascii() or not target.isprintable():
         raise bad(say("the address is no path of this page"))
     parts = urlsplit(target)
@@ -147,9 +115,9 @@ def read_address(target: str) -> tuple[str, dict[str, str]]:
     return parts.path, query
 
 
-def bad(problem: Text, fix: Text = NOTHING) -> Refused:
+def bad(problem: Text, fix: Text = NOTHING) -> RefusedRequest:
     """A request that cannot be understood."""
-    return Refused(HTTPStatus.BAD_REQUEST, problem, fix)
+    return RefusedRequest(HTTPStatus.BAD_REQUEST, problem, fix)
 
 
 def _short(text: str) -> Verbatim:
@@ -178,17 +146,11 @@ RECORDED = (
 
 
 @dataclass(frozen=True)
-class Answer:
+class Response:
     """What is sent.
 
-    Parameters
-    ----------
-    body : its bytes.
-    media : its type.
-    status : of the answer.
-    policy : what a browser may do with it.
-    referrer : whom a browser tells where it comes from.
-    headers : further ones.
+    ``body``: its bytes; ``policy``: what a browser may do with it; ``referrer``: whom a browser tells where it comes
+    from.
     """
 
     body: bytes
@@ -204,3 +166,86 @@ class Answer:
             "Content-Type": self.media, "Content-Length": str(len(self.body)), **SECURITY,
             "Content-Security-Policy": self.policy, "Referrer-Policy": self.referrer, **self.headers,
         }  # fmt: skip
+
+
+LARGEST = 256 * 2**20
+"""Bytes of a file that is looked up; a certificate with its inputs has a hundredth."""
+
+HELD = 16 * 2**20
+"""Bytes of a file that is asked what it says it is."""
+
+_HEAD = 8192
+_BLOCK = 2**18
+_BOUNDARY = re.compile(r'multipart/form-data;\s*boundary="?([0-9A-Za-z\'()+_,./:=? -]{1,70})"?', re.IGNORECASE)
+_NAMED = re.compile(rb'filename="((?:[^"\\]|\\.)*)"')
+
+
+@dataclass(frozen=True)
+class UploadedFile:
+    """A file that was dropped.
+
+    ``name``: as the browser gives it, without folders; ``size``: bytes; ``content``: the bytes; ``None`` of a file
+    larger than :data:`HELD`.
+    """
+
+    name: str
+    size: int
+    sha256: str
+    content: bytes | None
+
+
+def read_dropped(asked: Request) -> UploadedFile:
+    """The file in the body of a form."""
+    found = _BOUNDARY.fullmatch(asked.headers.get("content-type", "").strip())
+    if found is None or asked.body is None:
+        raise RefusedRequest(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, say("this page takes a file from its own form only"))
+    if asked.length > LARGEST + _HEAD:
+        raise RefusedRequest(
+            HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+            say("the file is larger than {most} MB", most=LARGEST // 2**20),
+            say("No certificate is; check that it is the right file"),
+        )
+    return _read(asked.body, asked.length, found[1].rstrip().encode())
+
+
+def _read(body: BinaryIO, length: int, boundary: bytes) -> UploadedFile:
+    """Hash all but the end mark as it comes, and keep the beginning as far as it may be held."""
+    end = b"\r\n--" + boundary + b"--"
+    pending, left = b"", length
+    while b"\r\n\r\n" not in pending and left and len(pending) < _HEAD:
+        block = _some(body, min(left, _BLOCK))
+        pending, left = pending + block, left - len(block)
+    head, parted, pending = pending.partition(b"\r\n\r\n")
+    named = _NAMED.search(head)
+    if not parted or len(head) > _HEAD or not head.startswith(b"--" + boundary + b"\r\n") or named is None:
+        raise bad(say("the form that came with the file cannot be read"))
+    name = re.split(r"[/\\]", named[1].decode("utf-8", "replace"))[-1]
+    if not name:
+        raise bad(say("no file was chosen"), say("Choose a file, or drop one on the field"))
+    sha256, size, held = hashlib.sha256(), 0, bytearray()
+    reserve = len(end) + 2  # the end mark may be cut by the end of a block
+
+    def take(part: bytes) -> None:
+        nonlocal size
+        sha256.update(part)
+        if size + len(part) <= HELD:
+            held.extend(part)
+        size += len(part)
+
+    while left:
+        take(pending[:-reserve])
+        pending = pending[-reserve:]
+        block = _some(body, min(left, _BLOCK))
+        pending, left = pending + block, left - len(block)
+    content, closed, rest = pending.rpartition(end)
+    if not closed or rest not in (b"", b"\r\n"):
+        raise bad(say("the file did not come whole"), say("Drop it again"))
+    take(content)
+    return UploadedFile(name, size, sha256.hexdigest(), bytes(held) if len(held) == size else None)
+
+
+def _some(body: BinaryIO, most: int) -> bytes:
+    block = body.read(most)
+    if not block:
+        raise bad(say("the file did not come whole"), say("Drop it again"))
+    return block

@@ -1,33 +1,59 @@
 """How every machine stands: overdue, due soon, not conforming, not released; the most urgent first.
 
+How every machine stands: overdue, due soon, not conforming, not released; the most urgent first.
+
 Worked out once for each head of the records and day, since nothing else changes it.
 """
 
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from cmm_uq.app.serve.due import SOON, Due, DueDates
-from cmm_uq.app.serve.words import DECISIONS, VERDICTS
+from cmm_uq.app.commands.laboratory.due import due_in
+from cmm_uq.app.serve.page import DECISIONS, VERDICTS
 from cmm_uq.base.messages import Text, say
 from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records.listing import Newest, standing_of_all
 from cmm_uq.laboratory.records.store import Records
 
+SOON = dt.timedelta(days=60)
+"""What is due within it is shown before it is late."""
+
+
+class DueDate(NamedTuple):
+    """When a machine is due.
+
+    ``day``: on which; ``None`` where no rule gives one; ``beyond``: whether its last certificate finds it beyond its
+    limits: it is overdue from that day on.
+    """
+
+    day: dt.date | None
+    why: Text
+    beyond: bool = False
+
+
+DueDates = Callable[[Records, dt.date], Mapping[str, DueDate]]
+"""Due dates on a day, by serial; a machine that is not among them has none."""
+
+
+def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
+    """Of all machines, each by its own rule, its interim checks and its adjustments.
+
+    ``today``: the day for which they are asked.
+    """
+    found = due_in(records, (), today) if records.head()[0] else []
+    return {one.serial: DueDate(one.due, one.why, one.beyond) for one in found if one.item == "machine"}
+
 
 @dataclass(frozen=True)
-class Group:
+class MachineGroup:
     """Machines of which the same is true.
 
-    Parameters
-    ----------
-    word : of one machine.
-    count : what a number of them is called.
-    standing : how it is to be taken.
+    ``count``: what a number of them is called; ``standing``: how it is to be taken.
     """
 
     word: Text
@@ -35,33 +61,30 @@ class Group:
     standing: Standing
 
 
-GROUPS: Mapping[str, Group] = {
-    "overdue": Group(say("Overdue"), say("overdue"), "bad"),
-    "failing": Group(say("Does not conform"), say("not conforming"), "bad"),
-    "due": Group(say("Due soon"), say("due within {days} days", days=SOON.days), "open"),
-    "open": Group(say("Not decided"), say("not decided"), "open"),
-    "diagnosis": Group(say("Contradicts its model"), say("contradict their model"), "open"),
-    "draft": Group(say("Not released"), say("not released"), "open"),
-    "never": Group(say("No certificate"), say("without certificate"), "open"),
-    "order": Group(say("In order"), say("in order"), "good"),
+GROUPS: Mapping[str, MachineGroup] = {
+    "overdue": MachineGroup(say("Overdue"), say("overdue"), "bad"),
+    "failing": MachineGroup(say("Does not conform"), say("not conforming"), "bad"),
+    "due": MachineGroup(say("Due soon"), say("due within {days} days", days=SOON.days), "open"),
+    "open": MachineGroup(say("Not decided"), say("not decided"), "open"),
+    "diagnosis": MachineGroup(say("Contradicts its model"), say("contradict their model"), "open"),
+    "draft": MachineGroup(say("Not released"), say("not released"), "open"),
+    "never": MachineGroup(say("No certificate"), say("without certificate"), "open"),
+    "order": MachineGroup(say("In order"), say("in order"), "good"),
 }
 """The most urgent first; by the words of an address."""
 
 _URGENCY = {name: place for place, name in enumerate(GROUPS)}
 
 
-class Stands(NamedTuple):
+class MachineStanding(NamedTuple):
     """How one machine stands.
 
-    Parameters
-    ----------
-    newest : machine, with its newest certificate.
-    due : when it is due, and why.
-    groups : to which it belongs, the most urgent first.
+    ``newest``: machine, with its newest certificate; ``due``: when it is due, and why; ``groups``: to which it
+    belongs, the most urgent first.
     """
 
     newest: Newest
-    due: Due | None
+    due: DueDate | None
     groups: tuple[str, ...]
 
     @property
@@ -70,31 +93,29 @@ class Stands(NamedTuple):
         return self.newest.machine.serial
 
 
-def overview(records: Records, due: DueDates, today: dt.date) -> tuple[Stands, ...]:
-    """Every machine, the most urgent first, then by due date.
-
-    Raises
-    ------
-    CmmUqError : the records are damaged or locked.
-    """
+def overview(records: Records, due: DueDates, today: dt.date) -> tuple[MachineStanding, ...]:
+    """Every machine, the most urgent first, then by due date."""
     newest = standing_of_all(records)
     days = due(records, today)
     return in_order(
-        [Stands(one, days.get(one.machine.serial), groups(one, days.get(one.machine.serial), today)) for one in newest]
+        [
+            MachineStanding(one, days.get(one.machine.serial), groups(one, days.get(one.machine.serial), today))
+            for one in newest
+        ]
     )
 
 
-def in_order(machines: Sequence[Stands]) -> tuple[Stands, ...]:
+def in_order(machines: Sequence[MachineStanding]) -> tuple[MachineStanding, ...]:
     """The most urgent first, then by due date and serial."""
 
-    def urgency(one: Stands) -> tuple[int, dt.date, str]:
+    def urgency(one: MachineStanding) -> tuple[int, dt.date, str]:
         due = one.due.day if one.due is not None and one.due.day is not None else dt.date.max
         return _URGENCY[one.groups[0]], due, one.serial
 
     return tuple(sorted(machines, key=urgency))
 
 
-def groups(newest: Newest, due: Due | None, today: dt.date) -> tuple[str, ...]:
+def groups(newest: Newest, due: DueDate | None, today: dt.date) -> tuple[str, ...]:
     """To which groups a machine belongs, the most urgent first."""
     found: tuple[str, ...] = ()
     if due is not None and due.day is not None:

@@ -1,4 +1,6 @@
-"""A page as data: what it says, before anyone decides what it looks like.
+"""A page as data: what it says, before anyone decides what it looks like; and the records' words as a reader sees them.
+
+A page as data: what it says, before anyone decides what it looks like.
 
 As a document's, a page's blocks are small frozen classes with texts already rounded and worded; one template
 (``templates/serve/page.html``) shows every page, and has no words of its own. An address is a path of this site with its
@@ -7,12 +9,14 @@ query, already quoted.
 
 from __future__ import annotations
 
+import datetime as dt
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from typing import ClassVar, Literal
 from urllib.parse import urlencode
 
-from cmm_uq.base.messages import NOTHING, Text
+from cmm_uq.base.messages import DASH, NOTHING, Day, Text, Verbatim, day, say
 from cmm_uq.certificate.document import Standing
 
 
@@ -32,13 +36,8 @@ def address(path: str, **query: object) -> str:
 class Cell:
     """A text in a table or a list of facts.
 
-    Parameters
-    ----------
-    text : what it says.
-    address : where it leads, if anywhere.
-    standing : how it is to be taken: shown by a sign and a colour beside the words.
-    note : smaller, below.
-    download : whether the address gives a file to keep rather than to look at.
+    ``address``: where it leads, if anywhere; ``standing``: how it is to be taken: shown by a sign and a colour beside
+    the words; ``download``: whether the address gives a file to keep rather than to look at.
     """
 
     text: Text
@@ -49,23 +48,27 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Column:
+class PageColumn:
     """Heading of a column; figures stand to the right under each other, a date is never broken."""
 
     heading: Text
-    unit: Text = NOTHING
     sort: Literal["text", "number", "day"] = "text"
 
 
+def columns(*headings: Text | tuple[Text, Literal["number", "day"]]) -> tuple[PageColumn, ...]:
+    """Headings of texts, or of figures or days where they are named so."""
+    return tuple(PageColumn(*one) if isinstance(one, tuple) else PageColumn(one) for one in headings)
+
+
 @dataclass(frozen=True)
-class Table:
+class PageTable:
     """Rows under headings; the first cell names its row. Where there is no row, ``empty`` says so.
 
     A caption that would only say the title of its section again is for those who hear the page (``heard``).
     """
 
     caption: Text
-    columns: tuple[Column, ...]
+    columns: tuple[PageColumn, ...]
     rows: tuple[tuple[Cell, ...], ...]
     empty: Text = NOTHING
     notes: tuple[Text, ...] = ()
@@ -74,7 +77,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Facts:
+class PageFacts:
     """Labels and values; in one column where values are long (``wide``)."""
 
     rows: tuple[tuple[Text, Cell], ...]
@@ -103,7 +106,7 @@ class Tally:
 
 
 @dataclass(frozen=True)
-class Notice:
+class PageNotice:
     """A verdict, or what must not be overlooked, with what belongs to it."""
 
     head: Text
@@ -113,7 +116,7 @@ class Notice:
 
 
 @dataclass(frozen=True)
-class Paragraph:
+class PageParagraph:
     """Running text; a note is set smaller."""
 
     text: Text
@@ -122,7 +125,7 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
-class Field:
+class FormField:
     """A field of a form: a line of text, a date, or one of several options ``(value, text)``."""
 
     name: str
@@ -138,7 +141,7 @@ class Chooser:
 
     title: Text
     path: str
-    fields: tuple[Field, ...]
+    fields: tuple[FormField, ...]
     button: Text
     clear: Cell | None = None
     kept: tuple[tuple[str, str], ...] = ()
@@ -204,11 +207,11 @@ class Press:
     kind: ClassVar[str] = "press"
 
 
-Block = Table | Facts | Tally | Notice | Paragraph | Chooser | Pager | Charts | Drop | Links | Press
+Block = PageTable | PageFacts | Tally | PageNotice | PageParagraph | Chooser | Pager | Charts | Drop | Links | Press
 
 
 @dataclass(frozen=True)
-class Section:
+class PageSection:
     """A titled part of a page."""
 
     title: Text
@@ -216,24 +219,72 @@ class Section:
 
 
 @dataclass(frozen=True)
-class Page:
+class WebPage:
     """What a reader gets.
 
-    Parameters
-    ----------
-    title : what it is.
-    place : path of the entry of the contents that it belongs to.
-    lead : one line below the title.
-    blocks : before any section.
-    sections : titled parts.
-    above : the pages that it stands below.
-    status : of the answer.
+    ``place``: path of the entry of the contents that it belongs to; ``lead``: one line below the title; ``above``:
+    the pages that it stands below.
     """
 
     title: Text
     place: str
     lead: Text = NOTHING
     blocks: tuple[Block, ...] = ()
-    sections: tuple[Section, ...] = ()
+    sections: tuple[PageSection, ...] = ()
     above: tuple[Cell, ...] = ()
     status: HTTPStatus = field(default=HTTPStatus.OK, compare=False)
+
+
+Word = tuple[Text, Standing | None]
+
+STATES: Mapping[str, Word] = {
+    "draft": (say("Draft, not released"), "open"), "released": (say("Released"), "good"),
+    "withdrawn": (say("Withdrawn"), "bad"), "replaced": (say("Replaced"), "bad"),
+}  # fmt: skip
+
+DECISIONS: Mapping[str, Word] = {
+    "pass": (say("Pass"), "good"), "conditional pass": (say("Conditional pass"), "open"),
+    "incomplete": (say("Incomplete"), "open"), "undecided": (say("Undecided"), "open"),
+    "remeasure": (say("Remeasure"), "open"), "conditional fail": (say("Conditional fail"), "bad"),
+    "fail": (say("Fail"), "bad"), "none": (say("None stated"), None),
+}  # fmt: skip
+
+VERDICTS: Mapping[str, Word] = {
+    "consistent": (say("Consistent"), "good"), "explained": (say("Explained"), "open"),
+    "partial": (say("Partly explained"), "open"), "unexplained": (say("Unexplained"), "bad"),
+}  # fmt: skip
+
+ORIGINS: Mapping[str, Text] = {
+    "measured": say("Measured"), "simulated": say("Simulated"), "compensated": say("Compensated"),
+}  # fmt: skip
+
+NOT_MEASURED: Mapping[str, Text] = {
+    "simulated": say("Nothing was measured: the recording was simulated"),
+    "compensated": say("The recording was corrected by an error map, not measured so"),
+}
+"""What must not be overlooked of a recording that was not measured."""
+
+
+def cell_of(words: Mapping[str, Word], word: str, *, address: str = "") -> Cell:
+    """A word of the records in a cell; one that is not known, as it stands."""
+    if not word:
+        return Cell(DASH)
+    text, standing = words.get(word, (Verbatim(word), "open"))
+    return Cell(text, address, standing)
+
+
+def day_cell(date: dt.date | None, *, before: dt.date | None = None, note: Text = NOTHING) -> Cell:
+    """A date; one that lies before another is marked."""
+    if date is None:
+        return Cell(DASH, note=note)
+    return Cell(day(date), standing="bad" if before is not None and date < before else None, note=note)
+
+
+def moment(at: dt.datetime) -> Text:
+    """A moment to the minute."""
+    return say("{moment} UTC", moment=Day(f"{at:%Y-%m-%d %H:%M}"))
+
+
+def shown(text: str) -> Text:
+    """A name of the records, or a dash where it is empty."""
+    return Verbatim(text) if text else DASH

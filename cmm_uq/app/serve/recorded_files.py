@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
-from cmm_uq.app.serve.exchange import OWN, RECORDED, Answer, Refused
+from cmm_uq.app.serve.exchange import OWN, RECORDED, RefusedRequest, Response
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.output.manifest import plain_name, read_manifest
 from cmm_uq.laboratory.records.entries import Entry
@@ -53,11 +53,7 @@ def files_of(entry: Entry, folder: Path, signed: Mapping[str, str] = MappingProx
 
     A manifest is believed only where it names the results.json that the entry does.
 
-    Parameters
-    ----------
-    entry : of the certificate.
-    folder : of its files.
-    signed : SHA-256 of the files that were signed since, by name.
+    ``signed``: SHA-256 of the files that were signed since, by name.
     """
     data = entry.data
     named = hashes(data)
@@ -80,34 +76,29 @@ def hashes(data: Mapping[str, Any]) -> dict[str, str]:
 
 
 def content_of(file: RecordedFile, folder: Path) -> bytes:
-    """The recorded bytes.
-
-    Raises
-    ------
-    Refused : the file is gone, is another one by now, or is too large.
-    """
+    """The recorded bytes."""
     name, path = Verbatim(file.name), folder
     if not plain_name(file.name):
-        raise Refused(HTTPStatus.NOT_FOUND, say("{name} is no file of a certificate", name=name))
+        raise RefusedRequest(HTTPStatus.NOT_FOUND, say("{name} is no file of a certificate", name=name))
     for part in file.name.split("/"):
         path = path / part
         if path.is_symlink():
-            raise Refused(HTTPStatus.CONFLICT, say("{name} is a link to another place by now", name=name))
+            raise RefusedRequest(HTTPStatus.CONFLICT, say("{name} is a link to another place by now", name=name))
     try:
         if not path.is_file():
-            raise Refused(HTTPStatus.GONE, say("{name} is not in its folder any more", name=name),
+            raise RefusedRequest(HTTPStatus.GONE, say("{name} is not in its folder any more", name=name),
                           say("The records name the folder {folder}", folder=Verbatim(str(folder))))  # fmt: skip
         if path.stat().st_size > LARGEST:
-            raise Refused(HTTPStatus.CONFLICT, say("{name} is too large for a browser", name=name),
+            raise RefusedRequest(HTTPStatus.CONFLICT, say("{name} is too large for a browser", name=name),
                           say("It lies in {folder}", folder=Verbatim(str(folder))))  # fmt: skip
         content = path.read_bytes()
     except OSError as error:
         told = say("{name} cannot be read: {why}", name=name, why=Verbatim(error.strerror or "the disk fails"))
-        raise Refused(HTTPStatus.CONFLICT, told) from None
+        raise RefusedRequest(HTTPStatus.CONFLICT, told) from None
     if sha256(content).hexdigest() != file.sha256:
-        raise Refused(HTTPStatus.CONFLICT, say("{name} is not the file that was recorded: it was altered since", name=name),
-                      say("The page hands out recorded files only; this one lies in {folder}",
-                          folder=Verbatim(str(folder))))  # fmt: skip
+        problem = say("{name} is not the file that was recorded: it was altered since", name=name)
+        fix = say("The page hands out recorded files only; this one lies in {folder}", folder=Verbatim(str(folder)))
+        raise RefusedRequest(HTTPStatus.CONFLICT, problem, fix)
     return content
 
 
@@ -117,21 +108,16 @@ def results_of(files: tuple[RecordedFile, ...], folder: Path) -> dict[str, Any]:
         if file.name == "results.json":
             try:
                 found = json.loads(content_of(file, folder))
-            except (Refused, ValueError, RecursionError):
+            except (RefusedRequest, ValueError, RecursionError):
                 return {}
             return found if isinstance(found, dict) else {}
     return {}
 
 
-def sent(file: RecordedFile, content: bytes, *, keep: bool) -> Answer:
-    """A recorded file as an answer.
-
-    Parameters
-    ----------
-    keep : whether the browser is to keep it rather than to show it.
-    """
+def sent(file: RecordedFile, content: bytes, *, keep: bool) -> Response:
+    """A recorded file as an answer."""
     media, policy = MEDIA.get(Path(file.name).suffix.lower(), ("application/octet-stream", OWN))
     how = "attachment" if keep or not file.shown else "inline"
     name = quote(file.name.rpartition("/")[2], safe="")
     headers = {"Content-Disposition": f"{how}; filename*=UTF-8''{name}"}
-    return Answer(content, media, policy=policy, headers=headers)
+    return Response(content, media, policy=policy, headers=headers)

@@ -19,7 +19,7 @@ from socketserver import TCPServer
 from typing import Any, BinaryIO, cast
 
 from cmm_uq import __version__
-from cmm_uq.app.serve.exchange import Answer, Asked, Refused, bad, read_address
+from cmm_uq.app.serve.exchange import RefusedRequest, Request, Response, bad, read_address
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.messages import Verbatim, say
 
@@ -31,23 +31,15 @@ AT_ONCE = 32
 
 LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
 
-Answering = Callable[[Asked | Refused], Answer]
+Answering = Callable[[Request | RefusedRequest], Response]
 """Given a request, or why it is none; never raises."""
 
 
-class Server(ThreadingHTTPServer):
+class RecordsServer(ThreadingHTTPServer):
     """Answers browsers until it is closed.
 
-    Parameters
-    ----------
-    answer : gives the page of a request.
-    bind : address to listen on.
-    port : 0 takes a free one.
-    names : further names under which browsers reach this machine.
-
-    Raises
-    ------
-    OutputError : the address or the port cannot be had.
+    ``answer``: gives the page of a request; ``port``: 0 takes a free one; ``names``: further names under which
+    browsers reach this machine.
     """
 
     daemon_threads = True
@@ -139,7 +131,7 @@ class _Timed(io.RawIOBase):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: Server
+    server: RecordsServer
     protocol_version = "HTTP/1.1"
 
     def setup(self) -> None:
@@ -163,55 +155,53 @@ class _Handler(BaseHTTPRequestHandler):
         told = say("the request cannot be read: {why}", why=Verbatim(status.phrase.lower()))
         if status == HTTPStatus.METHOD_NOT_ALLOWED:
             told = say("this page can only be looked at")
-        self._send(self.server.answer(Refused(status, told)))
+        self._send(self.server.answer(RefusedRequest(status, told)))
 
     def do_GET(self) -> None:
-        """A page."""
         self._answer(lambda: self._asked())
 
     def do_HEAD(self) -> None:
-        """Its headers alone."""
         self._answer(lambda: self._asked())
 
     def do_POST(self) -> None:
         """A form of this site."""
         self._answer(self._posted)
 
-    def _answer(self, ask: Callable[[], Asked]) -> None:
+    def _answer(self, ask: Callable[[], Request]) -> None:
         try:
-            asked: Asked | Refused = ask()
-        except Refused as refused:
+            asked: Request | RefusedRequest = ask()
+        except RefusedRequest as refused:
             asked = refused
         self._send(self.server.answer(asked))
 
-    def _asked(self) -> Asked:
+    def _asked(self) -> Request:
         hosts = self.headers.get_all("Host", [])
         if len(hosts) != 1 or not self.server.answers_to(hosts[0].strip()):
-            raise Refused(
+            raise RefusedRequest(
                 HTTPStatus.MISDIRECTED_REQUEST, say("this page is not known by that name"),
                 say("Open {url}", url=Verbatim(self.server.url)),
             )  # fmt: skip
         path, query = read_address(self.path)
         headers = {name.lower(): value for name, value in self.headers.items()}
-        return Asked(self.command, path, query, headers)
+        return Request(self.command, path, query, headers)
 
-    def _posted(self) -> Asked:
+    def _posted(self) -> Request:
         asked = self._asked()
         origin = asked.headers.get("origin")
         host = f"http://{asked.headers['host'].strip().lower()}"
         site = asked.headers.get("sec-fetch-site", "same-origin")
         if (origin is not None and origin.lower() != host) or site != "same-origin":
-            raise Refused(HTTPStatus.FORBIDDEN, say("the form was sent from another site"))
+            raise RefusedRequest(HTTPStatus.FORBIDDEN, say("the form was sent from another site"))
         given = self.headers.get_all("Content-Length", [])
         if len(given) != 1 or not (given[0].isascii() and given[0].isdigit()) or "transfer-encoding" in asked.headers:
-            raise Refused(HTTPStatus.LENGTH_REQUIRED, say("the request does not say how long it is"))
+            raise RefusedRequest(HTTPStatus.LENGTH_REQUIRED, say("the request does not say how long it is"))
         if len(given[0]) > 15:
             raise bad(say("the request says that it is longer than anything"))
         self._timed.allow(BODY_S)
         body = cast("BinaryIO", self.rfile)
-        return Asked(asked.method, asked.path, asked.query, asked.headers, body, int(given[0]))
+        return Request(asked.method, asked.path, asked.query, asked.headers, body, int(given[0]))
 
-    def _send(self, answer: Answer) -> None:
+    def _send(self, answer: Response) -> None:
         """All of it within its time; then the connection is closed, after what still comes has been let go."""
         self.close_connection = True
         self.connection.settimeout(ANSWER_S)

@@ -1,4 +1,6 @@
-"""The site: which address gives which page, and a page in words for whatever goes wrong.
+"""The site: which address gives which page, as HTML, and a page in words for whatever goes wrong.
+
+The site: which address gives which page, and a page in words for whatever goes wrong.
 
 Records are opened for each request and closed after it, so that a page shows what is there now, and not a file that was
 moved, restored or migrated meanwhile.
@@ -10,31 +12,91 @@ import contextlib
 import datetime as dt
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from http import HTTPStatus
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
-from cmm_uq.app.serve.artefacts_page import artefacts_page
+from cmm_uq.app.serve import trends as drawing
 from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
-from cmm_uq.app.serve.certificates_page import certificates_page, diagnoses_page
-from cmm_uq.app.serve.checking import Checking
-from cmm_uq.app.serve.due import DueDates, by_rule
-from cmm_uq.app.serve.exchange import Answer, Asked, Refused
-from cmm_uq.app.serve.file_page import dropped_page, file_page
-from cmm_uq.app.serve.html import icon, render_page, style
-from cmm_uq.app.serve.integrity_page import integrity_page
-from cmm_uq.app.serve.machine_page import machine_page
-from cmm_uq.app.serve.machines_page import machines_page
-from cmm_uq.app.serve.overview import Stands, overview
-from cmm_uq.app.serve.page import Cell, Notice, Page
-from cmm_uq.app.serve.view import View, problem_of
-from cmm_uq.base.errors import CmmUqError
+from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
+from cmm_uq.app.serve.exchange import RefusedRequest, Request, Response
+from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page
+from cmm_uq.app.serve.machines_page import machine_page, machines_page
+from cmm_uq.app.serve.overview import DueDates, MachineStanding, by_rule, overview
+from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage
+from cmm_uq.app.serve.view import ChainComparing, SiteView, problem_of
+from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.certificate import plot_style
+from cmm_uq.certificate.templates import template_folder
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.place import shown
 from cmm_uq.laboratory.records.store import Records
 
-Made = Callable[[View, Asked], Page | Answer]
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+CONTENTS: tuple[tuple[str, Text], ...] = (
+    ("/", say("Machines")), ("/certificates", say("Certificates")), ("/diagnoses", say("Diagnoses")),
+    ("/artefacts", say("Artefacts")), ("/file", say("Check a file")), ("/integrity", say("Integrity")),
+)  # fmt: skip
+"""What every page leads to."""
+
+WORDS: dict[str, Text] = {
+    "site": say("Calibration records"), "skip": say("To the content"), "contents": say("Contents"),
+    "above": say("Belongs to"),
+}  # fmt: skip
+"""What stands around every page."""
+
+
+def render_page(page: WebPage, foot: Sequence[Text]) -> bytes:
+    """A whole page."""
+    made = _environment().get_template("page.html").render(page=page, foot=foot, contents=CONTENTS, words=WORDS)
+    return made.encode()
+
+
+@cache
+def style() -> bytes:
+    """The style sheet, in the colours of the documents."""
+    colours = {**plot_style.COLOURS, "band": plot_style.BAND}
+    return _environment().get_template("style.css").render(colour=colours).encode()
+
+
+@cache
+def icon() -> bytes:
+    """The picture in the browser's tab."""
+    return (template_folder() / "serve" / "icon.svg").read_bytes()
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(template_folder() / "serve"), autoescape=True, undefined=StrictUndefined,
+        finalize=_visible, trim_blocks=True, lstrip_blocks=True, auto_reload=False,
+    )  # fmt: skip
+    environment.filters["picture"] = _picture
+    return environment
+
+
+def _visible(value: Any) -> Any:
+    """A text with what would turn it round, or hide in it, written as an escape."""
+    return printable(str.__str__(value)) if isinstance(value, str) and not hasattr(value, "__html__") else value
+
+
+def _picture(chart: Chart) -> Markup:
+    """A picture with its alternative text; its elements were drawn here, of numbers and escaped words."""
+    from markupsafe import Markup, escape
+
+    size, label = f"0 0 {drawing.WIDTH} {drawing.HEIGHT}", escape(printable(chart.alternative))
+    return Markup(f'<svg viewBox="{size}" role="img" aria-label="{label}">{chart.svg}</svg>')  # noqa: S704 - nothing in it is from elsewhere
+
+
+Made = Callable[[SiteView, Request], WebPage | Response]
 
 PAGES: Mapping[str, Made] = {
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
@@ -50,26 +112,19 @@ WITH_FORM = ("/file", "/integrity")
 class Site:
     """Answers requests.
 
-    Parameters
-    ----------
-    where : file or URL of the records, as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it.
-    due : finds due dates.
-    today : the day; this machine's own by default.
-
-    Raises
-    ------
-    CmmUqError : there are no records.
+    ``where``: file or URL of the records, as :func:`~cmm_uq.laboratory.records.opening.open_records` takes it;
+    ``today``: the day; this machine's own by default.
     """
 
     def __init__(
         self, where: str | Path | None = None, *, due: DueDates = by_rule, today: Callable[[], dt.date] = dt.date.today
-    ) -> None:  # fmt: skip
+    ) -> None:
         with open_records(where, read_only=True) as records:  # what is wrong with them is told before anybody looks
             self._where = records.place
         self._due, self._today = due, today
         self._lock = threading.Lock()
-        self._kept: tuple[tuple[int, str, dt.date], Sequence[Stands]] | None = None
-        self.checking = Checking(self.opened)
+        self._kept: tuple[tuple[int, str, dt.date], Sequence[MachineStanding]] | None = None
+        self.checking = ChainComparing(self.opened)
 
     @property
     def place(self) -> str:
@@ -77,81 +132,75 @@ class Site:
         return shown(self._where)
 
     def opened(self) -> Records:
-        """The records, to be read.
-
-        Raises
-        ------
-        CmmUqError : they cannot be.
-        """
+        """The records, to be read."""
         return open_records(self._where, read_only=True)
 
     def warm(self) -> None:
         """Load what is slow to load and work out how the machines stand, so that no reader waits for it."""
-        import cmm_uq.app.serve.diagnosis_section  # noqa: F401
-
         with contextlib.suppress(CmmUqError):  # whoever looks is told
             self.machines()
 
-    def answer(self, asked: Asked | Refused) -> Answer:
+    def answer(self, asked: Request | RefusedRequest) -> Response:
         """The answer to a request, whatever happens."""
         try:
-            if isinstance(asked, Refused):
+            if isinstance(asked, RefusedRequest):
                 raise asked
             return self._answer(asked)
-        except Refused as refused:
+        except RefusedRequest as refused:
             return self._shown(_refusal(refused))
         except CmmUqError as error:
             problem, fix = problem_of(error)
             return self._shown(
-                _refusal(Refused(HTTPStatus.SERVICE_UNAVAILABLE, problem, fix), say("The records cannot be read"))
+                _refusal(
+                    RefusedRequest(HTTPStatus.SERVICE_UNAVAILABLE, problem, fix), say("The records cannot be read")
+                )
             )
         except TimeoutError:
-            return self._shown(_refusal(Refused(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come"))))
+            return self._shown(
+                _refusal(RefusedRequest(HTTPStatus.REQUEST_TIMEOUT, say("the request took too long to come")))
+            )
         except Exception as error:  # a fault is told on its page; the others go on
             told = say("a fault of the program: {what}", what=Verbatim(f"{type(error).__name__}: {error}"))
-            return self._shown(_refusal(Refused(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it"))))
+            return self._shown(
+                _refusal(RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it")))
+            )
 
-    def _answer(self, asked: Asked) -> Answer:
+    def _answer(self, asked: Request) -> Response:
         if asked.method == "POST":
             return self._posted(asked)
         if asked.path in ("/style.css", "/icon.svg"):
             css = asked.path.endswith("css")
-            return Answer(style() if css else icon(), "text/css; charset=utf-8" if css else "image/svg+xml")
+            return Response(style() if css else icon(), "text/css; charset=utf-8" if css else "image/svg+xml")
         make = PAGES.get(asked.path)
         if make is None:
-            raise Refused(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
+            raise RefusedRequest(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
         with self.opened() as records:
             made = make(self._view(records), asked)
-        return made if isinstance(made, Answer) else self._shown(made)
+        return made if isinstance(made, Response) else self._shown(made)
 
-    def _posted(self, asked: Asked) -> Answer:
+    def _posted(self, asked: Request) -> Response:
         if asked.path in ("/integrity/chain", "/integrity/files"):
             asked.only(())
             self.checking.begin(files=asked.path.endswith("files"))
-            return Answer(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": "/integrity"})
+            return Response(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": "/integrity"})
         if asked.path != "/file":
-            raise Refused(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
+            raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
         with self.opened() as records:
             return self._shown(dropped_page(self._view(records), asked))
 
-    def _view(self, records: Records) -> View:
+    def _view(self, records: Records) -> SiteView:
         today = self._today()
-        return View(records, today, lambda: self._standing(records, today), self.checking)
+        return SiteView(records, today, lambda: self._standing(records, today), self.checking)
 
-    def _standing(self, records: Records, today: dt.date) -> Sequence[Stands]:
+    def _standing(self, records: Records, today: dt.date) -> Sequence[MachineStanding]:
         head = (*records.head(), today)
         with self._lock:  # worked out once: who asks meanwhile would only do the same
             if self._kept is None or self._kept[0] != head:
                 self._kept = head, overview(records, self._due, today)
             return self._kept[1]
 
-    def machines(self) -> Sequence[Stands]:
-        """How every machine stands, the most urgent first.
-
-        Raises
-        ------
-        CmmUqError : the records cannot be read.
-        """
+    def machines(self) -> Sequence[MachineStanding]:
+        """How every machine stands, the most urgent first."""
         with self.opened() as records:
             return self._standing(records, self._today())
 
@@ -160,19 +209,18 @@ class Site:
         with self._lock:
             self._kept = None
 
-    def _shown(self, page: Page) -> Answer:
+    def _shown(self, page: WebPage) -> Response:
         foot = (
             say("Records: {place}. To be looked at only: nothing here can be changed.", place=Verbatim(self.place)),
             say("cmm-uq {version}", version=Verbatim(__version__)),
         )
         referrer = "same-origin" if page.place in WITH_FORM else "no-referrer"
-        return Answer(render_page(page, foot), status=page.status, referrer=referrer)
+        return Response(render_page(page, foot), status=page.status, referrer=referrer)
 
 
-def _refusal(refused: Refused, title: Text | None = None) -> Page:
-    """A page in words."""
+def _refusal(refused: RefusedRequest, title: Text | None = None) -> WebPage:
     titles = {HTTPStatus.NOT_FOUND: say("Not found"), HTTPStatus.INTERNAL_SERVER_ERROR: say("A fault")}
     head = title or titles.get(refused.status, say("This cannot be shown"))
     problem = say("{problem:capital}.", problem=refused.problem)
     lines = (Cell(say("{fix}.", fix=refused.fix)),) if refused.fix else ()
-    return Page(head, "", lead=NOTHING, blocks=(Notice(problem, "bad", lines),), status=refused.status)
+    return WebPage(head, "", lead=NOTHING, blocks=(PageNotice(problem, "bad", lines),), status=refused.status)

@@ -10,8 +10,8 @@ from cmm_uq.analysis.diagnosis.rivals import Named, Rival
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, plural, say
 from cmm_uq.certificate.document import Column, Section, Table
 from cmm_uq.certificate.effect_words import parameter_title, titles
+from cmm_uq.certificate.quantity_data import quantity_data
 from cmm_uq.certificate.result import Diagnosed
-from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

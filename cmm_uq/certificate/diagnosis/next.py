@@ -11,7 +11,7 @@ from cmm_uq.analysis.planning.advice import ODDS, NextPlan, Shown, odds_words, r
 from cmm_uq.base.messages import NOTHING, Text, number, plural, say, semicolons, together
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.plots.plans import placing_pictures
+from cmm_uq.certificate.plan_picture import placing_pictures
 from cmm_uq.certificate.result import Diagnosed
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import every

@@ -9,14 +9,14 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.messages import NOTHING, Text, after, alternatives, lines, say, semicolons
+from cmm_uq.certificate.against import contained
 from cmm_uq.certificate.diagnosis.costs import explanation
 from cmm_uq.certificate.diagnosis.unseen import without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.effect_words import effect_of, size_of, titles
 from cmm_uq.certificate.result import Diagnosed
-from cmm_uq.certificate.sections.findings import contained
-from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
-from cmm_uq.certificate.sections.where import by_columns, place_words
+from cmm_uq.certificate.where_section import by_columns, place_words
+from cmm_uq.certificate.withheld import sentences as withheld_sentences
 from cmm_uq.certificate.wording import probability
 from cmm_uq.maths.uncertainty.rounding import alike
 

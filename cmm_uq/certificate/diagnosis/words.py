@@ -10,14 +10,15 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, LeftOut
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.messages import Text, Verbatim, after, commas, day, say
+from cmm_uq.certificate.against import VERDICTS as AGAINST
 from cmm_uq.certificate.diagnosis.next import next_sentence
 from cmm_uq.certificate.diagnosis.overview import STANDING, overview_of
 from cmm_uq.certificate.effect_words import effect_of, size_of, title_of, titles
+from cmm_uq.certificate.in_short import Summary, Verdict
 from cmm_uq.certificate.result import Diagnosed
-from cmm_uq.certificate.sections.findings import VERDICTS as AGAINST
-from cmm_uq.certificate.sections.findings import other_periods
-from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
-from cmm_uq.certificate.wording import Headline, Summary, probability
+from cmm_uq.certificate.withheld import other_periods
+from cmm_uq.certificate.withheld import sentences as withheld_sentences
+from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.rounding import alike
@@ -155,7 +156,7 @@ def summary_of(facts: JobFile, verdict: str, told: Sequence[Text], findings: Ite
     told : the verdict in a sentence, and what follows from it.
     findings : of the screening.
     """
-    first = Headline(VERDICTS_IN_SHORT[verdict], STANDING[verdict], told[0], ())
+    first = Verdict(VERDICTS_IN_SHORT[verdict], STANDING[verdict], told[0], ())
     warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
     machine = Verbatim(facts.machine.name)
     return Summary(machine, day(facts.job.date), (first,), remarks=tuple(told[1:]), warnings=warned)

@@ -14,32 +14,28 @@ from typing import Any
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import Unit
-from cmm_uq.certificate.digital_certificate.administration import SayIn, english, rich_of, words_of
-from cmm_uq.certificate.digital_certificate.quantities import (
-    ONE,
-    P95,
+from cmm_uq.certificate.digital_certificate.shapes import (
     are_numbers,
     decimal,
     decimals,
-    dsi_of,
-    expanded_of,
-    interval_of,
-    intervals_of,
     is_budget,
     is_curve,
     is_matrix,
     is_number,
     is_quantity,
-    named_unit,
     plain_cell,
     plain_name,
-    product,
-    ratio,
+)
+from cmm_uq.certificate.digital_certificate.uncertainty import (
+    P95,
+    expanded_of,
+    interval_of,
+    intervals_of,
     spread_of,
     symmetric,
-    unit_of,
-    without_unit,
 )
+from cmm_uq.certificate.digital_certificate.units import ONE, dsi_of, named_unit, product, ratio, unit_of, without_unit
+from cmm_uq.certificate.digital_certificate.words import SayIn, english, rich_of, words_of
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.jobs.dcc.administrative import Characters
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
@@ -60,9 +56,11 @@ _NO_RESULT = ("noise", "least_squares")
 class Figures:
     """Makes quantities.
 
-    ``say_in``: a text in the languages of the certificate; ``free``: paths of estimates that the recording does not
-    determine: what is known of them is no result; ``stated``: what is stated of estimates, ``scale_x.ppm``; it stands
-    with each.
+    Parameters
+    ----------
+    say_in : a text in the languages of the certificate.
+    free : paths of estimates that the recording does not determine: what is known of them is no result.
+    stated : what is stated of estimates, ``scale_x.ppm``; it stands with each.
     """
 
     def __init__(
@@ -72,6 +70,14 @@ class Figures:
         self._ids: set[str] = set()
 
     def parts(self, path: Path, value: Any, above: Unit | None = None) -> Iterator[Part]:
+        """What stands under a path.
+
+        Parameters
+        ----------
+        path : keys of results.json, of lists the index.
+        value : that stands there.
+        above : unit that a key above names.
+        """
         if value is None or value in ({}, []):
             return
         unit = unit_of(path[-1], above) if not path[-1].isdecimal() else above or ONE
@@ -87,6 +93,7 @@ class Figures:
             yield from self._group(path, value, named_unit(path[-1]) or above)
 
     def id_of(self, path: Path) -> str:
+        """An id that no other part has."""
         wanted = plain_name(".".join(path))
         wanted = found = wanted if wanted[0].isalpha() or wanted[0] == "_" else f"_{wanted}"
         count = 1
@@ -97,6 +104,7 @@ class Figures:
         return found
 
     def title(self, path: Path) -> Text:
+        """A quantity in words."""
         if path[-1] in TITLES:
             return TITLES[path[-1]]
         if len(path) > 1 and effect_of(path[-2]) is not None:
@@ -129,6 +137,7 @@ class Figures:
                 yield from self.parts((*path, key), further, unit)
 
     def _group(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
+        """What belongs together."""
         if is_budget(data):
             inner = list(self._budget(path, data))
         elif is_matrix(data):
@@ -224,6 +233,7 @@ class Figures:
             yield self._quantity((*path, str(i)), RealList(values=decimals(row), units=elements))
 
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Part]:
+        """A budget of uncertainty: what is combined, and its lines."""
         unit = dsi_of(data["unit"])
         stated = expanded_of(data)
         value = Real(value=decimal(data["value"]), unit=unit, uncertainty=stated) if data["value"] is not None else None
@@ -257,6 +267,7 @@ class Figures:
 
 
 def _texts(values: Sequence[Any]) -> Any:
+    """Words as a list, or paragraphs where one has spaces."""
     texts = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
     if all(text and text.split() == [text] for text in texts):
         return Characters(tuple(texts))
@@ -264,6 +275,7 @@ def _texts(values: Sequence[Any]) -> Any:
 
 
 def _ref_type(path: Path, value: Any) -> tuple[str, ...]:
+    """What the good practice of the DCC calls it."""
     if path[-1] == "interval95":
         return ("cmm_coverageInterval",)
     if not isinstance(value, Real | RealList) or path[0] in _NO_RESULT:

@@ -9,9 +9,11 @@ import numpy as np
 from cmm_uq.base.messages import Text, commas, number, say, semicolons
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.lettering import lettered
+from cmm_uq.certificate.measured import width_mm
+from cmm_uq.certificate.narrowing import NAMES_MM, told_apart
 from cmm_uq.certificate.part.margin_plot import A_PAGE
-from cmm_uq.certificate.plots.labels import NAMES_MM, told_apart, width_mm
-from cmm_uq.certificate.plots.style import INK, TINY, WIDTH_MM, drawn, house_style, lettered, new_figure
+from cmm_uq.certificate.plot_style import INK, TINY, WIDTH_MM, drawn, house_style, new_figure
 
 _SHADES = ("#0b5c7a", "#86b1c2", "#a84e08", "#e0b48a", "#5a666e", "#c3ccd0", "#3f86a0", "#cc7f3c")
 """Neighbours differ in lightness, so that they can be told apart without colour."""

@@ -9,7 +9,7 @@ import numpy as np
 from cmm_uq.base.messages import Text, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plots.style import (
+from cmm_uq.certificate.plot_style import (
     DIVERGING,
     INK,
     RULE,

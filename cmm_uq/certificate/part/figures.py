@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.limits import LimitDecision
+from cmm_uq.analysis.conformity.limits import Judged
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.in_words import CHARACTERISTICS
 from cmm_uq.analysis.parts.result import Stated
@@ -117,7 +117,7 @@ class Figures(Printed):
         return self.found.stated[self.place]
 
     @property
-    def judged(self) -> LimitDecision | None:
+    def judged(self) -> Judged | None:
         """What follows from its limits."""
         return self.found.judged[self.place]
 

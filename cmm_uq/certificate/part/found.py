@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Outcome, rule_words
-from cmm_uq.analysis.conformity.limits import LimitDecision
+from cmm_uq.analysis.conformity.limits import Judged
 from cmm_uq.analysis.parts.budget import Budget
 from cmm_uq.analysis.parts.by_method import Comparison
 from cmm_uq.analysis.parts.displaced import Displaced
@@ -182,7 +182,7 @@ class PartFound:
     budget: Budget
     unseen: tuple[Unseen, ...]
     further: Further | None
-    judged: tuple[LimitDecision | None, ...]
+    judged: tuple[Judged | None, ...]
     together: float | None
     ways: tuple[Way, ...]
     displaced: Displaced

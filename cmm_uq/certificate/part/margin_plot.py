@@ -10,8 +10,8 @@ import numpy as np
 
 from cmm_uq.base.messages import Text, number, say
 from cmm_uq.certificate.document import Outcome, Plot
-from cmm_uq.certificate.plots.labels import NAMES_MM, told_apart
-from cmm_uq.certificate.plots.style import (
+from cmm_uq.certificate.narrowing import NAMES_MM, told_apart
+from cmm_uq.certificate.plot_style import (
     ACCENT,
     BAD,
     BAND,

@@ -12,7 +12,8 @@ from cmm_uq.certificate.certificate import (
     signatures_of,
     statements_of,
 )
-from cmm_uq.certificate.clauses import DRAFT, Requirement, asked, not_stated, of_every_report
+from cmm_uq.certificate.clauses import DRAFT, Clause, asked, of_every_report
+from cmm_uq.certificate.completeness import not_stated
 from cmm_uq.certificate.document import Document, Facts
 from cmm_uq.certificate.part.budget_section import budget_section, unseen_section, ways_section
 from cmm_uq.certificate.part.found import PartFound
@@ -22,7 +23,7 @@ from cmm_uq.certificate.part.methods import methods_section
 from cmm_uq.certificate.part.overview import overview_of, part_words
 from cmm_uq.certificate.part.pictured import errors_section, part_section
 from cmm_uq.certificate.part.results_section import conformity_section, correlation_section, results_section
-from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
+from cmm_uq.certificate.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.origin import MEASURED
 
@@ -77,7 +78,7 @@ def part_document(found: PartFound) -> Document:
     ))  # fmt: skip
 
 
-def lacking_of(found: PartFound) -> tuple[Requirement, ...]:
+def lacking_of(found: PartFound) -> tuple[Clause, ...]:
     """What ISO/IEC 17025:2017, 7.8 asks of every report and the job does not state; nothing is asked where nobody measured."""
     facts = found.job.facts
     if found.measured is None or facts.job.origin != MEASURED:

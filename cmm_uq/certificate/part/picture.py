@@ -12,8 +12,8 @@ from cmm_uq.base.messages import NOTHING, Text, after, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.part.views import draw_outlines, label, panels, segments, span_of
-from cmm_uq.certificate.plots.labels import shown, told
-from cmm_uq.certificate.plots.style import ACCENT, DIVERGING, WIDTH_MM, dots, drawn, house_style
+from cmm_uq.certificate.plot_style import ACCENT, DIVERGING, WIDTH_MM, dots, drawn, house_style
+from cmm_uq.certificate.shown import shown, told
 
 _NORMAL, _STEM = 0.05, 0.22
 """Of the largest span: how long a normal is drawn, and a stylus at most."""

@@ -7,14 +7,14 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import rule_name
-from cmm_uq.analysis.conformity.limits import LimitDecision
+from cmm_uq.analysis.conformity.limits import Judged
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.base.languages.language import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.found import Further, PartFound, Standing, Unseen
 from cmm_uq.certificate.part.methods_data import methods_data
+from cmm_uq.certificate.program import NAME
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256
@@ -115,7 +115,7 @@ def _characteristic(found: PartFound, i: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _limits(facts: CharacteristicFacts, judged: LimitDecision) -> dict[str, Any]:
+def _limits(facts: CharacteristicFacts, judged: Judged) -> dict[str, Any]:
     ends = None if judged.accepted is None else [None if end is None else _in(facts, end) for end in judged.accepted]
     return {
         "lower": None if judged.lower is None else _in(facts, judged.lower),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from cmm_uq.certificate.results.keys import RESULTS
+from cmm_uq.certificate.results_keys import RESULTS
 
 OWN = "its `unit`"
 """Unit of values of a characteristic: the one that stands beside them, mm or °."""

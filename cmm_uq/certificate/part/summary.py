@@ -9,8 +9,9 @@ from cmm_uq.analysis.parts.in_words import CHARACTERISTICS
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, number, plural, say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.effect_words import titles
+from cmm_uq.certificate.in_short import Figure, Summary, Verdict
 from cmm_uq.certificate.part.found import Further, PartFound
-from cmm_uq.certificate.wording import Figure, Headline, Summary, probability
+from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.rounding import rounded, significant
 
@@ -24,19 +25,19 @@ def part_summary(found: PartFound) -> Summary:
     )  # fmt: skip
 
 
-def _verdicts(found: PartFound) -> list[Headline]:
+def _verdicts(found: PartFound) -> list[Verdict]:
     told = []
     for i, judged in enumerate(found.judged):
         if judged is None or judged.outcome is None:
             continue
         chance = say("conforms with {p}", p=probability(judged.probability or 0.0))
         told.append(
-            Headline(judged.outcome.upper(), standing_of(judged.outcome), _named(found, i), (chance, judged.rule))
+            Verdict(judged.outcome.upper(), standing_of(judged.outcome), _named(found, i), (chance, judged.rule))
         )
     if found.together is not None and len(told) > 1:
         whole = found.outcome or "undecided"
         chance = say("all conform with {p}", p=probability(found.together))
-        told.insert(0, Headline(whole.upper(), standing_of(whole), say("the part"), (chance,)))
+        told.insert(0, Verdict(whole.upper(), standing_of(whole), say("the part"), (chance,)))
     return told
 
 

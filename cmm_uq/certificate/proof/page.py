@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, plural, say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import titles
-from cmm_uq.certificate.origin import program
+from cmm_uq.certificate.program import program
 from cmm_uq.certificate.proof.method import how_to_check, method, not_covered
 from cmm_uq.certificate.proof.plots import said_plot, strength_plot
 from cmm_uq.certificate.proof.proof import Proof
@@ -23,6 +23,7 @@ from cmm_uq.certificate.proof.words import (
     percent,
     standing,
 )
+from cmm_uq.certificate.working_page import working_page
 from cmm_uq.laboratory.proving.accepted import MISSED, OPEN
 from cmm_uq.laboratory.proving.cases import KINDS, STRONGEST, micrometres
 from cmm_uq.laboratory.proving.intervals import Rate

@@ -7,7 +7,7 @@ import numpy as np
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plots.style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, house_style, new_figure
+from cmm_uq.certificate.plot_style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, house_style, new_figure
 from cmm_uq.laboratory.proving.intervals import Rate, Tenth
 from cmm_uq.laboratory.proving.smallest import OFTEN, Found
 

@@ -1,5 +1,7 @@
 """What a value changed by between two certificates, and whether that means anything.
 
+What a value changed by between two certificates, and whether that means anything.
+
 Both values carry the error of the artefact. Where it was the same artefact, that part is in both, and cancels in their
 difference: u²(d) = u₁² + u₂² − 2·u_a1·u_a2 (JCGM 100:2008, 5.2.2, with correlation 1 of what comes from the artefact).
 Where all of an uncertainty comes from the artefact, as a test uncertainty does, nothing is stated of how the machine
@@ -10,8 +12,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from statistics import NormalDist
 
-from cmm_uq.laboratory.due.normal import two_sided
+
+def two_sided(z: float) -> float:
+    """Probability of a deviate at least as far from zero as ``z``."""
+    return math.erfc(abs(z) / math.sqrt(2))
+
+
+def two_sided_limit(probability: float) -> float:
+    """The deviate that is exceeded on either side with a probability."""
+    return -NormalDist().inv_cdf(probability / 2)
+
 
 _NOTHING = 1e-9
 """Part of a variance that is none."""
@@ -21,7 +33,7 @@ FAMILY = 0.05
 
 
 @dataclass(frozen=True)
-class Stated:
+class ComparedValue:
     """A value of a certificate: estimate, standard uncertainty, the part of it from the artefact, and which artefact."""
 
     value: float
@@ -31,14 +43,7 @@ class Stated:
 
 
 @dataclass(frozen=True)
-class Change:
-    """A difference.
-
-    Parameters
-    ----------
-    value, u : later minus earlier, and its standard uncertainty.
-    """
-
+class ValueChange:
     value: float
     u: float
 
@@ -72,8 +77,8 @@ def common_part(u: float, u_artefact: float) -> float:
     return u_artefact if u**2 - u_artefact**2 > _NOTHING * u**2 else 0.0
 
 
-def change(before: Stated, now: Stated) -> Change:
+def change(before: ComparedValue, now: ComparedValue) -> ValueChange:
     """What a value changed by."""
     same = bool(before.artefact) and before.artefact == now.artefact
     common = common_part(before.u, before.u_artefact) * common_part(now.u, now.u_artefact) if same else 0.0
-    return Change(now.value - before.value, math.sqrt(max(before.u**2 + now.u**2 - 2 * common, 0.0)))
+    return ValueChange(now.value - before.value, math.sqrt(max(before.u**2 + now.u**2 - 2 * common, 0.0)))

@@ -23,10 +23,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from cmm_uq.jobs.verdicts import BEYOND
-from cmm_uq.laboratory.due.change import Change, Stated, change, each_of
-from cmm_uq.laboratory.due.normal import two_sided, two_sided_limit
+from cmm_uq.laboratory.due.change import ComparedValue, ValueChange, change, each_of, two_sided, two_sided_limit
 from cmm_uq.laboratory.due.observed import is_of_machine, part_used
-from cmm_uq.laboratory.records import Certificate, Value
+from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedValue
 
 Standing = Literal["in control", "warning", "action", "nothing compared"]
 
@@ -35,19 +34,14 @@ WARNING, ACTION = 2.0, 3.0
 
 
 @dataclass(frozen=True)
-class Checked:
+class InterimCheck:
     """What one interim check comes to.
 
-    Parameters
-    ----------
-    certificate : the check.
-    standing : by the rule.
-    worst : the value that is furthest out, as it is called; empty where nothing could be compared.
-    ratio : its difference from the calibration in units of the difference's standard uncertainty.
-    warning, action : limits of that ratio.
+    ``standing``: by the rule; ``worst``: the value that is furthest out, as it is called; empty where nothing could
+    be compared; ``ratio``: its difference from the calibration in units of the difference's standard uncertainty.
     """
 
-    certificate: Certificate
+    certificate: RecordedCertificate
     standing: Standing
     worst: str
     ratio: float
@@ -60,17 +54,14 @@ def limit_for(count: int, single: float) -> float:
     return two_sided_limit(each_of(count, two_sided(single)))
 
 
-def check_standings(calibration: Certificate, checks: Sequence[Certificate]) -> list[Checked]:
+def check_standings(calibration: RecordedCertificate, checks: Sequence[RecordedCertificate]) -> list[InterimCheck]:
     """Each check by the rule, in turn.
 
-    Parameters
-    ----------
-    calibration : that the checks are compared with.
-    checks : of the same machine since, without an adjustment between, by day.
+    ``checks``: of the same machine since, without an adjustment between, by day.
     """
     stated = {one.name: _stated(one, calibration) for one in calibration.values if is_of_machine(one.unit)}
-    found: list[Checked] = []
-    before: dict[str, Change] = {}
+    found: list[InterimCheck] = []
+    before: dict[str, ValueChange] = {}
     for check in checks:
         changes = {
             one.name: change(stated[one.name], _stated(one, check)) for one in check.values if one.name in stated
@@ -80,7 +71,9 @@ def check_standings(calibration: Certificate, checks: Sequence[Certificate]) -> 
     return found
 
 
-def _checked(check: Certificate, changes: dict[str, Change], before: dict[str, Change]) -> Checked:
+def _checked(
+    check: RecordedCertificate, changes: dict[str, ValueChange], before: dict[str, ValueChange]
+) -> InterimCheck:
     warning, action = limit_for(len(changes), WARNING), limit_for(len(changes), ACTION)
     titles = {one.name: one.quantity for one in check.values}
     worst = max(changes, key=lambda name: abs(changes[name].ratio), default="")
@@ -97,8 +90,8 @@ def _checked(check: Certificate, changes: dict[str, Change], before: dict[str, C
         standing = "action"
     elif abs(furthest) > warning:
         standing = "warning"
-    return Checked(check, standing, titles.get(worst, ""), furthest, warning, action)
+    return InterimCheck(check, standing, titles.get(worst, ""), furthest, warning, action)
 
 
-def _stated(value: Value, certificate: Certificate) -> Stated:
-    return Stated(value.value, value.u, value.u_artefact, certificate.artefact)
+def _stated(value: RecordedValue, certificate: RecordedCertificate) -> ComparedValue:
+    return ComparedValue(value.value, value.u, value.u_artefact, certificate.artefact)

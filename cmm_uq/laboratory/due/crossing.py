@@ -22,14 +22,16 @@ from cmm_uq.laboratory.due.drift import (
     HORIZON,
     PARTS,
     YEAR,
-    History,
+    DriftHistory,
+    DriftPrior,
+    Histories,
     RecordedSeries,
-    SideBySide,
+    default_prior,
     history,
+    limit_for,
     side_by_side,
 )
-from cmm_uq.laboratory.due.drift_filter import Filtered, filtered
-from cmm_uq.laboratory.due.drift_prior import Prior, default_prior, limit_for
+from cmm_uq.laboratory.due.drift_filter import DriftState, filtered
 
 
 def grid(gaps: int) -> Floats:
@@ -49,12 +51,10 @@ _SEED = 20
 class Crossings:
     """Of N machines.
 
-    Attributes
-    ----------
-    last : (N,) ordinal of each machine's last certificate, or of an adjustment after it.
-    days, probability : (G,) and (N, G), of having been beyond the limit at some time until so many days after it.
-    level, u_level : (N,) the error at the last certificate, given all certificates, and its standard uncertainty.
-    rate, u_rate : (N,) per year.
+    ``last``: (N,) ordinal of each machine's last certificate, or of an adjustment after it; ``days, probability``:
+    (G,) and (N, G), of having been beyond the limit at some time until so many days after it; ``level, u_level``:
+    (N,) the error at the last certificate, given all certificates, and its standard uncertainty; ``rate, u_rate``:
+    (N,) per year.
     """
 
     last: Floats
@@ -75,7 +75,6 @@ class Crossings:
         return Crossings(last, parts[0].days, *rest)
 
     def one(self, i: int) -> Crossing:
-        """Of one machine."""
         return Crossing(
             date.fromordinal(int(self.last[i])), self.days, self.probability[i], float(self.level[i]), float(self.u_level[i]),
             float(self.rate[i]), float(self.u_rate[i]),
@@ -96,13 +95,11 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """Of one machine.
+    """When one machine crosses its limit.
 
-    Attributes
-    ----------
-    last : day of the last certificate, or of an adjustment after it: from here on is looked ahead.
-    days, probability : (G,) of having crossed until so many days after it.
-    level, u_level, rate, u_rate : the error then and its rate per year, with standard uncertainties.
+    ``last``: day of the last certificate, or of an adjustment after it: from here on is looked ahead; ``days,
+    probability``: (G,) of having crossed until so many days after it; ``level, u_level, rate, u_rate``: the error
+    then and its rate per year, with standard uncertainties.
     """
 
     last: date
@@ -123,7 +120,6 @@ class Crossing:
         return self.after(max(float(day.toordinal() - self.last.toordinal()), 0.0))
 
     def after(self, days: float) -> float:
-        """The same by so many days after the last certificate."""
         return float(-np.expm1(np.interp(days, self.days, _log_survival(self.probability))))
 
     def quantile(self, part: float) -> date | None:
@@ -145,9 +141,9 @@ class Crossing:
 
 
 def crossing(
-    series: RecordedSeries | History,
+    series: RecordedSeries | DriftHistory,
     limit: float,
-    prior: Prior | None = None,
+    prior: DriftPrior | None = None,
     *,
     one_sided: bool = False,
     paths: int = PATHS,
@@ -158,7 +154,7 @@ def crossing(
     ----------
     series : of the records, or a history.
     limit : the error conforms while |error| ≤ limit, or error ≤ limit.
-    prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_prior.FleetPrior.prior`), or none.
+    prior : of the machine's fleet (:meth:`cmm_uq.laboratory.due.fleet_model.FleetPrior.prior`), or none.
     one_sided : only what is above the limit is beyond it.
     paths : how many are drawn.
 
@@ -168,7 +164,7 @@ def crossing(
     """
     if not (np.isfinite(limit) and limit > 0):
         raise CmmUqError(f"a limit of {limit:g} cannot be crossed", fix="State a limit above zero")
-    known = series if isinstance(series, History) else history(series)
+    known = series if isinstance(series, DriftHistory) else history(series)
     prior = prior or default_prior(limit_for(limit, known.u))
     machines = side_by_side([known])
     many = crossings(machines, prior, filtered(machines, prior), limit, one_sided=one_sided, paths=paths, days=FINE)
@@ -176,19 +172,13 @@ def crossing(
 
 
 def crossings(
-    machines: SideBySide, prior: Prior, state: Filtered, limit: Floats | float, *, one_sided: bool = False,
+    machines: Histories, prior: DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
     paths: int = PATHS, until: float = HORIZON * YEAR, days: Floats = DAYS,
 ) -> Crossings:  # fmt: skip
     """When the errors of many machines will be.
 
-    Parameters
-    ----------
-    machines, prior, state : histories, nodes, and what :func:`filtered` made of them.
-    limit : (N,) or one of all.
-    one_sided : see :func:`crossing`.
-    paths : drawn for each machine.
-    until : days to look ahead where less than the horizon does; later probabilities are those of that day.
-    days : a :func:`grid`.
+    ``limit``: (N,) or one of all; ``until``: days to look ahead where less than the horizon does; later probabilities
+    are those of that day.
     """
     N = len(machines)
     flat = _States.of(state, prior)
@@ -213,10 +203,10 @@ class _States:
     covariance: Floats
     weight: Floats
     node: Ints
-    prior: Prior
+    prior: DriftPrior
 
     @staticmethod
-    def of(state: Filtered, prior: Prior) -> _States:
+    def of(state: DriftState, prior: DriftPrior) -> _States:
         """From what the filter left."""
         N, K, M = state.log_weight.shape
         C = K * M

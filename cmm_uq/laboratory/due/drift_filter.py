@@ -1,5 +1,7 @@
 """Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
 
+Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
+
 State of a machine: level, rate, and the errors of the artefacts that it was measured with, in their standard uncertainties.
 Given when steps came and which certificates were wrong, all is Gaussian and the filter is exact (Kalman 1960; Durbin and
 Koopman 2012, section 4.3). Those tales are summed over: each certificate makes four of one, and the likeliest are kept (a
@@ -14,8 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.due.drift import SideBySide
-from cmm_uq.laboratory.due.drift_prior import WRONG, WRONG_TIMES, Prior
+from cmm_uq.laboratory.due.drift import (
+    WRONG,
+    WRONG_TIMES,
+    YEAR,
+    DriftHistory,
+    DriftPrior,
+    Histories,
+    default_prior,
+    limit_for,
+    side_by_side,
+)
 
 KEPT = 12
 """Tales kept of a machine at a node."""
@@ -25,13 +36,10 @@ _TIMES = WRONG_TIMES**2 - 1
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class DriftStart:
     """Rate and artefacts' errors of each machine at each node, before its own certificates.
 
-    Attributes
-    ----------
-    mean : (1 + q, N, K).
-    covariance : (1 + q, 1 + q, N, K).
+    ``mean``: (1 + q, N, K); ``covariance``: (1 + q, 1 + q, N, K).
     """
 
     mean: Floats
@@ -39,30 +47,26 @@ class Start:
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
+class DriftState:
     """After the last certificate, or an adjustment after it, for N machines, K nodes and M tales.
 
-    Attributes
-    ----------
-    mean : (2 + q, N, K, M) level, rate, errors of the artefacts.
-    covariance : (2 + q, 2 + q, N, K, M).
-    log_weight : (N, K, M) joint density of certificates and tale.
+    ``mean``: (2 + q, N, K, M) level, rate, errors of the artefacts; ``covariance``: (2 + q, 2 + q, N, K, M);
+    ``log_weight``: (N, K, M) joint density of certificates and tale.
     """
 
     mean: Floats
     covariance: Floats
     log_weight: Floats
 
-    def between(self, first: int, last: int | None) -> Filtered:
-        """Of some machines."""
-        return Filtered(self.mean[:, first:last], self.covariance[:, :, first:last], self.log_weight[first:last])
+    def between(self, first: int, last: int | None) -> DriftState:
+        return DriftState(self.mean[:, first:last], self.covariance[:, :, first:last], self.log_weight[first:last])
 
     @property
     def log_evidence(self) -> Floats:
         """Density of a machine's certificates at each node, (N, K)."""
         return log_sum(self.log_weight)
 
-    def weights(self, prior: Prior) -> Floats:
+    def weights(self, prior: DriftPrior) -> Floats:
         """Of nodes and tales given the certificates, (N, K, M), one in all for each machine."""
         evidence = self.log_evidence + np.log(prior.weight)
         of_group = np.stack([log_sum(np.where(row, evidence, -np.inf)) for row in prior.members], axis=-1)
@@ -86,33 +90,28 @@ def log_sum(values: Floats) -> Floats:
         return np.asarray(np.log(np.exp(values - top).sum(axis=-1)) + top[..., 0], dtype=np.float64)
 
 
-def usual_start(machines: SideBySide, prior: Prior) -> Start:
+def usual_start(machines: Histories, prior: DriftPrior) -> DriftStart:
     """Rates of the prior, artefacts as their certificates say."""
     q, N, K = machines.shared.shape[1], len(machines), len(prior)
     mean, covariance = np.zeros((1 + q, N, K)), np.zeros((1 + q, 1 + q, N, K))
     mean[0], covariance[0, 0] = prior.rate, prior.rate_sd**2
     covariance[np.arange(1, 1 + q), np.arange(1, 1 + q)] = 1.0
-    return Start(mean, covariance)
+    return DriftStart(mean, covariance)
 
 
-def filtered(machines: SideBySide, prior: Prior, start: Start | None = None, kept: int = KEPT) -> Filtered:
+def filtered(machines: Histories, prior: DriftPrior, start: DriftStart | None = None, kept: int = KEPT) -> DriftState:
     """Filter all certificates of all machines at all nodes.
 
-    Parameters
-    ----------
-    machines : their histories.
-    prior : nodes.
-    start : of rates and artefacts, where it is not :func:`usual_start`.
-    kept : tales kept after each certificate.
+    ``start``: of rates and artefacts, where it is not :func:`usual_start`.
     """
     start = start or usual_start(machines, prior)
     order = np.argsort(-machines.given.sum(axis=0), kind="stable")  # whoever has no further certificate is done
-    machines, start = machines.some(order), Start(start.mean[:, order], start.covariance[:, :, order])
+    machines, start = machines.some(order), DriftStart(start.mean[:, order], start.covariance[:, :, order])
     d, N, K = len(start.mean) + 1, len(machines), len(prior)
     mean, covariance = np.zeros((d, N, K, 1)), np.zeros((d, d, N, K, 1))
     mean[1:, ..., 0], covariance[1:, 1:, ..., 0] = start.mean, start.covariance
     covariance[0, 0] = (prior.first_sd**2)[:, None]
-    state, done = Filtered(mean, covariance, np.zeros((N, K, 1))), []
+    state, done = DriftState(mean, covariance, np.zeros((N, K, 1))), []
     for k, left in enumerate(machines.given.sum(axis=1)):
         done.append(state.between(left, None))
         state = _measured(_moved(state.between(0, left), machines, prior, k), machines, prior, k, kept)
@@ -123,7 +122,7 @@ def filtered(machines: SideBySide, prior: Prior, start: Start | None = None, kep
     return state
 
 
-def _set_back(state: Filtered, adjusted: NDArray[np.bool_], prior: Prior) -> None:
+def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: DriftPrior) -> None:
     """The level as an adjustment leaves it, in place; ``adjusted`` is (N, 1, 1)."""
     state.mean[0] *= ~adjusted
     state.covariance[0] *= ~adjusted
@@ -131,7 +130,7 @@ def _set_back(state: Filtered, adjusted: NDArray[np.bool_], prior: Prior) -> Non
     state.covariance[0, 0] += adjusted * (prior.as_left_sd**2)[:, None]
 
 
-def _side_by_side(parts: list[Filtered], order: NDArray[np.intp]) -> Filtered:
+def _side_by_side(parts: list[DriftState], order: NDArray[np.intp]) -> DriftState:
     """Machines with few certificates have few tales; the others' further ones have no weight."""
     most = max(part.log_weight.shape[-1] for part in parts)
 
@@ -140,13 +139,13 @@ def _side_by_side(parts: list[Filtered], order: NDArray[np.intp]) -> Filtered:
                 for array in arrays]  # fmt: skip
         return np.concatenate(wide, axis=-3).take(order, axis=-3)
 
-    return Filtered(
+    return DriftState(
         joined([part.mean for part in parts], 0.0), joined([part.covariance for part in parts], 0.0),
         joined([part.log_weight for part in parts], -np.inf),
     )  # fmt: skip
 
 
-def _moved(state: Filtered, machines: SideBySide, prior: Prior, k: int) -> Filtered:
+def _moved(state: DriftState, machines: Histories, prior: DriftPrior, k: int) -> DriftState:
     """To the day of certificate k: set back by an adjustment, along the rate, wandering; in place."""
     mean, covariance, N = state.mean, state.covariance, len(state.log_weight)
     adjusted, years = machines.adjusted[k, :N, None, None], machines.years[k, :N, None, None]
@@ -159,7 +158,7 @@ def _moved(state: Filtered, machines: SideBySide, prior: Prior, k: int) -> Filte
     return state
 
 
-def _measured(state: Filtered, machines: SideBySide, prior: Prior, k: int, kept: int) -> Filtered:
+def _measured(state: DriftState, machines: Histories, prior: DriftPrior, k: int, kept: int) -> DriftState:
     """With certificate k: each tale becomes four (no step or one before it; right or wrong), the likeliest are kept."""
     N, K, M = state.log_weight.shape
     shared, variance = machines.shared[k, :, :N, None, None], machines.u[k, :N, None, None] ** 2
@@ -177,7 +176,7 @@ def _measured(state: Filtered, machines: SideBySide, prior: Prior, k: int, kept:
     return _kept(state, log_weight, seen, spread, missed, size, kept)
 
 
-def _log_steps(years: Floats, prior: Prior) -> tuple[Floats, Floats]:
+def _log_steps(years: Floats, prior: DriftPrior) -> tuple[Floats, Floats]:
     """Logarithms of the probabilities of no step and of one in the years since the certificate before, (N, K) each."""
     expected = years[:, None] * prior.steps_per_year
     with np.errstate(divide="ignore"):
@@ -185,8 +184,8 @@ def _log_steps(years: Floats, prior: Prior) -> tuple[Floats, Floats]:
 
 
 def _kept(
-    state: Filtered, log_weight: Floats, seen: Floats, spread: Floats, missed: Floats, size: Floats, kept: int
-) -> Filtered:
+    state: DriftState, log_weight: Floats, seen: Floats, spread: Floats, missed: Floats, size: Floats, kept: int
+) -> DriftState:
     """The likeliest tales, each with its Kalman update; ``log_weight`` and ``spread`` are (N, K, 4, M)."""
     N, K, _, M = log_weight.shape
     few, rows = min(kept, 4 * M), np.arange(N * K)[:, None]
@@ -209,4 +208,30 @@ def _kept(
     gain = seen / taken(spread, tale, 4)
     mean += gain * taken(missed, of)
     covariance -= gain[:, None] * seen
-    return Filtered(mean, covariance, taken(log_weight, tale, 4))
+    return DriftState(mean, covariance, taken(log_weight, tale, 4))
+
+
+FEWEST = 2
+"""Certificates from which on a history says anything of a machine's own drift."""
+
+
+def change_since(
+    of: DriftHistory, days: float, *, prior: DriftPrior | None = None, limit: float | None = None
+) -> float | None:
+    """Root mean square change of an error by so many days after its last certificate, in its unit.
+
+    A rate that is known less and less well the farther it is carried on, a wandering and now and then a step:
+    √((r² + u²(r))·t² + w²·t + n·s²·t), averaged over the model's parameters given the certificates.
+
+    ``prior``: what the machine's fleet taught; else the default one; ``limit``: in units of which the default one is.
+    Gives ``None`` where there is one certificate only, or the machine was adjusted after the last: then nobody knows.
+    """
+    if len(of.day) < FEWEST or np.isfinite(of.adjusted_after):
+        return None
+    known = default_prior(limit_for(limit, of.u)) if prior is None else prior
+    state, years = filtered(side_by_side([of]), known), abs(days) / YEAR
+    weight = state.weights(known)[0]
+    rate = state.mean[1, 0] ** 2 + state.covariance[1, 1, 0]
+    wandering = (known.walk**2 + known.steps_per_year * known.step_sd**2)[:, None]
+    square = rate * years**2 + wandering * years
+    return float(np.sqrt(np.sum(weight * square) / np.sum(weight)))

@@ -13,33 +13,27 @@ from typing import TYPE_CHECKING, Literal
 
 from cmm_uq.base.messages import Text, Verbatim, day, foreign, number, say
 from cmm_uq.jobs.verdicts import BEYOND, NONE
-from cmm_uq.laboratory.due.checks import Checked, check_standings
-from cmm_uq.laboratory.due.interval import Interval, interval_by
+from cmm_uq.laboratory.due.checks import InterimCheck, check_standings
+from cmm_uq.laboratory.due.interval import RecalibrationInterval, interval_by
 from cmm_uq.laboratory.due.observed import Pool, calibrations
 from cmm_uq.laboratory.due.rule import Rule
-from cmm_uq.laboratory.records import ArtefactRow, Certificate, Machine
+from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
 
 if TYPE_CHECKING:
-    from cmm_uq.laboratory.due.drift_prior import Prior
+    from cmm_uq.laboratory.due.drift import DriftPrior as Prior
 
 State = Literal["overdue", "due", "later", "unknown"]
 
 
 @dataclass(frozen=True)
-class Due:
+class DueItem:
     """A machine or an artefact, and when it is to be calibrated.
 
-    Parameters
-    ----------
-    item : machine or artefact.
-    serial, name, model, place : of it.
-    last : day of its last calibration.
-    due : day by which it is to be calibrated again; ``None`` where nothing says so.
-    why : one sentence.
-    remarks : what else is to be known, a sentence each.
-    artefact : serial of the artefact that its last calibration was made with.
-    blocked : why no certificate of it can be made as things stand; empty where nothing is in the way.
-    beyond : whether its last certificate finds it beyond its limits: it is overdue from that day on.
+    ``last``: day of its last calibration; ``due``: day by which it is to be calibrated again; ``None`` where nothing
+    says so; ``remarks``: what else is to be known, a sentence each; ``artefact``: serial of the artefact that its
+    last calibration was made with; ``blocked``: why no certificate of it can be made as things stand; empty where
+    nothing is in the way; ``beyond``: whether its last certificate finds it beyond its limits: it is overdue from
+    that day on.
     """
 
     item: Literal["machine", "artefact"]
@@ -64,7 +58,6 @@ class Due:
 
 
 def after_months(start: dt.date, months: int) -> dt.date:
-    """The same day of a later month, or that month's last; no later than the calendar's last day."""
     years, month = divmod(start.month - 1 + months, 12)
     year = start.year + years
     if year > dt.MAXYEAR:
@@ -73,35 +66,27 @@ def after_months(start: dt.date, months: int) -> dt.date:
 
 
 @dataclass(frozen=True)
-class Known:
+class CalibrationRecord:
     """What is known of a machine on a day.
 
-    Parameters
-    ----------
-    machine, rule : as its newest certificate has them.
-    certificates : measured and standing ones up to the day, by day; of a fixed interval those since the last calibration.
-    limited : whether the last calibration sets a limit, or decides on one.
-    late : last date of those that are dated after the day; ``None`` where none is.
-    priors : what its fleet taught of each value, by name.
+    ``machine, rule``: as its newest certificate has them; ``certificates``: measured and standing ones up to the day,
+    by day; of a fixed interval those since the last calibration; ``limited``: whether the last calibration sets a
+    limit, or decides on one; ``late``: last date of those that are dated after the day; ``None`` where none is;
+    ``priors``: what its fleet taught of each value, by name.
     """
 
-    machine: Machine
+    machine: RecordedMachine
     rule: Rule
-    certificates: Sequence[Certificate]
+    certificates: Sequence[RecordedCertificate]
     limited: bool = True
     late: dt.date | None = None
     priors: Mapping[str, Prior] = field(default_factory=dict)
 
 
-def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> Due:
+def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> DueItem:
     """When a machine is to be calibrated again.
 
-    Parameters
-    ----------
-    of : what is known of the machine.
-    artefacts : by serial.
-    on : the day asked about.
-    pool : intervals of all machines of its model.
+    ``artefacts``: by serial; ``on``: the day asked about.
     """
     machine, known = of.machine, of.certificates
     remarks: list[Text] = []
@@ -113,7 +98,7 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
     done = calibrations(known)
     if not done:
         why = say("never calibrated up to {on}", on=day(on))
-        return Due(
+        return DueItem(
             "machine", machine.serial, machine.name, machine.model, machine.place, None, None, why, tuple(remarks)
         )
     last = done[-1]
@@ -131,11 +116,13 @@ def machine_due(of: Known, artefacts: Mapping[str, ArtefactRow], on: dt.date, po
     if used is not None and used.due is not None and blocked is None and used.due < calibrated_again:
         remarks.append(say("Its artefact {artefact} is itself due on {due}, before that.",
                            artefact=Verbatim(used.serial), due=day(used.due)))  # fmt: skip
-    return Due("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, reason,
+    return DueItem("machine", machine.serial, machine.name, machine.model, machine.place, last.day, calibrated_again, reason,
                tuple(remarks), last.artefact, blocked, _is_beyond(of, last, on))  # fmt: skip
 
 
-def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Pool) -> tuple[dt.date, Text]:
+def _machine_date(
+    of: CalibrationRecord, done: Sequence[RecordedCertificate], on: dt.date, pool: Pool
+) -> tuple[dt.date, Text]:
     """By the first of: an adjustment since, a certificate that does not conform, an interim check, the rule."""
     last, known, rule = done[-1], of.certificates, of.rule
     if adjusted := _adjusted_after(of, last, on):
@@ -150,24 +137,24 @@ def _machine_date(of: Known, done: Sequence[Certificate], on: dt.date, pool: Poo
     return _checked(rule, last, planned, interval.why, checks)
 
 
-def _adjusted_after(of: Known, last: Certificate, on: dt.date) -> list[dt.date]:
+def _adjusted_after(of: CalibrationRecord, last: RecordedCertificate, on: dt.date) -> list[dt.date]:
     since = (*of.machine.adjusted, *(one.adjusted_since for one in of.certificates))
     return [one for one in since if one is not None and last.day < one <= on]
 
 
-def _is_beyond(of: Known, last: Certificate, on: dt.date) -> bool:
+def _is_beyond(of: CalibrationRecord, last: RecordedCertificate, on: dt.date) -> bool:
     """Whether its last certificate finds it beyond its limits, and nobody has adjusted it since."""
     return last.decision in BEYOND and not _adjusted_after(of, last, on)
 
 
-def _ends(start: dt.date, interval: Interval) -> dt.date:
+def _ends(start: dt.date, interval: RecalibrationInterval) -> dt.date:
     if interval.months is not None:
         return after_months(start, interval.months)
     return dt.date.fromordinal(min(start.toordinal() + int(interval.days or 0), dt.date.max.toordinal()))
 
 
 def _checked(
-    rule: Rule, last: Certificate, planned: dt.date, why: Text, checks: Sequence[Checked]
+    rule: Rule, last: RecordedCertificate, planned: dt.date, why: Text, checks: Sequence[InterimCheck]
 ) -> tuple[dt.date, Text]:
     """What interim checks make of the date: an action ends the interval, a check in control may lengthen a fixed one."""
     for one in checks:
@@ -188,7 +175,7 @@ def _checked(
                             day=day(newest.certificate.day))  # fmt: skip
     if rule.method != "fixed" or rule.longest_months is None:
         return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
-    carried = Interval((planned - last.day).days, None, why)
+    carried = RecalibrationInterval((planned - last.day).days, None, why)
     extended = min(_ends(newest.certificate.day, carried), after_months(last.day, rule.longest_months))
     if extended <= planned:
         return planned, say("{why}; interim checks up to {day} in control", why=why, day=day(newest.certificate.day))
@@ -196,7 +183,7 @@ def _checked(
                          day=day(newest.certificate.day))  # fmt: skip
 
 
-def _furthest(one: Checked) -> Text:
+def _furthest(one: InterimCheck) -> Text:
     if not one.worst:
         return say("nothing in it can be compared")
     return say("{name}: {ratio} standard uncertainties from the calibration, limit {limit}", name=foreign(one.worst),
@@ -210,16 +197,16 @@ def _blocked(artefact: ArtefactRow | None, on: dt.date) -> Text | None:
                artefact=Verbatim(artefact.serial), due=day(artefact.due))  # fmt: skip
 
 
-def artefact_due(artefact: ArtefactRow) -> Due:
+def artefact_due(artefact: ArtefactRow) -> DueItem:
     """When an artefact is to be calibrated again, as its own certificate says."""
     why: Text = say("as the jobs that use it say")
     if artefact.certificate:
         why = say("as its certificate {number} says", number=Verbatim(artefact.certificate))
     if artefact.due is None:
         why = say("no job says when its calibration ends")
-    return Due("artefact", artefact.serial, artefact.kind, "", "", artefact.calibrated, artefact.due, why)
+    return DueItem("artefact", artefact.serial, artefact.kind, "", "", artefact.calibrated, artefact.due, why)
 
 
-def in_order(found: Sequence[Due]) -> list[Due]:
+def in_order(found: Sequence[DueItem]) -> list[DueItem]:
     """By day; those that nothing is known of come last."""
     return sorted(found, key=lambda one: (one.due is None, one.due or dt.date.max, one.item, one.serial))

@@ -1,13 +1,16 @@
 """A fleet of machines and one of their errors: what drift is usual, who does not belong, and each machine's own drift.
 
+A fleet of machines and one of their errors: what drift is usual, who does not belong, and each machine's own drift.
+
 Hyper-parameters are sampled by emcee, all else is exact given them (:mod:`cmm_uq.laboratory.due.fleet_model`). Each
 machine is judged and estimated with what all the *others* say as its prior, so that its certificates count once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +18,30 @@ from scipy import special
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.jobs.verdicts import BEYOND
 from cmm_uq.laboratory.due.crossing import Crossings, crossings
-from cmm_uq.laboratory.due.drift import History, SideBySide, side_by_side
-from cmm_uq.laboratory.due.drift_filter import Filtered, Start, filtered, log_sum
-from cmm_uq.laboratory.due.drift_prior import MEDIANS, NAMES, SPREADS, Prior, learnt_prior, limit_for
-from cmm_uq.laboratory.due.fleet_model import Shared, log_posterior, messages, others, shared_by, together
-from cmm_uq.laboratory.due.fleet_prior import FleetPrior
+from cmm_uq.laboratory.due.drift import (
+    MEDIANS,
+    NAMES,
+    SPREADS,
+    YEAR,
+    DriftHistory,
+    DriftPrior,
+    Histories,
+    learnt_prior,
+    limit_for,
+    side_by_side,
+)
+from cmm_uq.laboratory.due.drift_filter import DriftStart, DriftState, filtered, log_sum
+from cmm_uq.laboratory.due.fleet_model import (
+    FleetPrior,
+    SharedEffects,
+    log_posterior,
+    messages,
+    others,
+    shared_by,
+    together,
+)
 from cmm_uq.maths.inference.ensembles import LEAST_EFFECTIVE_SAMPLES, Chains, run_ensembles
 from cmm_uq.maths.inference.proposals import tempered
 
@@ -45,19 +66,19 @@ Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Member:
+class FleetMember:
     """A machine of the fleet: its name or serial, its model, its place, its certificates, and what the last one decides."""
 
     machine: str
     model: str
     place: str
-    history: History
+    history: DriftHistory
     limit: float | None = None
     outcome: str = ""
 
 
 @dataclass(frozen=True)
-class Usual:
+class UsualRate:
     """The rate per year that is usual for a group of machines, its standard uncertainty and 95 % interval.
 
     ``kind`` is "fleet" (the average machine), "model" (at the fleet's average place) or "place" (for its average model).
@@ -73,7 +94,7 @@ class Usual:
 
 
 @dataclass(frozen=True)
-class Spread:
+class HyperParameter:
     """A hyper-parameter: its name in the model, posterior median and 95 % interval."""
 
     name: str
@@ -86,12 +107,9 @@ class Spread:
 class Estimates:
     """Of N machines, rates per year.
 
-    Attributes
-    ----------
-    rate, u_rate : (N,) with the fleet as prior.
-    expected, u_expected : (N,) what all others say of a machine of its model and place, before its own certificates.
-    p : (N,) probability of a rate as far from that or farther, near 1 where its certificates say nothing of it.
-    crossing : where there is a limit.
+    ``rate, u_rate``: (N,) with the fleet as prior; ``expected, u_expected``: (N,) what all others say of a machine of
+    its model and place, before its own certificates; ``p``: (N,) probability of a rate as far from that or farther,
+    near 1 where its certificates say nothing of it; ``crossing``: where there is a limit.
     """
 
     rate: Floats
@@ -106,17 +124,12 @@ class Estimates:
 class Fleet(FleetPrior):
     """What was learnt: the prior for a further machine, and all else.
 
-    Attributes
-    ----------
-    usual, spreads : what is usual, and how much differs.
-    machines : names, in the order of the estimates.
-    estimates : of each.
-    learnt_from : machines that the hyper-parameters were sampled from.
-    chains : of emcee.
+    ``usual, spreads``: what is usual, and how much differs; ``machines``: names, in the order of the estimates;
+    ``learnt_from``: machines that the hyper-parameters were sampled from.
     """
 
-    usual: tuple[Usual, ...]
-    spreads: tuple[Spread, ...]
+    usual: tuple[UsualRate, ...]
+    spreads: tuple[HyperParameter, ...]
     machines: tuple[str, ...]
     estimates: Estimates
     learnt_from: int
@@ -124,22 +137,14 @@ class Fleet(FleetPrior):
 
 
 def fit_fleet(
-    members: Sequence[Member], seed: int = 1, progress: Progress | None = None, *, learnt_from: int = LEARNT_FROM,
+    members: Sequence[FleetMember], seed: int = 1, progress: Progress | None = None, *, learnt_from: int = LEARNT_FROM,
     crossing_paths: int = 512,
 ) -> Fleet:  # fmt: skip
     """Learn from a fleet.
 
-    Parameters
-    ----------
-    members : machines with at least one certificate each; one alone is possible, and learns little.
-    seed : the same seed gives the same figures.
-    progress : told the part done.
-    learnt_from : machines that hyper-parameters are sampled from, drawn by lot where there are more.
-    crossing_paths : drawn for the day of crossing of each.
-
-    Raises
-    ------
-    CmmUqError : no machine.
+    ``members``: machines with at least one certificate each; one alone is possible, and learns little;
+    ``learnt_from``: machines that hyper-parameters are sampled from, drawn by lot where there are more;
+    ``crossing_paths``: drawn for the day of crossing of each.
     """
     if not members:
         raise CmmUqError("no machine has a certificate that states this value",
@@ -165,7 +170,7 @@ def fit_fleet(
 
 
 def _sampled(
-    machines: SideBySide, shared: Shared, unit: float, seed: int, progress: Progress | None, most: int
+    machines: Histories, shared: SharedEffects, unit: float, seed: int, progress: Progress | None, most: int
 ) -> tuple[Chains, int]:
     """Draws of the hyper-parameters, and from how many machines."""
     which = np.arange(len(machines))
@@ -191,7 +196,9 @@ def _spaced(draws: Floats, count: int) -> Floats:
     return draws[np.linspace(0, len(draws) - 1, count).astype(np.intp)]
 
 
-def _usual(members: Sequence[Member], shared: Shared, mean: Floats, covariance: Floats) -> tuple[Usual, ...]:
+def _usual(
+    members: Sequence[FleetMember], shared: SharedEffects, mean: Floats, covariance: Floats
+) -> tuple[UsualRate, ...]:
     """Of the fleet's average machine, of each model at the average place, and of each place for the average model."""
     average = shared.design[:, 0].mean(axis=0)
     found = [_moments("fleet", "", len(members), average, mean, covariance)]
@@ -207,26 +214,26 @@ def _usual(members: Sequence[Member], shared: Shared, mean: Floats, covariance: 
     return tuple(found)
 
 
-def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covariance: Floats) -> Usual:
+def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covariance: Floats) -> UsualRate:
     """Of a sum of effects over draws of the hyper-parameters."""
     means, variances = mean @ row, np.einsum("i,wij,j->w", row, covariance, row)
     rate, u = float(means.mean()), float(np.sqrt(variances.mean() + means.var()))
     half = float(special.ndtri(0.975)) * u
-    return Usual(kind, name, count, rate, u, rate - half, rate + half)
+    return UsualRate(kind, name, count, rate, u, rate - half, rate + half)
 
 
-def _spreads(draws: Floats, unit: float) -> tuple[Spread, ...]:
+def _spreads(draws: Floats, unit: float) -> tuple[HyperParameter, ...]:
     """Posterior of each hyper-parameter in the unit of the values."""
     quantiles = np.exp(np.quantile(draws, [0.5, 0.025, 0.975], axis=0))
     scales = [1.0 if name == "steps_per_year" else unit for name in NAMES]
     return tuple(
-        Spread(name, *(float(scale * q) for q in column))
+        HyperParameter(name, *(float(scale * q) for q in column))
         for name, scale, column in zip(NAMES, scales, quantiles.T, strict=True)
     )
 
 
 def _estimated(
-    machines: SideBySide, start: Start, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
+    machines: Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
 ) -> Estimates:
     """Each machine's own estimates, from what the others say and its certificates; in parts that fit the memory."""
     prior = learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
@@ -235,7 +242,7 @@ def _estimated(
     parts = []
     for i in range(0, len(machines), chunk):
         which = np.arange(i, min(i + chunk, len(machines)))
-        some = Start(start.mean[:, which][..., prior.group], start.covariance[:, :, which][..., prior.group])
+        some = DriftStart(start.mean[:, which][..., prior.group], start.covariance[:, :, which][..., prior.group])
         few = machines.some(which)
         state = filtered(few, prior, some)
         parts.append((_rates(state, prior, some), crossings(few, prior, state, limit[which], paths=paths)))
@@ -244,7 +251,7 @@ def _estimated(
     return Estimates(rate, u, expected, u_expected, p, crossing)
 
 
-def _rates(state: Filtered, prior: Prior, start: Start) -> Floats:
+def _rates(state: DriftState, prior: DriftPrior, start: DriftStart) -> Floats:
     """Rate and u with the certificates, the same before them, and the probability of so great a shift between, (5, N).
 
     If the machine is one of its fleet, the certificates shift the mean of its rate by a normal deviate whose variance is what
@@ -268,7 +275,7 @@ def _rates(state: Filtered, prior: Prior, start: Start) -> Floats:
     return np.stack([mean, np.sqrt(total), expected, u_expected, p])
 
 
-def _without_it(state: Filtered, prior: Prior) -> Floats:
+def _without_it(state: DriftState, prior: DriftPrior) -> Floats:
     """Weights (N, g) that make draws of a fleet's posterior those of the same fleet without the machine.
 
     They are the inverse of the density of its certificates given those of the others, truncated (Ionides 2008): a machine far
@@ -289,3 +296,116 @@ def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> NDArra
     passed = np.flatnonzero(order <= false_discoveries * np.arange(1, n + 1) / n)
     threshold = order[passed[-1]] if len(passed) else -1.0
     return np.asarray(p > threshold)
+
+
+@dataclass(frozen=True, eq=False)
+class FleetValue:
+    """One error factor or figure of performance over the fleet.
+
+    ``name, quantity, unit``: of the value; the unit as recorded; ``members``: machines, in the order of the fleet's
+    estimates; ``belongs``: (N,) whether each machine drifts as its fleet lets expect, all values taken together;
+    ``left_out``: certificates that state no uncertainty, which cannot be weighed.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    members: tuple[FleetMember, ...]
+    fleet: Fleet
+    belongs: NDArray[np.bool_]
+    left_out: int
+
+    @property
+    def compared(self) -> bool:
+        """Whether machines could be compared."""
+        return comparable(self.members)
+
+    @cached_property
+    def median(self) -> Floats:
+        """Days after its last certificate by which a machine has as likely as not crossed its limit, (N,).
+
+        0 where it had already; infinite beyond the horizon, and without a limit.
+        """
+        crossing = self.fleet.estimates.crossing
+        return np.full(len(self.members), np.inf) if crossing is None else crossing.quantile(0.5)
+
+    @property
+    def crosses(self) -> Floats:
+        """Ordinals of these days, (N,)."""
+        crossing = self.fleet.estimates.crossing
+        return self.median if crossing is None else crossing.last + self.median
+
+    @property
+    def beyond(self) -> NDArray[np.bool_]:
+        """Whether a machine was beyond its limit at its last certificate, (N,): as that says, or where it says nothing."""
+        probably = self.median == 0
+        return np.array(
+            [one.outcome in BEYOND if one.outcome else bool(probably[i]) for i, one in enumerate(self.members)]
+        )
+
+    def crosses_by(self, day: float) -> NDArray[np.bool_]:
+        """Whether a machine that was not crosses its limit by an ordinal, (N,)."""
+        return np.asarray(~self.beyond & (self.crosses <= day))
+
+
+@dataclass(frozen=True, eq=False)
+class FleetResult:
+    """All values that were asked for."""
+
+    values: tuple[FleetValue, ...]
+    seed: int
+
+    @property
+    def outsiders(self) -> list[tuple[FleetValue, int]]:
+        """Machines that do not belong, by value: the value, and the machine's place among its members."""
+        return [(value, int(i)) for value in self.values for i in np.flatnonzero(~value.belongs)]
+
+    @property
+    def newest(self) -> float:
+        """Ordinal of the newest certificate."""
+        return max(float(member.history.day[-1]) for value in self.values for member in value.members)
+
+    @property
+    def in_a_year(self) -> float:
+        """Ordinal, a year after the newest certificate."""
+        return self.newest + YEAR
+
+    @property
+    def compared(self) -> bool:
+        """Whether machines could be compared by any value."""
+        return any(value.compared for value in self.values)
+
+    @property
+    def converged(self) -> bool:
+        return all(value.fleet.chains.converged for value in self.values)
+
+
+def comparable(members: Iterable[FleetMember]) -> bool:
+    """Whether two machines at least have certificates of two days: a machine seen on one shows no drift of its own."""
+    return sum(seen_again(member) for member in members) > 1
+
+
+def seen_again(member: FleetMember) -> bool:
+    """Whether a machine has certificates of two days."""
+    return bool(np.ptp(member.history.day) > 0)
+
+
+def judged(learnt: Iterable[tuple[str, str, str, tuple[FleetMember, ...], Fleet, int]], seed: int) -> FleetResult:
+    """Values with who belongs: one procedure over all machines and values, so that many values accuse no more machines.
+
+    Where nothing can be compared, no machine is said not to belong.
+    """
+    all_learnt = list(learnt)
+    p = np.concatenate([fleet.estimates.p for *_, fleet, _ in all_learnt])
+    weighed = np.concatenate([np.full(len(members), comparable(members)) for *_, members, _, _ in all_learnt])
+    belongs = np.ones(len(p), dtype=np.bool_)
+    belongs[weighed] = belonging(p[weighed])
+    ends = np.cumsum([len(fleet.machines) for *_, fleet, _ in all_learnt])[:-1]
+    return FleetResult(
+        tuple(
+            FleetValue(name, quantity, unit, members, fleet, those, left_out)
+            for (name, quantity, unit, members, fleet, left_out), those in zip(
+                all_learnt, np.split(belongs, ends), strict=True)
+        ),
+        seed,
+    )  # fmt: skip

@@ -1,5 +1,7 @@
 """What a fleet's certificates say of its hyper-parameters, with all that is linear integrated exactly.
 
+What a fleet's certificates say of its hyper-parameters, with all that is linear integrated exactly.
+
 A machine's certificates speak of its rate and of the errors of its artefacts; given the hyper-parameters they do so nearly as
 a Gaussian would (exactly, where no tale but the first counts: moments over the tales otherwise). Rates of machines are those
 usual for fleet, model and place, and their own; artefacts are shared. All of these are then one Gaussian, integrated in one
@@ -8,15 +10,16 @@ solution of linear equations (a hierarchical linear model: Gelman et al. 2013, B
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.laboratory.due.drift import SideBySide
-from cmm_uq.laboratory.due.drift_filter import Filtered, Start, filtered, log_sum
-from cmm_uq.laboratory.due.drift_prior import NAMES, USUAL_RATE_SD, Prior, learnt_prior, log_density
+from cmm_uq.laboratory.due.drift import NAMES, USUAL_RATE_SD, DriftPrior, Histories, learnt_prior, log_density
+from cmm_uq.laboratory.due.drift_filter import DriftStart, DriftState, filtered, log_sum, usual_start
 
 _RATE, _MODEL, _PLACE = (NAMES.index(name) for name in ("rate_sd", "model_sd", "place_sd"))
 MOST_ARTEFACTS = 100
@@ -27,13 +30,11 @@ _KEPT = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
+class SharedEffects:
     """What machines have in common: G = 1 + models + places + artefacts that several were measured with.
 
-    Attributes
-    ----------
-    models, places, artefacts : their names, in the order of the columns, after that of the whole fleet.
-    design : (N, 1 + q, G) from these to the rate usual for each machine, and to the errors of its artefacts.
+    ``models, places, artefacts``: their names, in the order of the columns, after that of the whole fleet;
+    ``design``: (N, 1 + q, G) from these to the rate usual for each machine, and to the errors of its artefacts.
     """
 
     models: tuple[str, ...]
@@ -49,12 +50,11 @@ class Shared:
         columns += [sizes[:, _MODEL] * unit] * len(self.models) + [sizes[:, _PLACE] * unit] * len(self.places)
         return np.stack([*columns, *[one] * len(self.artefacts)], axis=1) ** 2
 
-    def some(self, which: Ints) -> Shared:
-        """Of these machines only."""
-        return Shared(self.models, self.places, self.artefacts, self.design[which])
+    def some(self, which: Ints) -> SharedEffects:
+        return SharedEffects(self.models, self.places, self.artefacts, self.design[which])
 
 
-def shared_by(machines: SideBySide, models: Sequence[str], places: Sequence[str]) -> Shared:
+def shared_by(machines: Histories, models: Sequence[str], places: Sequence[str]) -> SharedEffects:
     """What machines of these models and places share; an artefact of one machine only is the machine's own."""
     N, q = machines.artefacts.shape
     used = np.bincount(machines.artefacts[machines.artefacts >= 0], minlength=len(machines.names))
@@ -68,18 +68,14 @@ def shared_by(machines: SideBySide, models: Sequence[str], places: Sequence[str]
     for column, artefact in enumerate(common):
         machine, slot = np.nonzero(machines.artefacts == artefact)
         design[machine, 1 + slot, first + column] = 1.0
-    return Shared(tuple(all_models), tuple(all_places), tuple(machines.names[i] for i in common), design)
+    return SharedEffects(tuple(all_models), tuple(all_places), tuple(machines.names[i] for i in common), design)
 
 
 @dataclass(frozen=True, eq=False)
 class Messages:
     """What each machine says of its rate and its artefacts, up to a factor exp(constant + η·v − v·Λ·v/2).
 
-    Attributes
-    ----------
-    constant : (N, W).
-    linear : (N, W, 1 + q).
-    precision : (N, W, 1 + q, 1 + q).
+    ``constant``: (N, W); ``linear``: (N, W, 1 + q); ``precision``: (N, W, 1 + q, 1 + q).
     """
 
     constant: Floats
@@ -87,7 +83,6 @@ class Messages:
     precision: Floats
 
     def without_own_rate(self, rate_sd: Floats) -> Messages:
-        """The same of the rate usual for the machine, its own part of standard deviation (W,) integrated out."""
         own = 1.0 / (self.precision[..., 0, 0] + rate_sd**-2.0)
         row = self.precision[..., 0, :]
         return Messages(
@@ -98,13 +93,10 @@ class Messages:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class SharedGaussian:
     """The Gaussian of all that machines share, for W sets of hyper-parameters.
 
-    Attributes
-    ----------
-    precision, linear : (W, G, G) and (W, G).
-    log_evidence : (W,) of all certificates.
+    ``precision, linear``: (W, G, G) and (W, G); ``log_evidence``: (W,) of all certificates.
     """
 
     precision: Floats
@@ -112,7 +104,7 @@ class Together:
     log_evidence: Floats
 
 
-def messages(machines: SideBySide, shared: Shared, theta: Floats, unit: float) -> Messages:
+def messages(machines: Histories, shared: SharedEffects, theta: Floats, unit: float) -> Messages:
     """What machines say, for W sets of hyper-parameters (W, 8)."""
     rate_variance = (np.exp(2 * theta[:, _RATE]) + np.exp(2 * theta[:, _MODEL]) + np.exp(2 * theta[:, _PLACE])
                      + USUAL_RATE_SD**2) * unit**2  # fmt: skip
@@ -133,7 +125,7 @@ def messages(machines: SideBySide, shared: Shared, theta: Floats, unit: float) -
     return Messages(constant + 0.5 * np.log(before).sum(axis=-1), linear, inverse - own / before[..., None])
 
 
-def _of_groups(state: Filtered, prior: Prior) -> tuple[Floats, Floats, Floats]:
+def _of_groups(state: DriftState, prior: DriftPrior) -> tuple[Floats, Floats, Floats]:
     """Evidence (N, W), mean (N, W, d) and covariance (N, W, d, d) of rate and artefacts over tales and a group's nodes."""
     N, K, M = state.log_weight.shape
     W = len(prior.members)
@@ -150,7 +142,7 @@ def _of_groups(state: Filtered, prior: Prior) -> tuple[Floats, Floats, Floats]:
     return log_evidence, mean.transpose(1, 2, 0), covariance.transpose(2, 3, 0, 1)
 
 
-def together(said: Messages, shared: Shared, theta: Floats, unit: float) -> Together:
+def together(said: Messages, shared: SharedEffects, theta: Floats, unit: float) -> SharedGaussian:
     """All machines' messages and the prior of what they share, for each set of hyper-parameters."""
     variances = shared.variances(theta, unit)
     of_usual = said.without_own_rate(np.exp(theta[:, _RATE]) * unit)
@@ -165,17 +157,19 @@ def together(said: Messages, shared: Shared, theta: Floats, unit: float) -> Toge
     solved = np.linalg.solve(precision, linear[..., None])[..., 0]
     evidence = of_usual.constant.sum(axis=0) + 0.5 * (linear * solved).sum(axis=1)
     evidence -= 0.5 * (np.linalg.slogdet(precision)[1] + np.log(variances).sum(axis=1))
-    return Together(precision, linear, evidence)
+    return SharedGaussian(precision, linear, evidence)
 
 
-def log_posterior(machines: SideBySide, shared: Shared, theta: Floats, unit: float) -> Floats:
+def log_posterior(machines: Histories, shared: SharedEffects, theta: Floats, unit: float) -> Floats:
     """Of hyper-parameters (W, 8), up to a constant, (W,)."""
     said = messages(machines, shared, theta, unit)
     found = together(said, shared, theta, unit).log_evidence + log_density(theta)
     return np.where(np.isfinite(found), found, -np.inf)
 
 
-def others(said: Messages, all_together: Together, shared: Shared, theta: Floats, unit: float) -> Start:
+def others(
+    said: Messages, all_together: SharedGaussian, shared: SharedEffects, theta: Floats, unit: float
+) -> DriftStart:
     """Rate and artefacts' errors of each machine as all the others say: (1 + q, N, W) and (1 + q, 1 + q, N, W).
 
     A machine's own message is taken out of the sum, which is exact.
@@ -194,4 +188,100 @@ def others(said: Messages, all_together: Together, shared: Shared, theta: Floats
         for slot in np.flatnonzero(~A.any(axis=1)):  # an artefact of its own, or none
             covariance[slot, slot, i] = 1.0
         covariance[0, 0, i] += rate_sd**2
-    return Start(mean, covariance)
+    return DriftStart(mean, covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class FleetPrior:
+    """Draws of the hyper-parameters' posterior, and at each the Gaussian of what the fleet, models and places add to a rate.
+
+    Attributes
+    ----------
+    unit : what hyper-parameters are in units of; see :func:`~cmm_uq.laboratory.due.drift.limit_for`.
+    theta : (g, 8) logarithms of hyper-parameters.
+    models, places : names.
+    effects, covariance : (g, E) and (g, E, E) of 1 + models + places effects.
+    """
+
+    unit: float
+    theta: Floats
+    models: tuple[str, ...]
+    places: tuple[str, ...]
+    effects: Floats
+    covariance: Floats
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any], where: str = "fleet.json") -> FleetPrior:
+        """From ``prior`` of a value in ``fleet.json``.
+
+        Raises
+        ------
+        CmmUqError : it is not what this version writes.
+        """
+        try:
+            theta, effects, covariance = (
+                np.array(data[key], dtype=np.float64) for key in ("log", "effects", "covariance")
+            )
+            found = FleetPrior(
+                float(data["unit"]), theta, tuple(data["models"]), tuple(data["places"]), effects, covariance
+            )
+            size = 1 + len(found.models) + len(found.places)
+            fits = theta.shape == (len(theta), len(NAMES)) and covariance.shape == (len(theta), size, size)
+            sound = fits and effects.shape == (len(theta), size) and list(data["hyper_parameters"]) == list(NAMES)
+        except (KeyError, TypeError, ValueError):
+            sound = False
+        if not sound:
+            raise CmmUqError(
+                "is no prior of a fleet that this version reads", where=where, fix="Make it again: cmm-uq fleet"
+            )
+        return found
+
+    def data(self) -> dict[str, Any]:
+        """For ``fleet.json``."""
+        return {
+            "unit": self.unit, "hyper_parameters": list(NAMES), "log": self.theta.tolist(), "models": list(self.models),
+            "places": list(self.places), "effects": self.effects.tolist(), "covariance": self.covariance.tolist(),
+        }  # fmt: skip
+
+    def prior(self, model: str = "", place: str = "") -> DriftPrior:
+        """Of a machine of a model at a place; either may be new to the fleet.
+
+        Parameters
+        ----------
+        model, place : names.
+        """
+        rate, rate_sd = self._usual_rate(model, place)
+        return learnt_prior(self.theta, rate, rate_sd, self.unit)
+
+    def start(self, machines: Histories, models: Sequence[str], places: Sequence[str]) -> tuple[DriftPrior, DriftStart]:
+        """The same of many machines, side by side: nodes common to all, and the rate of each.
+
+        Parameters
+        ----------
+        machines : their histories.
+        models, places : of each.
+        """
+        known = {of: self._usual_rate(*of) for of in set(zip(models, places, strict=True))}
+        rates = np.array([known[of] for of in zip(models, places, strict=True)])
+        prior = self.prior()
+        start = usual_start(machines, prior)
+        start.mean[0] = rates[:, 0][:, prior.group]
+        start.covariance[0, 0] = rates[:, 1][:, prior.group] ** 2
+        return prior, start
+
+    def _usual_rate(self, model: str, place: str) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (g,) of the rate of a machine at each draw."""
+        row = np.zeros(self.effects.shape[1])
+        row[0] = 1.0
+        sizes = np.exp(self.theta) * self.unit
+        variance = sizes[:, NAMES.index("rate_sd")] ** 2
+        for name, known, first, of in (
+            (model, self.models, 1, "model_sd"),
+            (place, self.places, 1 + len(self.models), "place_sd"),
+        ):
+            if name in known:
+                row[first + known.index(name)] = 1.0
+            else:
+                variance = variance + sizes[:, NAMES.index(of)] ** 2
+        variance = variance + np.einsum("i,wij,j->w", row, self.covariance, row)
+        return self.effects @ row, np.sqrt(variance)

@@ -1,4 +1,11 @@
-"""The history of one machine: every value over its certificates, what it changed by, and when it will cross its limit."""
+"""The history of one machine: every value over its certificates, what it changed by, and when it will cross its limit.
+
+A straight line through the values of one machine since it was last adjusted.
+
+Generalised least squares: the values are as uncertain as their certificates say, and what comes from the artefact is common
+to all that were made with it. A common error shifts the line and does not tilt it. Where the values scatter about the line by
+more than their uncertainties allow, the line is as much more uncertain (Birge ratio).
+"""
 
 from __future__ import annotations
 
@@ -8,39 +15,109 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, day, plural, say
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.verdicts import BEYOND, NONE
-from cmm_uq.laboratory.due.change import Change, Stated, change
+from cmm_uq.laboratory.due.change import ComparedValue, ValueChange, change, common_part
 from cmm_uq.laboratory.due.observed import is_of_machine
-from cmm_uq.laboratory.due.trend import Line, trend
-from cmm_uq.laboratory.records import Certificate, Machine, Series
-from cmm_uq.laboratory.records.facts import STANDING
+from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine, Series
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.due.crossing import Crossing
-    from cmm_uq.laboratory.due.drift_prior import Prior
+    from cmm_uq.laboratory.due.drift import DriftPrior as Prior
+
+YEAR = 365.2425
+"""Days."""
+
+_LEAST = 1e-9
+"""Standard uncertainty of a value that is stated without one, as a part of the largest value."""
+
+
+@dataclass(frozen=True)
+class TrendLine:
+    """The line.
+
+    ``count``: values that it was fitted to; ``day``: ordinal, at which ``value`` stands: that of the last of them;
+    ``value, slope``: then, and its change a year; ``covariance``: (2, 2) of both; ``excess``: Birge ratio: scatter
+    about the line over what the uncertainties allow; 1 where it is no more, and for two values.
+    """
+
+    count: int
+    day: int
+    value: float
+    slope: float
+    covariance: Floats
+    excess: float
+
+    def at(self, day: Floats) -> tuple[Floats, Floats]:
+        """Value and standard uncertainty (n,) on days (n,), ordinals."""
+        years = (np.asarray(day, dtype=np.float64) - self.day) / YEAR
+        terms = np.column_stack([np.ones_like(years), years])
+        u = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", terms, self.covariance, terms), 0))
+        return self.value + self.slope * years, u
+
+    @property
+    def u_slope(self) -> float:
+        """Standard uncertainty of the slope."""
+        return float(np.sqrt(self.covariance[1, 1]))
+
+
+def epochs(series: Series) -> list[slice]:
+    """Rows between adjustments, in turn."""
+    starts = np.flatnonzero(np.diff(series.adjusted_since, prepend=-1))
+    return [slice(int(a), int(b)) for a, b in zip(starts, [*starts[1:], len(series.day)], strict=True)]
+
+
+def covariance_of(u: Floats, u_artefact: Floats, artefact: NDArray[np.str_]) -> Floats:
+    """Covariance (n, n) of values (n,): what the artefact contributes is common to all with the same one."""
+    same = (np.asarray(artefact)[:, None] == np.asarray(artefact)[None, :]) & (np.asarray(artefact) != "")
+    covariance = np.where(same, np.outer(u_artefact, u_artefact), 0.0)
+    np.fill_diagonal(covariance, np.asarray(u, dtype=np.float64) ** 2)
+    return np.asarray(covariance, dtype=np.float64)
+
+
+def trend(series: Series) -> TrendLine | None:
+    """The line through the values since the last adjustment; ``None`` where they are of fewer than two days."""
+    rows = epochs(series)[-1] if len(series.day) else slice(0, 0)
+    day, value = series.day[rows], series.value[rows]
+    if len(np.unique(day)) < 2:
+        return None
+    pairs = zip(series.u[rows], series.u_artefact[rows], strict=True)
+    common = np.array([common_part(float(u), float(shared)) for u, shared in pairs])
+    covariance = covariance_of(series.u[rows], common, series.artefact[rows])
+    floor = _LEAST * max(float(np.abs(value).max()), 1e-30)
+    covariance += np.diag(np.full(len(day), floor**2))
+    terms = np.column_stack([np.ones(len(day)), (day - day[-1]) / YEAR])
+    weighed = np.linalg.solve(covariance, terms)
+    spread = np.linalg.inv(terms.T @ weighed)
+    found = spread @ (weighed.T @ value)
+    left = value - terms @ found
+    freedoms = len(day) - 2
+    chi2 = float(left @ np.linalg.solve(covariance, left))
+    excess = max(1.0, float(np.sqrt(chi2 / freedoms))) if freedoms else 1.0
+    return TrendLine(len(day), int(day[-1]), float(found[0]), float(found[1]), excess**2 * spread, excess)
 
 
 @dataclass(frozen=True)
 class ValueHistory:
     """One value of a machine over time.
 
-    Parameters
-    ----------
-    series : its values, none of them after the day asked about.
-    change : since the recording before the last; ``None`` where there is one only.
-    adjusted : whether the machine was adjusted between the two.
-    line : through the values since the last adjustment; ``None`` where they do not give one.
-    adjusted_after : ordinal of the machine's newest adjustment; ``None`` where none is known.
-    prior : what the machine's fleet taught of this value; ``None`` for the default one.
-    outcome : of the newest certificate's statement on it; empty where it states none.
+    ``series``: its values, none of them after the day asked about; ``change``: since the recording before the last;
+    ``None`` where there is one only; ``adjusted``: whether the machine was adjusted between the two; ``line``:
+    through the values since the last adjustment; ``None`` where they do not give one; ``adjusted_after``: ordinal of
+    the machine's newest adjustment; ``None`` where none is known; ``prior``: what the machine's fleet taught of this
+    value; ``None`` for the default one; ``outcome``: of the newest certificate's statement on it; empty where it
+    states none.
     """
 
     series: Series
-    change: Change | None
+    change: ValueChange | None
     adjusted: bool
-    line: Line | None
+    line: TrendLine | None
     adjusted_after: int | None = None
     prior: Prior | None = None
     outcome: str = ""
@@ -77,17 +154,14 @@ class ValueHistory:
 class MachineHistory:
     """All of a machine.
 
-    Parameters
-    ----------
-    machine, on : which, and up to which day.
-    certificates : its certificates and interim checks, by day, those withdrawn or replaced too.
-    values : in the order of the newest certificate.
-    remarks : what is to be known, a sentence each.
+    ``machine, on``: which, and up to which day; ``certificates``: its certificates and interim checks, by day, those
+    withdrawn or replaced too; ``values``: in the order of the newest certificate; ``remarks``: what is to be known, a
+    sentence each.
     """
 
-    machine: Machine
+    machine: RecordedMachine
     on: dt.date
-    certificates: tuple[Certificate, ...]
+    certificates: tuple[RecordedCertificate, ...]
     values: tuple[ValueHistory, ...]
     remarks: tuple[Text, ...]
 
@@ -104,8 +178,8 @@ class MachineHistory:
 
 
 def machine_history(
-    machine: Machine,
-    certificates: Sequence[Certificate],
+    machine: RecordedMachine,
+    certificates: Sequence[RecordedCertificate],
     series: Mapping[str, Series],
     on: dt.date,
     priors: Mapping[str, Prior] | None = None,
@@ -113,14 +187,9 @@ def machine_history(
 ) -> MachineHistory:
     """The history up to a day.
 
-    Parameters
-    ----------
-    machine : which.
-    certificates : of it, by day.
-    series : its values, by name.
-    on : the day; what is dated later does not count.
-    priors : what its fleet taught of each value, by name.
-    outcomes : what certificates state of their values, by entry and name.
+    ``certificates``: of it, by day; ``series``: its values, by name; ``on``: the day; what is dated later does not
+    count; ``priors``: what its fleet taught of each value, by name; ``outcomes``: what certificates state of their
+    values, by entry and name.
     """
     known = tuple(one for one in certificates if one.day <= on)
     remarks: list[Text] = []
@@ -164,7 +233,9 @@ def _value(series: Series, adjusted_after: int | None, prior: Prior | None, outc
     adjusted = False
     if len(series.day) > 1:
         before, now = (
-            Stated(float(series.value[i]), float(series.u[i]), float(series.u_artefact[i]), str(series.artefact[i]))
+            ComparedValue(
+                float(series.value[i]), float(series.u[i]), float(series.u_artefact[i]), str(series.artefact[i])
+            )
             for i in (-2, -1)
         )
         changed = change(before, now)

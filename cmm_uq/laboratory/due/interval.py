@@ -14,10 +14,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, say
 from cmm_uq.laboratory.due.observed import Pool
 from cmm_uq.laboratory.due.rule import Rule, months_of
-from cmm_uq.laboratory.records import Certificate
+from cmm_uq.laboratory.records.facts import RecordedCertificate
 
 if TYPE_CHECKING:
-    from cmm_uq.laboratory.due.drift_prior import Prior
+    from cmm_uq.laboratory.due.drift import DriftPrior as Prior
 
 METHOD_WORDS: Mapping[str, Text] = {
     "fixed": say("fixed"), "A3": Verbatim("A3"), "S2": Verbatim("S2"), "staircase": say("staircase"),
@@ -27,14 +27,11 @@ METHOD_WORDS: Mapping[str, Text] = {
 
 
 @dataclass(frozen=True)
-class Interval:
+class RecalibrationInterval:
     """An interval, and why it is that long.
 
-    Parameters
-    ----------
-    days : ``None`` where it is a number of calendar months.
-    months : that many; ``None`` where it is a number of days.
-    why : one sentence without a full stop.
+    ``days``: ``None`` where it is a number of calendar months; ``months``: that many; ``None`` where it is a number
+    of days; ``why``: one sentence without a full stop.
     """
 
     days: float | None
@@ -43,16 +40,12 @@ class Interval:
 
 
 def interval_by(
-    rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Mapping[str, Prior] | None = None
-) -> Interval:
+    rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Mapping[str, Prior] | None = None
+) -> RecalibrationInterval:
     """The interval after the last of a machine's calibrations.
 
-    Parameters
-    ----------
-    rule : of the machine.
-    certificates : of the machine, by day, up to its newest calibration; with later interim checks for the drift model.
-    pool : intervals of all machines of its model.
-    priors : what its fleet taught of each value, for the drift model.
+    ``certificates``: of the machine, by day, up to its newest calibration; with later interim checks for the drift
+    model.
     """
     if rule.method == "fixed":
         return _fixed(rule)
@@ -61,18 +54,18 @@ def interval_by(
     try:
         days, why = METHODS[rule.method](rule, certificates, pool, priors or {})
     except CmmUqError as error:
-        return Interval(
+        return RecalibrationInterval(
             None, rule.every_months,
             say("{months}, as method {method} cannot say: {why}", months=months_of(rule), method=METHOD_WORDS[rule.method],
                 why=foreign(error.problem)),
         )  # fmt: skip
-    return Interval(days, None, why)
+    return RecalibrationInterval(days, None, why)
 
 
 @lru_cache(maxsize=100)
-def _fixed(rule: Rule) -> Interval:
+def _fixed(rule: Rule) -> RecalibrationInterval:
     """A fixed interval; thousands of machines share a rule, and putting it into words takes longer than all else of it."""
     months = months_of(rule)
     stated = say("fixed interval of {months}", months=months)
     usual = say("{months}, as its job does not say otherwise", months=months)
-    return Interval(None, rule.every_months, stated if rule.stated else usual)
+    return RecalibrationInterval(None, rule.every_months, stated if rule.stated else usual)

@@ -9,26 +9,73 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, foreign, number, say
-from cmm_uq.laboratory.due.drift_interval import drift_interval
-from cmm_uq.laboratory.due.drift_prior import Prior
-from cmm_uq.laboratory.due.interval_test import interval_test
-from cmm_uq.laboratory.due.observed import Pool, adjusted_between, calibrations, ended_intervals
-from cmm_uq.laboratory.due.reliability_regression import grouped, reliability_regression
+from cmm_uq.laboratory.due.attributes import interval_test, staircase
+from cmm_uq.laboratory.due.crossing import crossing
+from cmm_uq.laboratory.due.drift import DriftPrior
+from cmm_uq.laboratory.due.observed import Pool, adjusted_between, calibrations, ended_intervals, is_of_machine
+from cmm_uq.laboratory.due.reliability import grouped, reliability_regression
 from cmm_uq.laboratory.due.rule import Rule, months_of
-from cmm_uq.laboratory.due.staircase import staircase
-from cmm_uq.laboratory.due.variables import Start, fitted_drift, interval_of_reliability
-from cmm_uq.laboratory.records import Certificate
+from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability
+from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
+
+
+def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Series:
+    """One value over certificates of one machine, by day, as the records give it.
+
+    ``certificates``: with their values; those without this one are left out.
+    """
+    rows = [(one, value) for one in certificates for value in one.values if value.name == name]
+    last = rows[-1][1]
+    limits = [value.limit for _, value in rows if value.limit is not None]
+    since = (one.adjusted_since for one, _ in rows)
+    return Series(
+        name, last.quantity, last.unit, limits[-1] if limits else None,
+        np.array([one.day.toordinal() for one, _ in rows]), np.array([value.value for _, value in rows]),
+        np.array([value.u for _, value in rows]), np.array([value.u_artefact for _, value in rows]),
+        np.array([one.artefact for one, _ in rows]), np.array([one.entry for one, _ in rows]),
+        np.array([0 if day is None else day.toordinal() for day in since]), np.array([one.interim for one, _ in rows]),
+    )  # fmt: skip
+
+
+def drift_interval(
+    certificates: Sequence[RecordedCertificate], reliability: float, priors: Mapping[str, DriftPrior]
+) -> tuple[float, str, bool]:
+    """Days after the last calibration until the first of the errors may have crossed its limit, and which one it is.
+
+    ``certificates``: of the machine, by day, interim checks too: the model takes all that was seen, as its history
+    does; ``priors``: of the machine's fleet, by the value's name; the default one where there is none.
+    Gives days, infinite beyond the model's horizon, the quantity's name, and whether its prior is a fleet's.
+    """
+    last = calibrations(certificates)[-1]
+    stated = (series_from(certificates, one.name) for one in last.values if is_of_machine(one.unit))
+    limited = [(one, one.limit) for one in stated if one.limit]
+    if not limited:
+        raise CmmUqError(say("its certificate has no limits"))
+    found: list[tuple[float, str, bool]] = []
+    refused: CmmUqError | None = None
+    for one, limit in limited:
+        try:
+            crossed = crossing(one, limit, priors.get(one.name)).quantile(1 - reliability)
+        except CmmUqError as error:
+            refused = error
+            continue
+        days = float("inf") if crossed is None else float((crossed - last.day).days)
+        found.append((days, one.quantity, one.name in priors))
+    if not found:
+        raise refused or CmmUqError(say("nothing in its history can be followed"))
+    return min(found)
+
 
 LIKE_DAYS, LIKE_PART = 56.0, 0.5
 """An interval is like the assigned one where it differs by no more than eight weeks, nor by half of it (as suncal has it)."""
 
-Priors = Mapping[str, Prior]
+Priors = Mapping[str, DriftPrior]
 
-Method = Callable[[Rule, Sequence[Certificate], Pool, Priors], tuple[float, Text]]
+Method = Callable[[Rule, Sequence[RecordedCertificate], Pool, Priors], tuple[float, Text]]
 """Days and the reason, from the rule, certificates, intervals of the model and priors of the fleet; refuses in words."""
 
 
-def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
+def _a3(rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     assigned = rule.days
     near = min(LIKE_DAYS, LIKE_PART * assigned)
     like = [one for one in pool() if abs(one.days - assigned) <= near]
@@ -44,7 +91,7 @@ def _a3(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Pri
     )  # fmt: skip
 
 
-def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
+def _s2(rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     ended = pool()
     if not ended:
         raise CmmUqError(say("no interval has ended with known limits"))
@@ -60,7 +107,9 @@ def _s2(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Pri
     return rule.changing.bounded(found.interval), why
 
 
-def _staircase(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
+def _staircase(
+    rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors
+) -> tuple[float, Text]:
     ended = ended_intervals(certificates)
     if not ended:
         raise CmmUqError(say("no interval of this machine has ended with known limits"))
@@ -71,7 +120,9 @@ def _staircase(rule: Rule, certificates: Sequence[Certificate], pool: Pool, prio
     )  # fmt: skip
 
 
-def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
+def _control_chart(
+    rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors
+) -> tuple[float, Text]:
     """The least of the intervals after which each value is within its limit with the reliability."""
     done = calibrations(certificates)
     pairs = [(a, b) for a, b in pairwise(done) if b.day > a.day and not adjusted_between(a, b)]
@@ -87,7 +138,7 @@ def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool, 
         if len(changes) < 2:
             continue
         days, differences = np.transpose(changes)
-        start, limit = Start(one.value, one.u), one.limit
+        start, limit = LastValue(one.value, one.u), one.limit
         length = interval_of_reliability(fitted_drift(days, differences), start, rule.reliability, -(limit or 0), limit)
         if shortest is None or length < shortest[0]:
             shortest = length, foreign(one.quantity)
@@ -99,7 +150,7 @@ def _control_chart(rule: Rule, certificates: Sequence[Certificate], pool: Pool, 
     return rule.changing.bounded(length), why
 
 
-def _drift(rule: Rule, certificates: Sequence[Certificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
+def _drift(rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Priors) -> tuple[float, Text]:
     length, name, learnt = drift_interval(certificates, rule.reliability, priors)
     why = say("{model}: {name} has not crossed its limit with {target} % for {reached}", name=Verbatim(name),
               model=say("drift model with its fleet") if learnt else say("drift model without a fleet"),

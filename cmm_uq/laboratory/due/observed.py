@@ -10,20 +10,17 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from cmm_uq.laboratory.records import Certificate
+from cmm_uq.laboratory.records.facts import RecordedCertificate
 
 _DECIDED = {"pass": 0.0, "conditional pass": 1.0, "conditional fail": 2.0, "fail": 2.0}
 """Part of the limits where only a decision is known: well within, just within, or beyond."""
 
 
 @dataclass(frozen=True)
-class Ended:
+class CompletedInterval:
     """An interval that a certificate ended.
 
-    Parameters
-    ----------
-    days : its length.
-    used : largest part of a limit that was found used up at its end; more than 1 is out of tolerance.
+    ``used``: largest part of a limit that was found used up at its end; more than 1 is out of tolerance.
     """
 
     days: int
@@ -35,11 +32,11 @@ class Ended:
         return self.used <= 1
 
 
-Pool = Callable[[], Sequence[Ended]]
+Pool = Callable[[], Sequence[CompletedInterval]]
 """Intervals of all machines of the model, this one's among them; asked for only by methods that pool."""
 
 
-def part_used(certificate: Certificate) -> float | None:
+def part_used(certificate: RecordedCertificate) -> float | None:
     """Largest part of a limit that a certificate finds used up; ``None`` where it knows neither limits nor a decision."""
     parts = [abs(one.value) / one.limit for one in certificate.values if one.limit]
     return max(parts) if parts else _DECIDED.get(certificate.decision)
@@ -50,22 +47,22 @@ def is_of_machine(unit: str) -> bool:
     return unit != "mm"
 
 
-def calibrations(certificates: Iterable[Certificate]) -> list[Certificate]:
+def calibrations(certificates: Iterable[RecordedCertificate]) -> list[RecordedCertificate]:
     """Those that are no interim checks."""
     return [one for one in certificates if not one.interim]
 
 
-def ended_intervals(certificates: Sequence[Certificate]) -> list[Ended]:
+def ended_intervals(certificates: Sequence[RecordedCertificate]) -> list[CompletedInterval]:
     """Intervals between the calibrations of one machine, sorted by day, whose ends are known."""
     ended = []
     for before, now in pairwise(calibrations(certificates)):
         used = part_used(now)
         if now.day > before.day and used is not None and not adjusted_between(before, now):
-            ended.append(Ended((now.day - before.day).days, used))
+            ended.append(CompletedInterval((now.day - before.day).days, used))
     return ended
 
 
-def adjusted_between(before: Certificate, now: Certificate) -> bool:
+def adjusted_between(before: RecordedCertificate, now: RecordedCertificate) -> bool:
     """Whether the machine was adjusted after the one and before the other."""
     return now.adjusted_since is not None and now.adjusted_since != before.adjusted_since and (
         now.adjusted_since >= before.day)  # fmt: skip

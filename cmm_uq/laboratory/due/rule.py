@@ -7,7 +7,30 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from cmm_uq.base.messages import Text, plural, say
-from cmm_uq.laboratory.due.changing import Changing
+
+
+@dataclass(frozen=True)
+class IntervalBounds:
+    """How far and how readily an interval is changed; the defaults are those of suncal.
+
+    ``confidence``: least confidence of a rejection that changes the interval; ``factor``: most that an interval grows
+    or shrinks by at once; ``least_days``: smaller changes are not worth making.
+    """
+
+    confidence: float = 0.5
+    factor: float = 2.0
+    least_days: float = 5.0
+    shortest_days: float = 14.0
+    longest_days: float = 1826.0
+
+    def bounded(self, days: float) -> float:
+        """The interval within its bounds."""
+        return min(max(days, self.shortest_days), self.longest_days)
+
+
+USUAL = IntervalBounds()
+"""As suncal has it."""
+
 
 DAYS_A_MONTH = 365.2425 / 12
 
@@ -24,13 +47,10 @@ LONGEST_MONTHS = 60
 class Rule:
     """A rule; see :class:`cmm_uq.jobs.recalibration.Recalibration`.
 
-    Parameters
-    ----------
-    method : one of fixed, A3, S2, staircase, control chart, drift.
-    every_months : interval, or the one that a method begins with.
-    reliability : wanted at the end of an interval.
-    shortest_months, longest_months : bounds of what a method, or a check, comes to; no longest one where nothing is said.
-    stated : whether the job says anything.
+    ``method``: one of fixed, A3, S2, staircase, control chart, drift; ``every_months``: interval, or the one that a
+    method begins with; ``reliability``: wanted at the end of an interval; ``shortest_months, longest_months``: bounds
+    of what a method, or a check, comes to; no longest one where nothing is said; ``stated``: whether the job says
+    anything.
     """
 
     method: str = "fixed"
@@ -56,10 +76,10 @@ class Rule:
         return self.every_months * DAYS_A_MONTH
 
     @property
-    def changing(self) -> Changing:
+    def changing(self) -> IntervalBounds:
         """Within which bounds a method changes it."""
         longest = max(self.longest_months or LONGEST_MONTHS, self.every_months)
-        return Changing(shortest_days=self.shortest_months * DAYS_A_MONTH, longest_days=longest * DAYS_A_MONTH)
+        return IntervalBounds(shortest_days=self.shortest_months * DAYS_A_MONTH, longest_days=longest * DAYS_A_MONTH)
 
 
 def months_of(rule: Rule) -> Text:

@@ -22,16 +22,12 @@ _FAR, _STEPS = 100.0, 4000
 
 
 @dataclass(frozen=True)
-class Drift:
+class DriftPolynomial:
     """A polynomial through zero, fitted by least squares.
 
-    Parameters
-    ----------
-    coefficients : (m,) of t, t², …
-    covariance : (m, m) of them, from the scatter about the curve.
-    scatter : standard deviation about the curve.
-    freedoms : degrees of freedom of it.
-    longest : interval that was observed, days.
+    ``coefficients``: (m,) of t, t², …; ``covariance``: (m, m) of them, from the scatter about the curve; ``scatter``:
+    standard deviation about the curve; ``freedoms``: degrees of freedom of it; ``longest``: interval that was
+    observed, days.
     """
 
     coefficients: Floats
@@ -51,7 +47,7 @@ class Drift:
 
 
 @dataclass(frozen=True)
-class Start:
+class LastValue:
     """A value when it was last calibrated: the value, its standard uncertainty and that one's degrees of freedom."""
 
     value: float
@@ -59,17 +55,10 @@ class Start:
     freedoms: float = np.inf
 
 
-def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> Drift:
+def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> DriftPolynomial:
     """Fit what a value changed by.
 
-    Parameters
-    ----------
-    days, changes : (n,) length of each interval, and what the value changed by over it.
-    order : of the polynomial.
-
-    Raises
-    ------
-    CmmUqError : no more intervals than the order, or one of no length.
+    ``days, changes``: (n,) length of each interval, and what the value changed by over it.
     """
     days, changes = np.asarray(days, dtype=np.float64), np.asarray(changes, dtype=np.float64)
     if len(days) <= order or not (days > 0).all():
@@ -83,12 +72,14 @@ def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> Drift:
     freedoms = len(days) - order
     variance = float(((changes - powers @ coefficients) ** 2).sum() / freedoms)
     unit = longest ** -np.arange(1, order + 1, dtype=np.float64)
-    return Drift(
+    return DriftPolynomial(
         coefficients * unit, variance * inverse * np.outer(unit, unit), float(np.sqrt(variance)), freedoms, longest
     )
 
 
-def reliability_after(drift: Drift, start: Start, days: Floats, low: float | None, high: float | None) -> Floats:
+def reliability_after(
+    drift: DriftPolynomial, start: LastValue, days: Floats, low: float | None, high: float | None
+) -> Floats:
     """Probability (n,) that the value lies within its limits after times (n,), each limit where there is one.
 
     The prediction has Student's t with Welch–Satterthwaite degrees of freedom.
@@ -104,12 +95,13 @@ def reliability_after(drift: Drift, start: Start, days: Floats, low: float | Non
     return np.asarray(above - below)
 
 
-def interval_of_reliability(drift: Drift, start: Start, target: float, low: float | None, high: float | None) -> float:
+def interval_of_reliability(
+    drift: DriftPolynomial, start: LastValue, target: float, low: float | None, high: float | None
+) -> float:
     """Days until the probability of lying within the limits falls to the target.
 
-    Returns
-    -------
-    0 where it is not reached from the beginning, infinity where it lasts a hundred of the longest observed intervals.
+    Gives 0 where it is not reached from the beginning, infinity where it lasts a hundred of the longest observed
+    intervals.
     """
     return _falls(lambda days: reliability_after(drift, start, days, low, high) - target, drift.longest)
 

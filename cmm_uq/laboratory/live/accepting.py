@@ -8,28 +8,18 @@ from typing import Any
 from cmm_uq.base.errors import OutputError
 from cmm_uq.base.messages import Text, Verbatim, commas, say, signed
 from cmm_uq.laboratory.live.journal import Moment
-from cmm_uq.laboratory.live.judging import Judge, Judged
-from cmm_uq.laboratory.live.lead import Lead, Run, Step
+from cmm_uq.laboratory.live.judging import Judge, Judgement
+from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder
 from cmm_uq.laboratory.live.story import Story
-from cmm_uq.laboratory.live.table import Table, rows_of
+from cmm_uq.laboratory.live.table import LiveRecording, rows_of
 
 
 class Accepting:
     """What happens to a point.
 
-    Parameters
-    ----------
-    recorder : keeps it.
-    lead : says where it belongs.
-    judge : what is said of it.
-    table : the recording.
-    repeats_most : how often a set-up is measured at most.
-    tell : shows a text.
-
-    Attributes
-    ----------
-    judged : what was said last.
+    ``lead``: says where it belongs; ``judge``: what is said of it; ``repeats_most``: how often a set-up is measured
+    at most.
     """
 
     def __init__(
@@ -37,34 +27,29 @@ class Accepting:
         recorder: Recorder,
         lead: Lead,
         judge: Judge,
-        table: Table,
+        table: LiveRecording,
         repeats_most: int,
         tell: Callable[[Text], None],
     ) -> None:
         self._recorder, self._lead, self._judge, self._table = recorder, lead, judge, table
         self._repeats_most, self._tell = repeats_most, tell
         self._due: list[Run] = []
-        self._waiting: list[Step] = []
+        self._waiting: list[PlannedPoint] = []
         self._written = -1
-        self.judged = Judged()
+        self.judged = Judgement()
 
     @property
     def story(self) -> Story:
-        """All sessions so far."""
         return self._recorder.story
 
     def accept(
-        self, points: Sequence[tuple[Step, Mapping[str, float]]], moment: Moment, how: str, of: Mapping[str, Any]
+        self,
+        points: Sequence[tuple[PlannedPoint, Mapping[str, float]]],
+        moment: Moment,
+        how: str,
+        of: Mapping[str, Any],
     ) -> None:
-        """Keep points, and say so; where there is no room they wait, and it is said when they are kept.
-
-        Parameters
-        ----------
-        points : what was measured of each step, by column.
-        moment : when.
-        how : it came.
-        of : what more belongs to it.
-        """
+        """Keep points, and say so; where there is no room they wait, and it is said when they are kept."""
         for step, columns in points:
             self._recorder.accept(step.place, columns, moment, how, of=of)
         self._waiting += [step for step, _ in points]
@@ -112,13 +97,13 @@ class Accepting:
         for run in [run for run in self._due if run in there]:
             self._due.remove(run)
             judged = self._judge.run(run, rows, repeats_most=self._repeats_most)
-            self.judged = Judged((*self.judged.shown, *judged.shown), (), judged.again)
+            self.judged = Judgement((*self.judged.shown, *judged.shown), (), judged.again)
             for text in judged.shown:
                 self._tell(text)
             self._warn(judged)
             if judged.again is not None:
                 self._tell(say("REPEAT? {why} (repeat does)", why=judged.again))
 
-    def _warn(self, judged: Judged) -> None:
+    def _warn(self, judged: Judgement) -> None:
         for warning in judged.warnings:
             self._tell(say("WARNING: {why}", why=warning))

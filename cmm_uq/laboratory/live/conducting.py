@@ -18,18 +18,15 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.acquire import AcquireFacts
 from cmm_uq.laboratory.live.accepting import Accepting
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Event
+from cmm_uq.laboratory.live.instruments.source import Event, Reading
 from cmm_uq.laboratory.live.journal import Moment
-from cmm_uq.laboratory.live.judging import Judge, Judged
-from cmm_uq.laboratory.live.lead import Lead, Run, Step
-from cmm_uq.laboratory.live.picture import picture
+from cmm_uq.laboratory.live.judging import Judge, Judgement
+from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder
+from cmm_uq.laboratory.live.screen import WORDS, OperatorInput, SessionView, coming, picture, understood
 from cmm_uq.laboratory.live.soaking import Soak, is_temperature, unsettled
 from cmm_uq.laboratory.live.story import Place, Story
-from cmm_uq.laboratory.live.table import TYPED, Table, rows_of
-from cmm_uq.laboratory.live.typed import WORDS, Typed, understood
-from cmm_uq.laboratory.live.view import View, coming
+from cmm_uq.laboratory.live.table import TYPED, LiveRecording, rows_of
 
 _SAID = 50
 """Lines of what happened that a screen may show."""
@@ -38,21 +35,10 @@ _SAID = 50
 class Conductor:
     """A session.
 
-    Parameters
-    ----------
-    recorder : keeps everything.
-    lead : what comes next.
-    judge : what is said of a point.
-    table : the recording.
-    facts : ``[acquire]``.
-    soak_k_per_h : largest change of a temperature in an hour; ``None``: none is stated.
-    machine : has a machine measure a point, where one measures when it is asked.
-    clear : of each machine that waits for its errors to be cleared by who has looked at them.
-
-    Attributes
-    ----------
-    said : what happened and was not read yet, oldest first.
-    paused : whether points are not taken.
+    ``judge``: what is said of a point; ``soak_k_per_h``: largest change of a temperature in an hour; ``None``: none
+    is stated; ``machine``: has a machine measure a point, where one measures when it is asked; ``clear``: of each
+    machine that waits for its errors to be cleared by who has looked at them. ``said``: what happened and was not
+    read yet, oldest first; ``paused``: whether points are not taken.
     """
 
     def __init__(
@@ -60,11 +46,11 @@ class Conductor:
         recorder: Recorder,
         lead: Lead,
         judge: Judge,
-        table: Table,
+        table: LiveRecording,
         facts: AcquireFacts,
         *,
         soak_k_per_h: float | None,
-        machine: Callable[[Step], None] | None = None,
+        machine: Callable[[PlannedPoint], None] | None = None,
         clear: Sequence[Callable[[], None]] = (),
     ) -> None:
         self.recorder, self.lead = recorder, lead
@@ -81,7 +67,6 @@ class Conductor:
 
     @property
     def story(self) -> Story:
-        """All sessions so far."""
         return self.recorder.story
 
     @property
@@ -90,8 +75,7 @@ class Conductor:
         return self._ending and (self._at_once or not (self._asks or self.recorder.unsettled))
 
     @property
-    def step(self) -> Step | None:
-        """What comes next."""
+    def step(self) -> PlannedPoint | None:
         return self.lead.next(self.story, self._wanted)
 
     @property
@@ -122,13 +106,7 @@ class Conductor:
     def file(self, name: str, content: bytes, moment: Moment, rows: Sequence[Mapping[str, float]], kept: str) -> None:
         """Points of a file that a machine's program wrote: where the file says, else in the order of the plan.
 
-        Parameters
-        ----------
-        name : of the file.
-        content : its bytes.
-        moment : when it was written.
-        rows : columns of each point.
-        kept : name under which its bytes are kept beside the journal.
+        ``content``: its bytes; ``kept``: name under which its bytes are kept beside the journal.
         """
         digest = hashlib.sha256(content).hexdigest()
         if digest in self.story.files:
@@ -149,29 +127,19 @@ class Conductor:
                            more=len(rows) - len(places)))  # fmt: skip
 
     def tick(self) -> None:
-        """Keep everything, join what can be joined, judge what is complete, and write the recording where it grew.
-
-        Raises
-        ------
-        OutputError : the disk fails.
-        """
+        """Keep everything, join what can be joined, judge what is complete, and write the recording where it grew."""
         if self.recorder.tick():
             self._accepting.kept()
         self._listen()
 
     def finish(self) -> None:
-        """Write the last of it.
-
-        Raises
-        ------
-        OutputError : the disk fails.
-        """
+        """Write the last of it."""
         self.recorder.finish()
         self.recorder.say("end")
         self.tick()
         self._table.finish(self.story, self.lead)
 
-    def view(self) -> View:
+    def view(self) -> SessionView:
         """What there is to be seen."""
         done, every = self.lead.progress(self.story)
         step, head = self.step, say("{done} of {every} set-ups", done=done, every=every)
@@ -182,7 +150,7 @@ class Conductor:
         if waiting := unsettled(self._soaks):
             head = say("{head}; WAIT, not settled: {columns}", head=head, columns=commas(names(waiting)))
         steps = () if step is None else self.lead.steps((step.place[0], step.place[2]))
-        return View(
+        return SessionView(
             head, coming(step, self.lead), picture(self.lead.plan.machine, steps, step), self._accepting.judged.shown,
             say("REPEAT? {why}", why=self._accepting.judged.again) if self._accepting.judged.again else NOTHING,
             tuple(soak.words for soak in self._soaks.values()), tuple(self._instruments()), tuple(self._log),
@@ -216,7 +184,7 @@ class Conductor:
             return reading.status
         return None if all(name in columns for name in COORDINATES) else say("it lacks a coordinate")
 
-    def _take(self, typed: Typed) -> None:
+    def _take(self, typed: OperatorInput) -> None:
         """The point that comes next, as typed or as the scales read."""
         step, now = self.step, self.recorder.now
         if self.paused:
@@ -261,7 +229,7 @@ class Conductor:
         last = list(self.story.points.values())[-1]
         self.recorder.undo([last], reason)
         self._after_word()
-        self._accepting.judged, self._wanted = Judged(), (last.place[0], last.place[2])
+        self._accepting.judged, self._wanted = Judgement(), (last.place[0], last.place[2])
         self.tell(say("taken back: measurement {m}, point {p}, repeat {r}: {why}", m=last.place[0], p=last.place[1],
                        r=last.place[2], why=Verbatim(reason)))  # fmt: skip
 
@@ -272,7 +240,7 @@ class Conductor:
         run = self.lead.more((last[0], last[2]), self.story)
         self.recorder.say("repeat", measurement=run[0], repeat=run[1])
         self._after_word()
-        self._wanted, self._accepting.judged = run, Judged()
+        self._wanted, self._accepting.judged = run, Judgement()
 
     def _skip(self, reason: str) -> None:
         step = self.step
@@ -340,7 +308,6 @@ class Conductor:
             self.tell(text)
 
     def tell(self, text: Text) -> None:
-        """Something to be shown."""
         self.said.append(text)
         self._log.append(text)
 

@@ -40,13 +40,10 @@ _DETERMINED = 1e-9
 class Predicted:
     """Each observation (m,) as measured, and as all others predict it, µm against the artefact's nominal sizes.
 
-    Parameters
-    ----------
-    measured : deviation from what the artefact's nominal sizes would give, the set-up's own freedoms fitted.
-    expected : the same as predicted; ``nan`` where nothing else says anything.
-    u : standard deviation of measured less expected.
-    factor : of the interval at :data:`LEVEL`.
-    sigma : standard deviation of a coordinate, µm.
+    ``measured``: deviation from what the artefact's nominal sizes would give, the set-up's own freedoms fitted;
+    ``expected``: the same as predicted; ``nan`` where nothing else says anything; ``u``: standard deviation of
+    measured less expected; ``factor``: of the interval at :data:`LEVEL`; ``sigma``: standard deviation of a
+    coordinate, µm.
     """
 
     measured: Floats
@@ -65,12 +62,7 @@ class Predicted:
 
 
 def predicted(model: MeasurementModel) -> Predicted | None:
-    """Every observation as all others predict it; ``None`` where neither the job nor the recording says what the noise is.
-
-    Parameters
-    ----------
-    model : that the job names, of the set-ups so far.
-    """
+    """Every observation as all others predict it; ``None`` where neither the job nor the recording says what the noise is."""
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     sigma, degrees = _sigma(linear)
     if sigma is None:
@@ -119,15 +111,11 @@ def _sigma(linear: LinearModel) -> tuple[float | None, float]:
 
 
 @dataclass(frozen=True)
-class Scatter:
+class RepeatScatter:
     """How the repeats of one measurement scatter.
 
-    Parameters
-    ----------
-    measurement : its number.
-    s : standard deviation of a coordinate by its repeats, µm.
-    usual : the same as stated, or of all others, µm.
-    limit : what one set-up in a hundred exceeds, µm.
+    ``s``: standard deviation of a coordinate by its repeats, µm; ``usual``: the same as stated, or of all others, µm;
+    ``limit``: what one set-up in a hundred exceeds, µm.
     """
 
     measurement: int
@@ -145,13 +133,8 @@ class Scatter:
         )  # fmt: skip
 
 
-def scatter(model: MeasurementModel, measurement: int) -> Scatter | None:
-    """The scatter of the repeats of a measurement, where it asks for another; ``None`` where it does not, or cannot be told.
-
-    Parameters
-    ----------
-    model : that the job names, of the set-ups so far.
-    """
+def scatter(model: MeasurementModel, measurement: int) -> RepeatScatter | None:
+    """The scatter of the repeats of a measurement where it asks for another; else, or where it is unknown, ``None``."""
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     try:
         residuals = model.residuals(values) / model.artefact.noise_scale / MICROMETRE
@@ -168,7 +151,7 @@ def scatter(model: MeasurementModel, measurement: int) -> Scatter | None:
     else:
         return None
     s, limit = float(np.sqrt(own / own_dof)), usual * float(np.sqrt(factor))
-    return Scatter(measurement, s, usual, limit) if s > limit else None
+    return RepeatScatter(measurement, s, usual, limit) if s > limit else None
 
 
 def _within(model: MeasurementModel, residuals: Floats, chosen: Floats) -> tuple[float, int]:

@@ -12,7 +12,7 @@ from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output.locking import locked
-from cmm_uq.laboratory.live.journal import Journal, Moment, Record, opened, refuse_damaged
+from cmm_uq.laboratory.live.journal import Moment, Record, RecordingJournal, opened, refuse_damaged
 from cmm_uq.laboratory.live.story import Story
 
 FOLDER = "acquisition"
@@ -29,17 +29,12 @@ _EVENTS = re.compile(r"(\d{4})-events\.jsonl")
 class Journals:
     """The journals of the session that is running.
 
-    Parameters
-    ----------
-    folder : of all sessions.
-    events : of what happened: points, gaps, notes.
-    streams : of the readings that come by themselves.
-    story : all sessions so far.
+    ``events``: of what happened: points, gaps, notes; ``streams``: of the readings that come by themselves.
     """
 
     folder: Path
-    events: Journal
-    streams: Journal
+    events: RecordingJournal
+    streams: RecordingJournal
     story: Story
     _lock: int
 
@@ -50,12 +45,7 @@ class Journals:
         return record
 
     def commit(self) -> None:
-        """Put both on the disk.
-
-        Raises
-        ------
-        OutputError : there is no room.
-        """
+        """Put both on the disk."""
         self.events.commit()
         self.streams.commit()
 
@@ -77,20 +67,7 @@ def sessions_in(folder: Path) -> list[Path]:
 
 
 def begin(folder: Path, said: Mapping[str, Any], moment: Moment, *, skip_damaged: bool = False) -> Journals:
-    """Begin a session: take the lock, read what earlier ones left, cut what was never finished, and open new journals.
-
-    Parameters
-    ----------
-    folder : of all sessions; made where it is not there.
-    said : what the session begins with.
-    moment : now.
-    skip_damaged : go on behind damaged lines, which the new session then names.
-
-    Raises
-    ------
-    CmmUqError : another program is recording this job, or a line is damaged.
-    OutputError : the folder cannot be written to.
-    """
+    """Begin a session: take the lock, read what earlier ones left, cut what was never finished, and open new journals."""
     lock = _taken(folder)
     try:
         return _begun(folder, said, moment, skip_damaged, lock)
@@ -100,12 +77,7 @@ def begin(folder: Path, said: Mapping[str, Any], moment: Moment, *, skip_damaged
 
 
 def read_story(folder: Path, *, skip_damaged: bool = False) -> Story:
-    """What all sessions in a folder come to; nothing is changed.
-
-    Raises
-    ------
-    CmmUqError : a line is damaged.
-    """
+    """What all sessions in a folder come to; nothing is changed."""
     return _read(folder, skip_damaged)[0]
 
 
@@ -131,8 +103,8 @@ def _begun(folder: Path, said: Mapping[str, Any], moment: Moment, skip_damaged: 
     number = 1 + max((int(path.name[:4]) for path in sessions_in(folder)), default=0)
     streams = folder / STREAMS.format(number - 1)
     torn += [(streams, tail)] if (tail := _torn_end(streams)) else []
-    events = Journal(folder / EVENTS.format(number), first=following)
-    journals = Journals(folder, events, Journal(folder / STREAMS.format(number)), story, lock)
+    events = RecordingJournal(folder / EVENTS.format(number), first=following)
+    journals = Journals(folder, events, RecordingJournal(folder / STREAMS.format(number)), story, lock)
     fresh = [line for line in damaged if line not in known]
     journals.say("session", {"session": number, **said, **({"damaged": fresh} if fresh else {})}, moment)
     for path, tail in torn:

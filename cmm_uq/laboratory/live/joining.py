@@ -37,12 +37,8 @@ class Joined:
 class Stream:
     """The last readings of one instrument for one column.
 
-    Parameters
-    ----------
-    column : of the recording.
-    source : name of the instrument.
-    latency_s : from the measurement to the arrival of its last byte.
-    max_gap_s : longest time between two readings that is interpolated over.
+    ``latency_s``: from the measurement to the arrival of its last byte; ``max_gap_s``: longest time between two
+    readings that is interpolated over.
     """
 
     def __init__(self, column: str, source: str, *, latency_s: float = 0.0, max_gap_s: float = 10.0) -> None:
@@ -82,10 +78,7 @@ class Stream:
     def at(self, moment_ns: int, now_ns: int | None) -> Joined | Text | None:
         """Value at a moment of the monotonic clock; why there is none; ``None`` while the reading behind it may still come.
 
-        Parameters
-        ----------
-        moment_ns : of the point.
-        now_ns : up to when readings have arrived; ``None``: no further one will.
+        ``now_ns``: up to when readings have arrived; ``None``: no further one will.
         """
         after = bisect_left(self._times, moment_ns)
         if after == len(self._times):

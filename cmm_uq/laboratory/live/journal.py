@@ -36,15 +36,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Record:
-    """A record.
-
-    Parameters
-    ----------
-    number : ascending by one in a file.
-    kind : what it is of.
-    moment : when it was written down.
-    data : what it says, plain data.
-    """
+    """``number``: ascending by one in a file; ``moment``: when it was written down; ``data``: what it says, plain data."""
 
     number: int
     kind: str
@@ -72,15 +64,11 @@ def record_of(line: bytes) -> Record | None:
 
 
 @dataclass(frozen=True)
-class Line:
+class JournalLine:
     """A line of a file, read.
 
-    Parameters
-    ----------
-    number : in the file, from 1.
-    start : its first byte.
-    record : ``None`` where it is damaged, or was never finished.
-    whole : whether it ends with a line feed; only the last may not.
+    ``number``: in the file, from 1; ``record``: ``None`` where it is damaged, or was never finished; ``whole``:
+    whether it ends with a line feed; only the last may not.
     """
 
     number: int
@@ -89,25 +77,22 @@ class Line:
     whole: bool
 
 
-def lines_in(path: Path) -> Iterator[Line]:
+def lines_in(path: Path) -> Iterator[JournalLine]:
     """Every line of a journal, one at a time."""
     start = 0
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
             whole = line.endswith(b"\n")
-            yield Line(number, start, record_of(line[:-1]) if whole else None, whole)
+            yield JournalLine(number, start, record_of(line[:-1]) if whole else None, whole)
             start += len(line)
 
 
 @dataclass(frozen=True)
-class Opened:
+class JournalContent:
     """What a journal holds.
 
-    Parameters
-    ----------
-    records : all that are sound, in order.
-    torn : bytes behind the last whole line, which nobody was told were kept.
-    damaged : lines, from 1, whose checksum does not fit, or behind which a record is missing.
+    ``records``: all that are sound, in order; ``torn``: bytes behind the last whole line, which nobody was told were
+    kept; ``damaged``: lines, from 1, whose checksum does not fit, or behind which a record is missing.
     """
 
     records: tuple[Record, ...]
@@ -115,13 +100,8 @@ class Opened:
     damaged: tuple[int, ...]
 
 
-def opened(path: Path, *, first: int | None = None) -> Opened:
-    """Read a journal; nothing of it is changed.
-
-    Parameters
-    ----------
-    first : number that its first record must have; any when left out.
-    """
+def opened(path: Path, *, first: int | None = None) -> JournalContent:
+    """Read a journal; nothing of it is changed."""
     records: list[Record] = []
     damaged, torn_at, expected = [], None, first
     for line in lines_in(path):
@@ -136,16 +116,11 @@ def opened(path: Path, *, first: int | None = None) -> Opened:
             records.append(line.record)
             expected = line.record.number + 1
     torn = b"" if torn_at is None else path.read_bytes()[torn_at:]
-    return Opened(tuple(records), torn, tuple(damaged))
+    return JournalContent(tuple(records), torn, tuple(damaged))
 
 
-def refuse_damaged(path: Path, found: Opened) -> None:
-    """Refuse to go on behind a damaged line: what it said, an undone point perhaps, would be forgotten.
-
-    Raises
-    ------
-    CmmUqError : a line is damaged.
-    """
+def refuse_damaged(path: Path, found: JournalContent) -> None:
+    """Refuse to go on behind a damaged line: what it said, an undone point perhaps, would be forgotten."""
     if found.damaged:
         others = f", and {len(found.damaged) - 1} more" if len(found.damaged) > 1 else ""
         raise CmmUqError(
@@ -159,21 +134,10 @@ class NoRoomError(OutputError):
     """The disk takes nothing more; what was to be written waits in memory."""
 
 
-class Journal:
+class RecordingJournal:
     """A journal that is written.
 
-    Parameters
-    ----------
-    path : of a file that does not exist yet.
-    first : number of its first record.
-
-    Attributes
-    ----------
-    written : bytes that are on the disk.
-
-    Raises
-    ------
-    OutputError : it cannot be made.
+    ``path``: of a file that does not exist yet; ``first``: number of its first record.
     """
 
     def __init__(self, path: Path, *, first: int = 1) -> None:
@@ -188,12 +152,7 @@ class Journal:
             raise _refused("cannot be made", error, path) from None
 
     def append(self, kind: str, data: Mapping[str, Any], moment: Moment) -> Record:
-        """A record that will be kept by the next :meth:`commit`.
-
-        Raises
-        ------
-        OutputError : too much waits already for room on the disk.
-        """
+        """A record that will be kept by the next :meth:`commit`."""
         record = Record(self.next, kind, moment, data)
         line = line_of(record)
         if self._bytes + len(line) > MOST_WAITING:
@@ -212,12 +171,7 @@ class Journal:
         return len(self._waiting)
 
     def commit(self) -> None:
-        """Put everything that waits on the disk.
-
-        Raises
-        ------
-        NoRoomError : there is no room for it; it goes on waiting, and the file ends with its last whole record.
-        """
+        """Put everything that waits on the disk."""
         if not self._waiting:
             return
         text = b"".join(self._waiting)
@@ -265,12 +219,7 @@ def _keep_name(folder: Path) -> None:
 
 
 def made_folder(folder: Path) -> None:
-    """Make a folder, and those above it, that may be there already.
-
-    Raises
-    ------
-    OutputError : it cannot be made, or is a file.
-    """
+    """Make a folder, and those above it, that may be there already."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -278,12 +227,7 @@ def made_folder(folder: Path) -> None:
 
 
 def written_whole(path: Path, content: bytes) -> None:
-    """Write a file, or write it anew: whoever reads it finds the old content or the new one, also after a power cut.
-
-    Raises
-    ------
-    OutputError : it cannot be written.
-    """
+    """Write a file, or write it anew: whoever reads it finds the old content or the new one, also after a power cut."""
     temporary = path.with_name(f".unfinished-{path.name}")
     try:
         with temporary.open("wb") as file:

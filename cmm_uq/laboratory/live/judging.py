@@ -16,7 +16,7 @@ from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.laboratory.live.expectation import LEVEL, RARE, Predicted, predicted, scatter
-from cmm_uq.laboratory.live.lead import Lead, Run, Step
+from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES
 from cmm_uq.laboratory.live.story import Place, Point, Story
 from cmm_uq.laboratory.live.table import Row
@@ -30,14 +30,10 @@ and by less than this part of that (squares) once they change places."""
 
 
 @dataclass(frozen=True)
-class Judged:
+class Judgement:
     """What is said.
 
-    Parameters
-    ----------
-    shown : live figures.
-    warnings : what is odd.
-    again : why the set-up should be measured once more; ``None``: nothing asks for it.
+    ``again``: why the set-up should be measured once more; ``None``: nothing asks for it.
     """
 
     shown: tuple[Text, ...] = ()
@@ -49,13 +45,9 @@ class Judged:
 class Judge:
     """Knows the artefact, the machine and the model of a job.
 
-    Parameters
-    ----------
-    facts, screening, observe : of the artefact, and what its kind offers; ``observe`` is ``None`` where it offers none.
-    machine : that is measured.
-    effects : that the job names.
-    sigma : standard uncertainty of a coordinate as stated, mm.
-    where : the recording's name, for messages.
+    ``facts, screening, observe``: of the artefact, and what its kind offers; ``observe`` is ``None`` where it offers
+    none; ``sigma``: standard uncertainty of a coordinate as stated, mm; ``where``: the recording's name, for
+    messages.
     """
 
     facts: ArtefactFacts
@@ -66,7 +58,7 @@ class Judge:
     sigma: float | None
     where: str
 
-    def point(self, step: Step, story: Story, lead: Lead) -> Judged:
+    def point(self, step: PlannedPoint, story: Story, lead: Lead) -> Judgement:
         """Of a point that was just accepted."""
         place, taken = step.place, story.by_place
         own = taken[place]
@@ -80,19 +72,12 @@ class Judge:
         steps = lead.steps((place[0], place[2]))
         if (other := _exchanged(step, steps, taken)) is not None:
             warnings.append(say("points {own} and {other} seem exchanged against the plan", own=place[1], other=other))
-        return Judged(self._live(step, steps, story), tuple(warnings))
+        return Judgement(self._live(step, steps, story), tuple(warnings))
 
-    def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> Judged:
-        """Of a set-up that is complete, with all that are.
-
-        Parameters
-        ----------
-        run : its measurement and repeat.
-        rows : the recording so far.
-        repeats_most : repeats beyond which no further one is asked for.
-        """
+    def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> Judgement:
+        """Of a set-up that is complete, with all that are."""
         if self.observe is None or not rows:
-            return Judged()
+            return Judgement()
         points = self.points(rows)
         needed = {column for effect in self.effects for column in effect.columns}
         try:
@@ -103,8 +88,8 @@ class Judge:
             warnings = [one.why for one in found.findings if run[0] in one.measurements]
             shown, again = self._expected(run, found.points, repeats_most)
         except CmmUqError as error:
-            return Judged((), (Verbatim(f"{error.problem}. {error.fix or ''}".rstrip()),))
-        return Judged(shown, tuple(warnings), again)
+            return Judgement((), (Verbatim(f"{error.problem}. {error.fix or ''}".rstrip()),))
+        return Judgement(shown, tuple(warnings), again)
 
     def points(self, rows: Sequence[Row]) -> Points:
         """Rows as points, with the columns that all of them have."""
@@ -139,7 +124,7 @@ class Judge:
             again = odd if spread is None else spread.words
         return shown, again
 
-    def _live(self, step: Step, steps: Sequence[Step], story: Story) -> tuple[Text, ...]:
+    def _live(self, step: PlannedPoint, steps: Sequence[PlannedPoint], story: Story) -> tuple[Text, ...]:
         first = story.by_place.get(steps[0].place)
         own = story.by_place[step.place]
         if first is None or first is own:
@@ -195,7 +180,7 @@ def _copied(own: Point, story: Story) -> Place | None:
     return None
 
 
-def _exchanged(step: Step, steps: Sequence[Step], taken: Mapping[Place, Point]) -> int | None:
+def _exchanged(step: PlannedPoint, steps: Sequence[PlannedPoint], taken: Mapping[Place, Point]) -> int | None:
     """Number of the point of its set-up that the newest has changed places with; where the set-up stands is no matter."""
     there = [other for other in steps if other.place in taken]
     planned, found = np.array([other.xyz for other in there]), np.array([_xyz(taken[other.place]) for other in there])

@@ -21,14 +21,11 @@ Run = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class PlannedPoint:
     """A point to be measured.
 
-    Parameters
-    ----------
-    place : measurement, point, repeat.
-    xyz : (3,) where the plan has it, mm, in the coordinates that are recorded.
-    columns : what the plan says of it besides: references, approach, normals.
+    ``xyz``: (3,) where the plan has it, mm, in the coordinates that are recorded; ``columns``: what the plan says of
+    it besides: references, approach, normals.
     """
 
     place: Place
@@ -40,11 +37,9 @@ class Step:
 class Lead:
     """A plan, as it is followed.
 
-    Parameters
-    ----------
-    plan : nominal points, in the order in which they are measured.
-    titles : of measurements, in words, by their numbers.
-    unmeasured : columns of the plan that say what will be measured, not what is known: times, temperatures.
+    ``plan``: nominal points, in the order in which they are measured; ``titles``: of measurements, in words, by their
+    numbers; ``unmeasured``: columns of the plan that say what will be measured, not what is known: times,
+    temperatures.
     """
 
     plan: Points
@@ -57,7 +52,6 @@ class Lead:
         return tuple(self.plan.run_of(group) for group in range(len(self.plan.rows_of_groups)))
 
     def all_runs(self, story: Story) -> list[Run]:
-        """The same with the repeats that were asked for, each behind the others of its measurement, without those left out."""
         found = list(self.runs)
         for run in story.asked:
             if run not in found:
@@ -65,38 +59,31 @@ class Lead:
                 found.insert(last + 1, run)
         return [run for run in found if run not in story.skipped]
 
-    def steps(self, run: Run) -> list[Step]:
-        """Points of a measurement and repeat; one that was asked for besides has those of the first.
-
-        Raises
-        ------
-        CmmUqError : the plan has no such measurement.
-        """
+    def steps(self, run: Run) -> list[PlannedPoint]:
+        """Points of a measurement and repeat; one that was asked for besides has those of the first."""
         if run not in self._steps:
             self._steps[run] = self._found(run)
         return self._steps[run]
 
-    def _found(self, run: Run) -> list[Step]:
+    def _found(self, run: Run) -> list[PlannedPoint]:
         rows = self._rows(run)
         names = [name for name in self.plan.columns if name not in self.unmeasured]
         return [
-            Step(
+            PlannedPoint(
                 (run[0], int(self.plan.point[row]), run[1]), self.plan.xyz[row],
                 {name: float(self.plan.columns[name][row]) for name in names},
             )
             for row in rows
         ]  # fmt: skip
 
-    def missing(self, run: Run, story: Story) -> list[Step]:
+    def missing(self, run: Run, story: Story) -> list[PlannedPoint]:
         """Points of it that are still to be measured."""
         return self._left(run, story.by_place)
 
-    def next(self, story: Story, wanted: Run | None = None) -> Step | None:
+    def next(self, story: Story, wanted: Run | None = None) -> PlannedPoint | None:
         """The point that comes next; ``None`` when all is measured.
 
-        Parameters
-        ----------
-        wanted : what the operator goes on with; else what was begun, else the first that lacks a point.
+        ``wanted``: what the operator goes on with; else what was begun, else the first that lacks a point.
         """
         runs = self.all_runs(story)
         last = list(story.points.values())[-1].place if story.points else None
@@ -123,12 +110,7 @@ class Lead:
         return run[0], 1 + max(repeat for measurement, repeat in (*self.runs, *story.asked) if measurement == run[0])
 
     def run_of(self, measurement: int, story: Story) -> Run:
-        """The first measurement and repeat of a number that lacks a point.
-
-        Raises
-        ------
-        CmmUqError : there is none.
-        """
+        """The first measurement and repeat of a number that lacks a point."""
         of_it = [run for run in self.all_runs(story) if run[0] == measurement]
         for run in of_it:
             if self.missing(run, story):
@@ -139,17 +121,13 @@ class Lead:
             problem, fix=f"It has {numbers.min()} to {numbers.max()}; repeat asks for one more of the last"
         )
 
-    def places(self, story: Story, ahead: Step | None, numbers: Sequence[Place | None]) -> list[Step] | Text:
+    def places(
+        self, story: Story, ahead: PlannedPoint | None, numbers: Sequence[Place | None]
+    ) -> list[PlannedPoint] | Text:
         """Where the points of a file belong, as far as the plan has room: by their numbers, else as the plan goes on.
 
-        Parameters
-        ----------
-        ahead : what comes next.
-        numbers : measurement, point and repeat of each, where the file says so.
-
-        Returns
-        -------
-        a step for each; why not, where a number is none that is open.
+        ``numbers``: measurement, point and repeat of each, where the file says so.
+        Gives a step for each; why not, where a number is none that is open.
         """
         runs, taken = self.all_runs(story), story.by_place
         start = runs.index((ahead.place[0], ahead.place[2])) if ahead is not None else 0
@@ -164,13 +142,8 @@ class Lead:
             found.append(by_place.pop(place))
         return found
 
-    def at_distance(self, step: Step, distance_mm: float, story: Story) -> list[tuple[Step, Floats]]:
-        """Where a point lies that is so far from the first of its set-up, and the first itself where that is not there yet.
-
-        Raises
-        ------
-        CmmUqError : its points lie on no line, or it is the first one itself.
-        """
+    def at_distance(self, step: PlannedPoint, distance_mm: float, story: Story) -> list[tuple[PlannedPoint, Floats]]:
+        """Where a point lies that is so far from the first of its set-up, and the first itself where that is not there yet."""
         run = (step.place[0], step.place[2])
         steps = self.steps(run)
         about = np.array([other.xyz for other in steps]) - steps[0].xyz
@@ -188,12 +161,11 @@ class Lead:
         first = [] if begun is not None else [(steps[0], start)]
         return [*first, (target, start + distance_mm * along / np.linalg.norm(along))]
 
-    def _left(self, run: Run, taken: Mapping[Place, Point]) -> list[Step]:
+    def _left(self, run: Run, taken: Mapping[Place, Point]) -> list[PlannedPoint]:
         return [step for step in self.steps(run) if step.place not in taken]
 
     @cached_property
-    def _steps(self) -> dict[Run, list[Step]]:
-        """What :meth:`steps` found."""
+    def _steps(self) -> dict[Run, list[PlannedPoint]]:
         return {}
 
     def _rows(self, run: Run) -> Ints:

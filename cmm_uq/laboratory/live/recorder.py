@@ -1,5 +1,7 @@
 """Takes what instruments say, keeps it, and joins it to the points: nothing is shown as accepted that is not on the disk.
 
+Takes what instruments say, keeps it, and joins it to the points: nothing is shown as accepted that is not on the disk.
+
 It knows no thread and no screen. Whoever runs it passes events on as they come, and calls :meth:`Recorder.tick` at least
 every 100 ms, which puts everything on the disk.
 """
@@ -7,20 +9,86 @@ every 100 ms, which puts everything on the disk.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.acquire import DeclaredSource
-from cmm_uq.laboratory.live.blocks import Blocks
-from cmm_uq.laboratory.live.folder import Journals
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, Returned
+from cmm_uq.laboratory.live.folder import STREAMS, Journals
+from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, Reading, Returned
 from cmm_uq.laboratory.live.joining import NS, Joined, Stream
-from cmm_uq.laboratory.live.journal import Moment, NoRoomError
+from cmm_uq.laboratory.live.journal import Moment, NoRoomError, RecordingJournal, lines_in
 from cmm_uq.laboratory.live.story import Place, Point, Story
+
+READINGS = "readings"
+"""Kind of such a record."""
+
+
+class Blocks:
+    """Readings that came since the last commit, by instrument."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, list[Reading]] = {}
+
+    def add(self, reading: Reading) -> None:
+        self._open.setdefault(reading.source, []).append(reading)
+
+    def put(self, journal: RecordingJournal, moment: Moment) -> None:
+        """Move everything into a journal, a record for each instrument."""
+        for source, readings in self._open.items():
+            for run in _runs(readings):
+                journal.append(READINGS, _as_data(source, run), moment)
+        self._open.clear()
+
+
+def _runs(readings: list[Reading]) -> Iterator[list[Reading]]:
+    """Readings whose numbers follow each other."""
+    start = 0
+    for i in range(1, len(readings) + 1):
+        if i == len(readings) or readings[i].number != readings[i - 1].number + 1:
+            yield readings[start:i]
+            start = i
+
+
+def _as_data(source: str, readings: list[Reading]) -> dict[str, Any]:
+    told = {str(i): str.__str__(reading.status) for i, reading in enumerate(readings) if reading.status is not None}
+    probed = {str(i): reading.point for i, reading in enumerate(readings) if reading.point is not None}
+    names = list(readings[0].values)
+    alike = all(list(reading.values) == names for reading in readings)
+    return {
+        "source": source,
+        "first": readings[0].number,
+        "utc_ns": [reading.utc_ns for reading in readings],
+        "monotonic_ns": [reading.monotonic_ns for reading in readings],
+        "raw": [reading.raw.decode("latin-1") for reading in readings],
+        **({"names": names, "values": [list(reading.values.values()) for reading in readings]} if alike
+           else {"values": [dict(reading.values) for reading in readings]}),
+        **({"status": told} if told else {}),
+        **({"point": probed} if probed else {}),
+    }  # fmt: skip
+
+
+def readings_of(data: Mapping[str, Any]) -> Iterable[Reading]:
+    """The readings of a record, as they came."""
+    names, told, probed = data.get("names"), data.get("status", {}), data.get("point", {})
+    rows = zip(data["utc_ns"], data["monotonic_ns"], data["raw"], data["values"], strict=True)
+    for i, (utc_ns, monotonic_ns, raw, values) in enumerate(rows):
+        given = values if names is None else dict(zip(names, values, strict=True))
+        status = Verbatim(told[str(i)]) if str(i) in told else None
+        yield Reading(
+            data["source"],
+            data["first"] + i,
+            utc_ns,
+            monotonic_ns,
+            raw.encode("latin-1"),
+            given,
+            status,
+            probed.get(str(i)),
+        )
+
 
 COORDINATES = tuple(f"{axis}_mm" for axis in AXES)
 _JUMP_S = 0.5
@@ -30,20 +98,11 @@ _JUMP_S = 0.5
 class Recorder:
     """One session of a recording.
 
-    Parameters
-    ----------
-    journals : that were begun for it.
-    sources : the instruments that the job declares.
-    max_gap_s : longest time between two readings that is interpolated over.
-    clock : wall clock and monotonic one.
-
-    Attributes
-    ----------
-    streams : of readings that come by themselves, by column.
-    stalled : why nothing can be kept at the moment; ``None``: everything is.
-    counts : readings of each instrument in this session.
-    ill : what each instrument says is wrong with it, by its name; those that are well are not there.
-    told : what happened, to be shown once.
+    ``journals``: that were begun for it; ``sources``: the instruments that the job declares; ``max_gap_s``: longest
+    time between two readings that is interpolated over; ``clock``: wall clock and monotonic one.
+    ``streams``: of readings that come by themselves, by column; ``stalled``: why nothing can be kept at the moment;
+    ``None``: everything is; ``counts``: readings of each instrument in this session; ``ill``: what each instrument
+    says is wrong with it, by its name; those that are well are not there; ``told``: what happened, to be shown once.
     """
 
     def __init__(
@@ -67,12 +126,10 @@ class Recorder:
 
     @property
     def story(self) -> Story:
-        """All sessions so far."""
         return self._journals.story
 
     @property
     def now(self) -> Moment:
-        """By both clocks."""
         return Moment(self._clock.utc_ns(), self._clock.monotonic_ns())
 
     def identified(self, identity: Identity) -> None:
@@ -110,17 +167,8 @@ class Recorder:
     ) -> int:
         """Write a point down; it counts once :meth:`commit` has returned ``True``.
 
-        Parameters
-        ----------
-        place : measurement, point, repeat.
-        columns : what was measured of it.
-        moment : when.
-        how : it came: an instrument's name, ``typed``, a file's name.
-        of : what more belongs to it: the instrument's bytes, the line typed, the file's hash.
-
-        Returns
-        -------
-        number of its record.
+        ``of``: what more belongs to it: the instrument's bytes, the line typed, the file's hash.
+        Gives number of its record.
         """
         data = {
             "place": list(place),
@@ -143,13 +191,7 @@ class Recorder:
     def commit(self, *, streams: bool = True) -> bool:
         """Put everything on the disk; whether that was possible. If not, it waits, and :attr:`stalled` says why.
 
-        Parameters
-        ----------
-        streams : the readings that come by themselves too; without them a point is on the disk in half the time.
-
-        Raises
-        ------
-        OutputError : the disk fails otherwise than by being full, or has been full for too long.
+        ``streams``: the readings that come by themselves too; without them a point is on the disk in half the time.
         """
         if streams:
             self._blocks.put(self._journals.streams, self.now)
@@ -188,12 +230,7 @@ class Recorder:
         return len(self._open)
 
     def latest(self, columns: Sequence[str]) -> dict[str, float]:
-        """What streams read just now, for a point that is taken while the machine stands still.
-
-        Raises
-        ------
-        CmmUqError : one of them is silent.
-        """
+        """What streams read just now, for a point that is taken while the machine stands still."""
         found, now = dict[str, float](), self._clock.monotonic_ns()
         for column in columns:
             stream = self.streams.get(column)
@@ -279,3 +316,56 @@ class Recorder:
             self.told.append(say(
                 "the computer's clock was moved by {s:.3g} s, or it slept; times go on by the one that nobody sets", s=by_s
             ))  # fmt: skip
+
+
+def settle_earlier(journals: Journals, sources: Iterable[DeclaredSource], max_gap_s: float, now: Moment) -> int:
+    """Join what earlier sessions left open; how many points that were."""
+    story, declared = journals.story, {source.name: source for source in sources}
+    left = [point for point in story.points.values() if not point.settled and point.session != story.session.number]
+    for number in dict.fromkeys(point.session for point in left):
+        own = [point for point in left if point.session == number]
+        for point, streams in _streams(journals.folder / STREAMS.format(number), own, declared, max_gap_s):
+            answers = {
+                stream.column: stream.at(point.moment.monotonic_ns, None)
+                for stream in streams.values()
+                if stream.column not in (*point.columns, *COORDINATES)
+            }
+            values = {name: [one.value, one.u] for name, one in answers.items() if isinstance(one, Joined)}
+            missing = {name: str.__str__(one) for name, one in answers.items() if one and not isinstance(one, Joined)}
+            journals.say("joined", {"of": point.record, "values": values, "missing": missing}, now)
+    return len(left)
+
+
+def _streams(
+    path: Path, points: list[Point], declared: dict[str, DeclaredSource], max_gap_s: float
+) -> Iterable[tuple[Point, dict[tuple[str, str], Stream]]]:
+    """Each point with the streams about its moment."""
+    for point in points:
+        streams: dict[tuple[str, str], Stream] = {}
+        for source in declared.values():
+            for quantity, column in source.values.items():
+                streams[source.name, quantity] = _stream(column, source, source.name, max_gap_s)
+        for reading in _about(path, point.moment.monotonic_ns, round(3e9 * max_gap_s)):
+            given = declared.get(reading.source)
+            for quantity, value in reading.values.items():
+                column = given.values.get(quantity, quantity) if given else quantity
+                key = (reading.source, quantity)
+                streams.setdefault(key, _stream(column, given, reading.source, max_gap_s))
+                streams[key].add(reading.monotonic_ns, value)
+        yield point, streams
+
+
+def _about(path: Path, moment_ns: int, near_ns: int) -> Iterator[Reading]:
+    """Sound readings about a moment, from a journal of streams; damaged lines are passed over."""
+    for line in lines_in(path) if path.exists() else ():
+        record = line.record
+        if record is None or record.kind != READINGS or record.data["monotonic_ns"][-1] < moment_ns - near_ns:
+            continue
+        if record.data["monotonic_ns"][0] > moment_ns + near_ns:
+            return
+        yield from (one for one in readings_of(record.data) if one.status is None and one.point is None)
+
+
+def _stream(column: str, declared: DeclaredSource | None, source: str, max_gap_s: float) -> Stream:
+    latency = declared.latency_ms * 1e-3 if declared else 0.0
+    return Stream(column, source, latency_s=latency, max_gap_s=max_gap_s)

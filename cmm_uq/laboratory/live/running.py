@@ -1,4 +1,10 @@
-"""The one thread that writes, and those that listen: a session run until its operator ends it."""
+"""The one thread that writes, and those that listen: a session run until its operator ends it.
+
+A folder that a machine's program drops results into: each file is read once, when it has stood still.
+
+Stable is a file whose size and time of change are the same at two looks at least :data:`STILL_S` apart, and that did not
+change within that time. What was there before the session began is read too, unless a session took it already.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +12,91 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.laboratory.live.conducting import Conductor
-from cmm_uq.laboratory.live.dropped import Dropped, Watched
-from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, Event, Gap, Source
-from cmm_uq.laboratory.live.view import View
+from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, Event, Gap, LiveSource
+from cmm_uq.laboratory.live.screen import SessionView
+
+STILL_S = 1.0
+"""For which a file must not change."""
+
+_UNFINISHED = (".tmp", ".part", ".crdownload", ".swp", "~")
+
+
+@dataclass(frozen=True)
+class DroppedFile:
+    """A file that stands still."""
+
+    path: Path
+    content: bytes
+    utc_ns: int
+
+
+class WatchedFolder:
+    def __init__(self, folder: Path, clock: Clock) -> None:
+        if not folder.is_dir():
+            raise CmmUqError("is no folder", where=str(folder), fix="Make it, or mend folder in [acquire] of job.toml")
+        self.folder, self._clock = folder, clock
+        self._seen: dict[str, tuple[int, int, int]] = {}
+        self._done: dict[str, tuple[int, int]] = {}
+        self._readable = True
+        self.trouble: list[Text] = []
+
+    def look(self) -> list[DroppedFile]:
+        """Files that stand still since the last looks, oldest first."""
+        now, found = self._clock.monotonic_ns(), list[DroppedFile]()
+        for path in self._files():
+            try:
+                state = path.stat()
+            except OSError:
+                continue
+            size, changed = state.st_size, state.st_mtime_ns
+            if self._done.get(path.name) == (size, changed):
+                continue
+            before = self._seen.get(path.name)
+            if before is None or before[:2] != (size, changed):
+                self._seen[path.name] = (size, changed, now)
+            elif now - before[2] >= STILL_S * 1e9:
+                self._done[path.name] = (size, changed)
+                found += self._content(path, size, changed)
+        return sorted(found, key=lambda one: (one.utc_ns, one.path.name))
+
+    def again(self, path: Path) -> None:
+        """A file could not be kept: read it again."""
+        self._done.pop(path.name, None)
+
+    def _files(self) -> list[Path]:
+        try:
+            found = [
+                path for path in self.folder.iterdir()
+                if path.is_file() and not path.name.startswith(".") and not path.name.endswith(_UNFINISHED)
+            ]  # fmt: skip
+            self._readable = True
+            return found
+        except OSError as error:
+            if self._readable:
+                self.trouble.append(say("the folder {folder} cannot be read: {why}", folder=Verbatim(str(self.folder)),
+                                        why=Verbatim(str(error.strerror))))  # fmt: skip
+            self._readable = False
+            return []
+
+    def _content(self, path: Path, size: int, changed: int) -> list[DroppedFile]:
+        try:
+            content = content_of(path, TABLE_BYTES, "Export it again")
+        except CmmUqError as error:
+            self.trouble.append(Verbatim(str(error)))
+            return []
+        if len(content) != size:  # it went on growing between the look and the reading
+            del self._done[path.name]
+            return []
+        return [DroppedFile(path, content, changed)]
+
 
 COMMIT_S = 0.04
 """Between two commits, and two pictures: what came is on the disk after 100 ms at the latest, and seen after 50."""
@@ -25,40 +109,29 @@ _AT_ONCE = 2000
 class Screen(Protocol):
     """What shows a session."""
 
-    def tell(self, text: Text) -> None:
-        """Something happened."""
-        ...
+    def tell(self, text: Text) -> None: ...
 
-    def show(self, view: View) -> None:
-        """How it stands."""
-        ...
+    def show(self, view: SessionView) -> None: ...
 
 
 @dataclass(frozen=True)
-class Line:
+class OperatorLine:
     """A line of the operator; the end of what is typed where it is ``None``."""
 
     text: str | None
 
 
-Item = Event | Line
+Item = Event | OperatorLine
 
 
 class Listening:
-    """Sources, each with a thread of its own.
+    """Sources, each with a thread of its own."""
 
-    Parameters
-    ----------
-    sources : that are open.
-    items : where their events go.
-    """
-
-    def __init__(self, sources: Sequence[Source], items: queue.Queue[Item]) -> None:
+    def __init__(self, sources: Sequence[LiveSource], items: queue.Queue[Item]) -> None:
         self.sources, self._items, self._stop = tuple(sources), items, threading.Event()
         self._threads = [threading.Thread(target=self._listen, args=(source,), daemon=True) for source in sources]
 
     def start(self) -> None:
-        """Begin to listen."""
         for thread in self._threads:
             thread.start()
 
@@ -70,7 +143,7 @@ class Listening:
         for source in self.sources:
             source.close()
 
-    def _listen(self, source: Source) -> None:
+    def _listen(self, source: LiveSource) -> None:
         try:
             for event in source.events(self._stop):
                 self._items.put(event)
@@ -83,23 +156,9 @@ class Listening:
 
 def run(
     conductor: Conductor, listening: Listening, items: queue.Queue[Item], screen: Screen, clock: Clock, *,
-    watched: Watched | None = None, dropped: Callable[[Dropped], None] | None = None,
+    watched: WatchedFolder | None = None, dropped: Callable[[DroppedFile], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run a session to its end.
-
-    Parameters
-    ----------
-    conductor : takes everything.
-    listening : to the instruments.
-    items : what they say, and what the operator types.
-    screen : shows it.
-    clock : for the time between commits.
-    watched, dropped : a folder, and what takes the files in it.
-
-    Raises
-    ------
-    OutputError : the disk fails.
-    """
+    """Run a session to its end."""
     turns = _Turns(conductor, screen, clock, watched, dropped)
     listening.start()
     try:
@@ -118,8 +177,8 @@ class _Turns:
     """What is done between events, each in its own time."""
 
     def __init__(
-        self, conductor: Conductor, screen: Screen, clock: Clock, watched: Watched | None,
-        dropped: Callable[[Dropped], None] | None,
+        self, conductor: Conductor, screen: Screen, clock: Clock, watched: WatchedFolder | None,
+        dropped: Callable[[DroppedFile], None] | None,
     ) -> None:  # fmt: skip
         self._conductor, self._screen, self._clock, self._watched, self._dropped = (
             conductor,
@@ -130,8 +189,7 @@ class _Turns:
         )
         self._kept = self._looked = self._drawn = clock.monotonic_ns()
 
-    def turn(self, sources: Sequence[Source]) -> None:
-        """Everything that is due."""
+    def turn(self, sources: Sequence[LiveSource]) -> None:
         now, wait = self._clock.monotonic_ns(), COMMIT_S * 1e9
         if now - self._looked >= _LOOK_S * 1e9:
             self._looked = now
@@ -167,7 +225,7 @@ def _taken(conductor: Conductor, items: queue.Queue[Item]) -> None:
         for _ in range(_AT_ONCE):
             if item is None:
                 break
-            if not isinstance(item, Line):
+            if not isinstance(item, OperatorLine):
                 conductor.event(item)
             elif item.text is None:
                 conductor.line("quit")

@@ -13,9 +13,8 @@ import numpy as np
 
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.acquire import DeclaredSource
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity
-from cmm_uq.laboratory.live.lead import Step
+from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity, Reading
+from cmm_uq.laboratory.live.lead import PlannedPoint
 from cmm_uq.laboratory.live.recorder import COORDINATES
 
 MAKER = "simulated"
@@ -36,13 +35,7 @@ _USUAL = {"pressure_hpa": 1013.2, "humidity_pct": 45.0}
 
 
 class SimulatedThermometer:
-    """A stream: each quantity near a usual value, with a slow wave of a tenth and noise of a thousandth.
-
-    Parameters
-    ----------
-    name : in the job.
-    quantities : that it gives.
-    """
+    """A stream: each quantity near a usual value, with a slow wave of a tenth and noise of a thousandth."""
 
     def __init__(
         self, name: str, quantities: Sequence[str], *, clock: Clock, seed: int, rate_hz: float = RATE_HZ
@@ -51,11 +44,9 @@ class SimulatedThermometer:
         self._random = np.random.default_rng([seed, *name.encode()])
 
     def identity(self) -> Identity:
-        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
         return Identity(self.name, MAKER, "thermometer", "0", "1", "none: simulated")
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
-        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
         number, begin = 0, self._clock.monotonic_ns()
         while not stop.is_set():
             number += 1
@@ -64,8 +55,7 @@ class SimulatedThermometer:
                 self._clock.sleep(wait)
             yield self._reading(number)
 
-    def close(self) -> None:
-        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+    def close(self) -> None: ...
 
     def _reading(self, number: int) -> Reading:
         wave = 0.1 * np.sin(2 * np.pi * number / self._rate / 1800)
@@ -81,28 +71,21 @@ class SimulatedThermometer:
 class SimulatedMachine:
     """A machine that measures the point that it is asked for.
 
-    Parameters
-    ----------
-    name : in the job.
-    seed : of its noise, and of where the artefact stands.
-    noise_mm : standard deviation of a coordinate.
+    ``seed``: of its noise, and of where the artefact stands; ``noise_mm``: standard deviation of a coordinate.
     """
 
     def __init__(self, name: str, *, clock: Clock, seed: int, noise_mm: float = NOISE_MM) -> None:
         self.name, self._clock, self._seed, self._noise_mm = name, clock, seed, noise_mm
-        self._asked: queue.Queue[Step] = queue.Queue()
+        self._asked: queue.Queue[PlannedPoint] = queue.Queue()
         self._number = 0
 
     def identity(self) -> Identity:
-        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
         return Identity(self.name, MAKER, "machine", "0", "1", "none: simulated")
 
-    def measure(self, step: Step) -> None:
-        """Have a point measured."""
+    def measure(self, step: PlannedPoint) -> None:
         self._asked.put(step)
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
-        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
         while not stop.is_set():
             try:
                 step = self._asked.get(timeout=0.1)
@@ -110,11 +93,9 @@ class SimulatedMachine:
                 continue
             yield self._probed(step)
 
-    def close(self) -> None:
-        """See :class:`~cmm_uq.laboratory.live.instruments.source.Source`."""
+    def close(self) -> None: ...
 
-    def _probed(self, step: Step) -> Reading:
-        """The same point at the same place, whenever it is asked for, but for the noise of its repeat."""
+    def _probed(self, step: PlannedPoint) -> Reading:
         self._clock.sleep(TAKES_S)
         self._number += 1
         placed = _PLACED_MM * np.random.default_rng([self._seed, step.place[0]]).standard_normal(3)

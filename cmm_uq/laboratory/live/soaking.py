@@ -26,11 +26,8 @@ _WHOLE = 0.95
 class Soak:
     """The temperatures of one column over the last while.
 
-    Parameters
-    ----------
-    column : of the recording.
-    limit_k_per_h : largest change in an hour; ``None``: none is stated.
-    over_min : time over which it is taken, min.
+    ``limit_k_per_h``: largest change in an hour; ``None``: none is stated; ``over_min``: time over which it is taken,
+    min.
     """
 
     column: str
@@ -44,7 +41,6 @@ class Soak:
     _latest: float | None = None
 
     def add(self, monotonic_ns: int, value: float) -> None:
-        """A reading."""
         time_s = monotonic_ns * NS
         if self._count and monotonic_ns - self._begin_ns >= _MEAN_S / NS:
             self._means.append((self._times / self._count, self._sum / self._count))

@@ -17,19 +17,10 @@ Place = tuple[int, int, int]
 class Point:
     """A point that was accepted.
 
-    Parameters
-    ----------
-    record : number of its record.
-    place : measurement, point, repeat.
-    columns : what was measured of it, by column.
-    moment : when it was measured.
-    time_s : since the start of the job.
-    session : number of the session that accepted it.
-    how : it came: by an instrument's name, ``typed`` or a file's name.
-    joined : what streams had at that moment, by column.
-    missing : why others had nothing, by column.
-    settled : whether every stream has answered.
-    timed : whether the moment is its own; points of a file have that of the file.
+    ``columns``: what was measured of it, by column; ``time_s``: since the start of the job; ``session``: number of
+    the session that accepted it; ``how``: it came: by an instrument's name, ``typed`` or a file's name; ``joined``:
+    what streams had at that moment, by column; ``missing``: why others had nothing, by column; ``settled``: whether
+    every stream has answered; ``timed``: whether the moment is its own; points of a file have that of the file.
     """
 
     record: int
@@ -49,12 +40,8 @@ class Point:
 class Session:
     """One run of the program.
 
-    Parameters
-    ----------
-    number : of it.
-    start : by both clocks.
-    offset_s : time since the start of the job at its start.
-    said : what it was begun with.
+    ``start``: by both clocks; ``offset_s``: time since the start of the job at its start; ``said``: what it was begun
+    with.
     """
 
     number: int
@@ -72,19 +59,13 @@ class Session:
 class Story:
     """All sessions of a job, record by record.
 
-    Attributes
-    ----------
-    sessions : in order.
-    points : that count, by the number of their record, in the order in which they were accepted.
-    undone : points that were taken back, each with the reason.
-    identities : what is known of each instrument, by its name.
-    gaps : when instruments were silent: source, s since the start of the job, for how long (``None``: to the end), why.
-    clocks : jumps of the wall clock: s since the start of the job, by how much, s.
-    skipped, asked : set-ups that the operator left out, and repeats more that were asked for.
-    notes : of the operator, and everything else that was said, each with its time.
-    files : that were read, by SHA-256, with their names.
-    damaged : lines of journals that are not in it.
-    changes : how many records changed what counts.
+    ``points``: that count, by the number of their record, in the order in which they were accepted; ``undone``:
+    points that were taken back, each with the reason; ``identities``: what is known of each instrument, by its name;
+    ``gaps``: when instruments were silent: source, s since the start of the job, for how long (``None``: to the end),
+    why; ``clocks``: jumps of the wall clock: s since the start of the job, by how much, s; ``skipped, asked``:
+    set-ups that the operator left out, and repeats more that were asked for; ``notes``: of the operator, and
+    everything else that was said, each with its time; ``files``: that were read, by SHA-256, with their names;
+    ``damaged``: lines of journals that are not in it; ``changes``: how many records changed what counts.
     """
 
     sessions: list[Session] = field(default_factory=list)

@@ -22,7 +22,7 @@ from cmm_uq.jobs.acquired import Acquired, as_file, provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.laboratory.live.folder import EVENTS, FOLDER
 from cmm_uq.laboratory.live.journal import written_whole
-from cmm_uq.laboratory.live.lead import Lead, Step
+from cmm_uq.laboratory.live.lead import Lead, PlannedPoint
 from cmm_uq.laboratory.live.recorder import COORDINATES
 from cmm_uq.laboratory.live.story import Point, Story
 
@@ -36,7 +36,7 @@ class Row:
     """A point of the recording: as accepted, and as planned."""
 
     point: Point
-    step: Step
+    step: PlannedPoint
 
 
 def rows_of(story: Story, lead: Lead) -> list[Row]:
@@ -79,13 +79,11 @@ def _cell(row: Row, name: str) -> str:
 
 def said_of(
     story: Story, rows: Sequence[Row], folder: Path, hashes: Sequence[str], *, simulated: bool
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """How the recording was taken, as plain data.
 
-    Parameters
-    ----------
-    folder : of the sessions.
-    hashes : SHA-256 of the recording, and of what it was before, lest a power cut between the two leave them apart.
+    ``hashes``: SHA-256 of the recording, and of what it was before, lest a power cut between the two leave them
+    apart.
     """
     return {
         "program": PROGRAM,
@@ -115,19 +113,8 @@ def said_of(
     }  # fmt: skip
 
 
-class Table:
-    """The recording of a job and what stands beside it, as they are written anew while they grow.
-
-    Parameters
-    ----------
-    path : of the recording.
-    folder : of the sessions.
-    simulated : whether the instruments are.
-
-    Raises
-    ------
-    CmmUqError : something is there that this command did not write.
-    """
+class LiveRecording:
+    """The recording of a job and what stands beside it, as they are written anew while they grow."""
 
     def __init__(self, path: Path, folder: Path, *, simulated: bool) -> None:
         self.path, self._folder, self._simulated = path, folder, simulated
@@ -139,12 +126,7 @@ class Table:
                              fix="Move it away, or name another file in [recording]; nothing is overwritten")  # fmt: skip
 
     def write(self, story: Story, lead: Lead) -> bool:
-        """Write both where the points changed; whether they were written.
-
-        Raises
-        ------
-        OutputError : they cannot be written; what was there before still is.
-        """
+        """Write both where the points changed; whether they were written."""
         rows = rows_of(story, lead)
         content = as_recording(rows)
         own = hashlib.sha256(content).hexdigest()
@@ -158,12 +140,7 @@ class Table:
         return True
 
     def finish(self, story: Story, lead: Lead) -> None:
-        """Write what stands beside the recording once more: gaps and notes since its last point.
-
-        Raises
-        ------
-        OutputError : it cannot be written.
-        """
+        """Write what stands beside the recording once more: gaps and notes since its last point."""
         self.write(story, lead)
         if self._last is not None and (rows := rows_of(story, lead)):
             written_whole(

@@ -17,8 +17,7 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output.locking import locked
 from cmm_uq.laboratory.proving.sealed import canonical
-from cmm_uq.laboratory.schedule.pool import answers
-from cmm_uq.laboratory.schedule.talking import Work
+from cmm_uq.laboratory.schedule.processes import WorkerTask, answers
 
 Record = dict[str, Any]
 """What was said of a task: plain data with its ``number``."""
@@ -117,7 +116,7 @@ def answered(
 
     Parameters
     ----------
-    program : module that a process runs; see :func:`cmm_uq.laboratory.schedule.talking.serve`.
+    program : module that a process runs; see :func:`cmm_uq.laboratory.schedule.processes.serve`.
     setting : what every process is told first.
     tasks : by number.
     workers : processes at once.
@@ -127,7 +126,7 @@ def answered(
     ------
     CmmUqError : a task that is refused, or over which processes ended; what was answered before is kept.
     """
-    with contextlib.closing(answers(Work(program, setting), tasks.items(), workers)) as found:
+    with contextlib.closing(answers(WorkerTask(program, setting), tasks.items(), workers)) as found:
         for answer in found:
             if answer.failure is not None:
                 raise answer.failure

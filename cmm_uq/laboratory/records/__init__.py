@@ -7,12 +7,6 @@ Nothing here imports SQLAlchemy before records are opened.
 
 from __future__ import annotations
 
-from cmm_uq.laboratory.records.entries import KINDS, Entry
-from cmm_uq.laboratory.records.facts import ArtefactRow, Certificate, Finding, Machine, Series, Signature, Value
 from cmm_uq.laboratory.records.opening import open_records
-from cmm_uq.laboratory.records.place import DEFAULT, ENVIRONMENT, NONE
 
-__all__ = [
-    "DEFAULT", "ENVIRONMENT", "KINDS", "NONE", "ArtefactRow", "Certificate", "Entry", "Finding", "Machine", "Series",
-    "Signature", "Value", "open_records",
-]  # fmt: skip
+__all__ = ["open_records"]

@@ -18,8 +18,7 @@ from cmm_uq.base.output.refusing import writing_to
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.records.entries import Entry
 from cmm_uq.laboratory.records.opening import open_records
-from cmm_uq.laboratory.records.place import is_url, shown
-from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.place import is_url, shown, told
 from cmm_uq.laboratory.records.tables import entries
 from cmm_uq.laboratory.records.verifying import chain
 
@@ -35,19 +34,7 @@ KEPT = ".before-restore"
 def back_up(records: Records, out: Path) -> tuple[int, str]:
     """Write all entries, and what follows from them, into a new SQLite file, whatever database they are in.
 
-    Parameters
-    ----------
-    records : that others may write to meanwhile.
-    out : a file that is not there yet.
-
-    Returns
-    -------
-    number and hash of the last entry in it.
-
-    Raises
-    ------
-    CmmUqError : the chain of the records is broken.
-    OutputError : something is there, or it cannot be written.
+    Gives number and hash of the last entry in it.
     """
     if os.path.lexists(out):
         raise OutputError("is there already", where=str(out), fix="Name another file; nothing is overwritten")
@@ -66,19 +53,7 @@ def back_up(records: Records, out: Path) -> tuple[int, str]:
 def restore(file: Path, place: str | Path) -> tuple[int, str]:
     """Make records of a backup; records that are there are kept beside them.
 
-    Parameters
-    ----------
-    file : the backup.
-    place : of the records; a database of a server must hold none yet.
-
-    Returns
-    -------
-    number and hash of the last entry.
-
-    Raises
-    ------
-    CmmUqError : it is no backup, or its chain is broken.
-    OutputError : the place cannot be written to.
+    Gives number and hash of the last entry.
     """
     head = _checked(file)
     if is_url(place):
@@ -116,12 +91,7 @@ def _set_aside(target: Path) -> None:
 
 
 def _checked(path: Path) -> tuple[int, str]:
-    """Number and hash of the last entry of a file whose chain holds.
-
-    Raises
-    ------
-    CmmUqError : it is no file of records, or its chain is broken.
-    """
+    """Number and hash of the last entry of a file whose chain holds."""
     with open_records(path, read_only=True) as records:
         with told(path), records.engine.connect() as connection:
             found = chain(connection)

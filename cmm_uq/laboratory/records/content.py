@@ -41,19 +41,7 @@ def certificate_content(
 ) -> dict[str, Any]:
     """Content of the entry of a report or a diagnosis.
 
-    Parameters
-    ----------
-    data : results.json.
-    facts : its job; ``None`` where only results.json is left.
-    command : report or diagnose.
-    folder : of the files.
-    results_sha256 : of results.json.
-    files : SHA-256 of each file of the set, by name.
-    named : calls a value.
-
-    Raises
-    ------
-    CmmUqError : it is no results.json of a job.
+    ``facts``: its job; ``None`` where only results.json is left; ``files``: SHA-256 of each file of the set, by name.
     """
     try:
         job, verdicts = data["job"], Verdicts.of_results(data)
@@ -157,7 +145,7 @@ def _quantities(data: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any
 
 def _row(
     name: str, quantity: str, unit: str, stated: Mapping[str, Any], common: float, limit: float | None
-) -> list[Any] | None:  # fmt: skip
+) -> list[Any] | None:
     """``None`` where there is no estimate: what the recording does not determine has no value."""
     if not all(_finite(stated.get(key)) for key in ("value", "u")):
         return None

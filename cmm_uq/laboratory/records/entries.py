@@ -32,14 +32,8 @@ BEGINNING = "0" * 64
 class Entry:
     """One entry.
 
-    Parameters
-    ----------
-    number : 1, 2, … without a gap.
-    at : moment of recording, UTC, ISO 8601.
-    kind : one of :data:`KINDS`.
-    content : canonical JSON.
-    previous : hash of the entry before, hexadecimal.
-    hash : of all of these.
+    ``number``: 1, 2, … without a gap; ``at``: moment of recording, UTC, ISO 8601; ``content``: canonical JSON;
+    ``previous``: hash of the entry before, hexadecimal.
     """
 
     number: int
@@ -51,7 +45,6 @@ class Entry:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The content, parsed."""
         found: dict[str, Any] = json.loads(self.content)
         return found
 
@@ -64,12 +57,7 @@ class Entry:
 
 
 def canonical(content: Mapping[str, Any]) -> str:
-    """The one way in which a content is written: keys sorted, no blanks, finite numbers in their shortest form.
-
-    Raises
-    ------
-    CmmUqError : a number is not finite, or something in it is no JSON.
-    """
+    """The one way in which a content is written: keys sorted, no blanks, finite numbers in their shortest form."""
     try:
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
         text.encode()
@@ -87,12 +75,7 @@ def hash_of(previous: str, number: int, at: str, kind: str, content: str) -> str
 
 
 def following(previous: str, number: int, at: dt.datetime, kind: str, content: Mapping[str, Any]) -> Entry:
-    """The entry after one of the hash ``previous``.
-
-    Raises
-    ------
-    CmmUqError : there is no such kind, or the content is no JSON.
-    """
+    """The entry after one of the hash ``previous``."""
     if kind not in KINDS:
         raise CmmUqError(f"{kind!r} is no kind of entry", where="records", fix=f"Known: {', '.join(KINDS)}")
     text, moment = canonical(content), moment_of(at)

@@ -1,8 +1,9 @@
-"""What records are asked for: machines, artefacts, certificates with their values, series of a value."""
+"""What records are asked for: machines, artefacts, certificates with their values, series; and by what they are recognised."""
 
 from __future__ import annotations
 
 import datetime as dt
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,17 +23,14 @@ PERFORMANCE = "performance:"
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class RecordedMachine:
     """A machine.
 
-    Parameters
-    ----------
-    serial : by which it is asked for; its name where it has no serial number. Of two machines with one serial number the
-        second has its manufacturer behind it.
-    name, manufacturer, model, place : as its newest certificate has them.
-    adjusted : days on which it was adjusted, sorted.
-    by_name : whether it has no serial number and is recognised by its name.
-    calibrate : ``[machine] calibrate`` of its newest certificate; ``None`` where the job has none.
+    ``serial``: by which it is asked for; its name where it has no serial number. Of two machines with one serial
+    number the second has its manufacturer behind it; ``name, manufacturer, model, place``: as its newest certificate
+    has them; ``adjusted``: days on which it was adjusted, sorted; ``by_name``: whether it has no serial number and is
+    recognised by its name; ``calibrate``: ``[machine] calibrate`` of its newest certificate; ``None`` where the job
+    has none.
     """
 
     serial: str
@@ -49,12 +47,8 @@ class Machine:
 class ArtefactRow:
     """An artefact, with its newest certificate.
 
-    Parameters
-    ----------
-    serial : its serial number, or the number of its certificate, or its name.
-    kind : of the measurement it was last used in.
-    certificate, laboratory : of its own calibration.
-    calibrated, due : days of that.
+    ``serial``: its serial number, or the number of its certificate, or its name; ``kind``: of the measurement it was
+    last used in; ``calibrated, due``: days of that.
     """
 
     serial: str
@@ -66,19 +60,13 @@ class ArtefactRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Value:
+class RecordedValue:
     """One error factor, size or figure of performance of one certificate.
 
-    Parameters
-    ----------
-    name : ``scale_x.ppm``, ``artefact.length_mm``, ``accuracy.b89_range_um``, ``performance:E0``.
-    quantity : how it is called in the field, as printed.
-    unit : as printed.
-    value, u : estimate and standard uncertainty.
-    lower, upper : the stated 95 % interval.
-    u_artefact : part of ``u`` that comes from what is certified of the artefact, common to certificates made with the same
-        artefact; 0 where it is unknown.
-    limit : the value conforms while its amount is no larger; ``None`` where none is set.
+    ``name``: ``scale_x.ppm``, ``artefact.length_mm``, ``accuracy.b89_range_um``, ``performance:E0``; ``quantity``:
+    how it is called in the field, as printed; ``lower, upper``: the stated 95 % interval; ``u_artefact``: part of
+    ``u`` that comes from what is certified of the artefact, common to certificates made with the same artefact; 0
+    where it is unknown; ``limit``: the value conforms while its amount is no larger; ``None`` where none is set.
     """
 
     name: str
@@ -93,32 +81,16 @@ class Value:
 
 
 @dataclass(frozen=True, slots=True)
-class Certificate:
+class RecordedCertificate:
     """One certificate, interim check or diagnosis as recorded.
 
-    Parameters
-    ----------
-    entry : its number.
-    job : id of the job.
-    machine : serial of the machine.
-    artefact : serial of the artefact; empty where the job says nothing of it.
-    kind : of the measurement.
-    origin : measured, simulated or compensated.
-    day : of the measurement.
-    recorded : moment of recording.
-    adjusted_since : last adjustment of the machine before the recording, as the job or an entry says.
-    state : one of :data:`STATES`.
-    decision : the worst of its statements of conformity, in the words of results.json; ``none`` where it states none.
-    diagnosis : verdict of the diagnosis; empty where there is none.
-    interim : whether it is an interim check and no certificate.
-    folder : where its files are.
-    version : of the package that made it.
-    results_sha256 : of its results.json.
-    number : of the certificate.
-    command : that made it: report or diagnose.
-    artefact_due : day by which the artefact was to be calibrated again, as the job said.
-    values : what it states.
-    covariance : names, and lower triangle row by row, of what is stated with one.
+    ``artefact``: serial of the artefact; empty where the job says nothing of it; ``adjusted_since``: last adjustment
+    of the machine before the recording, as the job or an entry says; ``decision``: the worst of its statements of
+    conformity, in the words of results.json; ``none`` where it states none; ``diagnosis``: verdict of the diagnosis;
+    empty where there is none; ``interim``: whether it is an interim check and no certificate; ``folder``: where its
+    files are; ``version``: of the package that made it; ``command``: that made it: report or diagnose;
+    ``artefact_due``: day by which the artefact was to be calibrated again, as the job said; ``covariance``: names,
+    and lower triangle row by row, of what is stated with one.
     """
 
     entry: int
@@ -140,7 +112,7 @@ class Certificate:
     number: str
     command: str
     artefact_due: dt.date | None = None
-    values: tuple[Value, ...] = ()
+    values: tuple[RecordedValue, ...] = ()
     covariance: tuple[tuple[str, ...], tuple[float, ...]] | None = None
 
     @property
@@ -150,19 +122,8 @@ class Certificate:
 
 
 @dataclass(frozen=True, slots=True)
-class Signature:
-    """Who released, withdrew or replaced a certificate.
-
-    Parameters
-    ----------
-    entry : number of this entry.
-    certificate : number of the certificate's.
-    what : release, withdrawal or replacement.
-    by : the person.
-    reason : given.
-    at : moment.
-    replaced_by : number of the entry of the certificate in its place.
-    """
+class ReleaseSignature:
+    """Who released, withdrew or replaced a certificate."""
 
     entry: int
     certificate: int
@@ -177,16 +138,9 @@ class Signature:
 class Series:
     """One value of one machine over its certificates and interim checks, by day; each array is (n,).
 
-    Parameters
-    ----------
-    name, quantity, unit : of the value.
-    limit : that the newest certificate with one sets.
-    day : of the measurement, proleptic Gregorian ordinal.
-    value, u, u_artefact : in the unit.
-    artefact : serials.
-    entry : numbers.
-    adjusted_since : day of the last adjustment before, ordinal; 0 where none is known.
-    interim : whether it is of an interim check.
+    ``limit``: that the newest certificate with one sets; ``day``: of the measurement, proleptic Gregorian ordinal;
+    ``adjusted_since``: day of the last adjustment before, ordinal; 0 where none is known; ``interim``: whether it is
+    of an interim check.
     """
 
     name: str
@@ -204,16 +158,44 @@ class Series:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class ChainFinding:
     """Something that is not as it was recorded.
 
-    Parameters
-    ----------
-    kind : chain, index, file or missing: a file that is not there any more may only have been moved.
-    problem : in words.
-    entry : number of the entry that it is about.
+    ``kind``: chain, index, file or missing: a file that is not there any more may only have been moved; ``entry``:
+    number of the entry that it is about.
     """
 
     kind: str
     problem: str
     entry: int | None = None
+
+
+BY_NAME = "name:"
+"""What begins the key of something without a serial number."""
+
+
+def spelled(serial: str) -> str:
+    """A serial number for comparing: NFKC, without case and blanks."""
+    return "".join(unicodedata.normalize("NFKC", serial).casefold().split())
+
+
+def machine_key(facts: Mapping[str, Any]) -> str:
+    """By manufacturer and serial number, or by name where it has none."""
+    if serial := spelled(str(facts.get("serial") or "")):
+        return f"{spelled(str(facts.get('manufacturer') or ''))}/{serial}"
+    return BY_NAME + spelled(str(facts.get("name") or ""))
+
+
+def artefact_key(facts: Mapping[str, Any]) -> str:
+    """By serial number, else by the number of its certificate, else by name; empty where none of them is given."""
+    if serial := spelled(str(facts.get("serial") or "")):
+        return serial
+    if number := spelled(str(facts.get("certificate") or "")):
+        return f"certificate:{number}"
+    name = spelled(str(facts.get("name") or ""))
+    return BY_NAME + name if name else ""
+
+
+def called(facts: Mapping[str, Any], *names: str) -> str:
+    """The first of the names under which the facts say something, as it is printed."""
+    return next((text for name in names if (text := " ".join(str(facts.get(name) or "").split()))), "")

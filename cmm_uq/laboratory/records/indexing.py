@@ -10,8 +10,7 @@ from sqlalchemy import Connection, Table, func, insert, select, update
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records.entries import CERTIFIED, Entry
-from cmm_uq.laboratory.records.facts import STANDING
-from cmm_uq.laboratory.records.recognised import artefact_key, called, machine_key, spelled
+from cmm_uq.laboratory.records.facts import STANDING, artefact_key, called, machine_key, spelled
 from cmm_uq.laboratory.records.tables import (
     INDEX,
     adjustments,
@@ -30,12 +29,7 @@ STATE_AFTER = {"withdrawal": "withdrawn", "replacement": "replaced"}
 
 
 class Indexer:
-    """Adds the rows of entries, one after the other; :meth:`flush` writes them.
-
-    Parameters
-    ----------
-    connection : in a transaction that writes.
-    """
+    """Adds the rows of entries, one after the other; :meth:`flush` writes them."""
 
     def __init__(self, connection: Connection) -> None:
         self.connection = connection
@@ -48,12 +42,7 @@ class Indexer:
         self._adjusted: set[tuple[int, str]] = set()
 
     def add(self, entry: Entry) -> None:
-        """Add what an entry says.
-
-        Raises
-        ------
-        CmmUqError : it says something that no entry before it allows.
-        """
+        """Add what an entry says."""
         data = entry.data
         try:
             if entry.kind in CERTIFIED:
@@ -72,7 +61,6 @@ class Indexer:
                              where=f"entry {entry.number}") from error  # fmt: skip
 
     def flush(self) -> None:
-        """Write what was added."""
         for table, rows in self._rows.items():
             if rows:
                 self.connection.execute(insert(table), rows)

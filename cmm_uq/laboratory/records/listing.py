@@ -15,16 +15,15 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select
 
 from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.laboratory.records.entries import Entry
-from cmm_uq.laboratory.records.facts import PERFORMANCE, STANDING, Machine
+from cmm_uq.laboratory.records.facts import BY_NAME, PERFORMANCE, STANDING, RecordedMachine, spelled
+from cmm_uq.laboratory.records.place import told
 from cmm_uq.laboratory.records.queries import adjusted_before, blocks
-from cmm_uq.laboratory.records.recognised import BY_NAME, spelled
-from cmm_uq.laboratory.records.refusals import told
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
 
 
-class Listed(NamedTuple):
-    """A certificate, interim check or diagnosis in a list; fields as in :class:`~cmm_uq.laboratory.records.facts.Certificate`.
+class ListedCertificate(NamedTuple):
+    """A certificate, interim check or diagnosis in a list; fields as in ``RecordedCertificate``.
 
     A tuple, as the others here are: ten thousand of them are made in a tenth of the time of dataclasses.
     """
@@ -46,7 +45,7 @@ class Listed(NamedTuple):
 
 
 class Called(NamedTuple):
-    """What a machine is called: fields as in :class:`~cmm_uq.laboratory.records.facts.Machine`."""
+    """What a machine is called: fields as in :class:`~cmm_uq.laboratory.records.facts.RecordedMachine`."""
 
     serial: str
     name: str
@@ -60,22 +59,17 @@ class Newest(NamedTuple):
     """A machine and its newest measured certificate that stands; ``None`` where it has none."""
 
     machine: Called
-    certificate: Listed | None
+    certificate: ListedCertificate | None
 
 
 @dataclass(frozen=True)
-class Choice:
+class CertificateFilter:
     """Which certificates are listed; what is empty or ``None`` leaves all.
 
-    Parameters
-    ----------
-    text : in the job's id, the certificate's number, or the machine's serial or name; capitals do not matter.
-    machine, artefact : as they are called in the records.
-    origin : of the recording.
-    command : report or diagnose.
-    states, decisions, verdicts : of the certificate, its statements, its diagnosis.
-    interim : whether interim checks, or certificates.
-    since, until : first and last day.
+    ``text``: in the job's id, the certificate's number, or the machine's serial or name; capitals do not matter;
+    ``machine, artefact``: as they are called in the records; ``states, decisions, verdicts``: of the certificate, its
+    statements, its diagnosis; ``interim``: whether interim checks, or certificates; ``since, until``: first and last
+    day.
     """
 
     text: str = ""
@@ -104,12 +98,7 @@ _JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.
 
 
 def standing_of_all(records: Records) -> list[Newest]:
-    """Every machine with its newest certificate, in the order in which they were first recorded.
-
-    Raises
-    ------
-    CmmUqError : the records are damaged or locked.
-    """
+    """Every machine with its newest certificate, in the order in which they were first recorded."""
     newest = certificates.alias()
     of_machine = (
         select(newest.c.entry)
@@ -134,18 +123,10 @@ def standing_of_all(records: Records) -> list[Newest]:
     ]
 
 
-def chosen(records: Records, choice: Choice, most: int, left_out: int = 0) -> tuple[list[Listed], int]:
-    """Certificates, newest first, and how many there are.
-
-    Parameters
-    ----------
-    most : of a page.
-    left_out : newer ones on the pages before.
-
-    Raises
-    ------
-    CmmUqError : the records are damaged or locked.
-    """
+def chosen(
+    records: Records, choice: CertificateFilter, most: int, left_out: int = 0
+) -> tuple[list[ListedCertificate], int]:
+    """Certificates, newest first, and how many there are."""
     with told(records.place), records.engine.connect() as connection:
         where = _conditions(connection, choice)
         count = connection.execute(select(func.count()).select_from(certificates).where(*where)).scalar_one()
@@ -156,13 +137,28 @@ def chosen(records: Records, choice: Choice, most: int, left_out: int = 0) -> tu
     return [found[entry] for entry in page], int(count)
 
 
-def _listed(row: Any) -> Listed:
+def _listed(row: Any) -> ListedCertificate:
     entry, job, number, machine, name, artefact, kind, origin, day, state, decision, verdict, interim, command = row
-    return Listed(entry, job, number, machine, name, artefact, kind, origin, dt.date.fromisoformat(day), state, decision,
-                  verdict, bool(interim), command)  # fmt: skip
+    date = dt.date.fromisoformat(day)
+    return ListedCertificate(
+        entry,
+        job,
+        number,
+        machine,
+        name,
+        artefact,
+        kind,
+        origin,
+        date,
+        state,
+        decision,
+        verdict,
+        bool(interim),
+        command,
+    )
 
 
-def _conditions(connection: Connection, choice: Choice) -> list[ColumnElement[bool]]:
+def _conditions(connection: Connection, choice: CertificateFilter) -> list[ColumnElement[bool]]:
     found: list[ColumnElement[bool]] = [_C.command.in_(COMMANDS if not choice.command else (choice.command,))]
     if choice.origin:
         found.append(_C.origin == choice.origin)
@@ -193,16 +189,12 @@ def _with_text(connection: Connection, text: str) -> list[ColumnElement[bool]]:
     return [or_(*named, _C.machine.in_(select(machines.c.id).where(of_machine)))]
 
 
-class Stated(NamedTuple):
+class CourseValue(NamedTuple):
     """One value as one certificate or interim check states it.
 
-    Parameters
-    ----------
-    entry, day : of the certificate.
-    value, lower, upper : with the ends of the stated interval.
-    limit : of its amount; ``None`` where none is set.
-    interim : whether it is of an interim check.
-    adjusted_since : the last adjustment of the machine before it.
+    ``value, lower, upper``: with the ends of the stated interval; ``limit``: of its amount; ``None`` where none is
+    set; ``interim``: whether it is of an interim check; ``adjusted_since``: the last adjustment of the machine before
+    it.
     """
 
     entry: int
@@ -217,35 +209,18 @@ class Stated(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """One value of one machine over its newest certificates and interim checks, oldest first.
-
-    Parameters
-    ----------
-    name, quantity, unit : of the value.
-    stated : at each.
-    """
+    """One value of one machine over its newest certificates and interim checks, oldest first."""
 
     name: str
     quantity: str
     unit: str
-    stated: list[Stated]
+    stated: list[CourseValue]
 
 
-def courses(records: Records, machine: Machine, most: int) -> list[Course]:
+def courses(records: Records, machine: RecordedMachine, most: int) -> list[Course]:
     """What a machine's measured certificates and interim checks state, as far as they stand.
 
-    Parameters
-    ----------
-    machine : of the records.
-    most : certificates, the newest.
-
-    Returns
-    -------
-    in the order of the newest certificate, then what only older ones state.
-
-    Raises
-    ------
-    CmmUqError : the records are damaged or locked.
+    Gives in the order of the newest certificate, then what only older ones state.
     """
     newest = (
         select(_C.entry, _C.day, _C.interim, _C.adjusted_since)
@@ -255,11 +230,10 @@ def courses(records: Records, machine: Machine, most: int) -> list[Course]:
     )  # fmt: skip
     f, q = figures.c, quantities.c
     query = (
-        select(newest, q.name, q.quantity, q.unit, f.value, f.lower, f.upper,
-               f.at_most)
+        select(newest, q.name, q.quantity, q.unit, f.value, f.lower, f.upper, f.at_most)
         .select_from(newest.join(figures, f.certificate == newest.c.entry).join(quantities, q.id == f.quantity))
         .order_by(newest.c.day.desc(), newest.c.entry.desc(), f.place)
-    )  # fmt: skip
+    )
     found: dict[tuple[str, str], Course] = {}
     adjusted = [day.isoformat() for day in machine.adjusted]
     with told(records.place), records.engine.connect() as connection:
@@ -267,8 +241,10 @@ def courses(records: Records, machine: Machine, most: int) -> list[Course]:
     for row in rows:
         course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
         course.stated.append(
-            Stated(row.entry, dt.date.fromisoformat(row.day), row.value, row.lower, row.upper, row.at_most, bool(row.interim),
-                   adjusted_before(row.adjusted_since, row.day, adjusted))
+            CourseValue(
+                row.entry, dt.date.fromisoformat(row.day), row.value, row.lower, row.upper, row.at_most, bool(row.interim),
+                adjusted_before(row.adjusted_since, row.day, adjusted),
+            )
         )  # fmt: skip
     for course in found.values():
         course.stated.reverse()
@@ -287,12 +263,7 @@ def _outcomes(verdicts: Verdicts) -> dict[str, str]:
 
 
 def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[str, str]]:
-    """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it.
-
-    Raises
-    ------
-    CmmUqError : the records are damaged or locked.
-    """
+    """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it."""
     found = {}
     with told(records.place), records.engine.connect() as connection:
         for block in blocks(sorted(numbers)):
@@ -303,12 +274,7 @@ def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[st
 
 
 def entry_of(records: Records, number: int) -> Entry | None:
-    """One entry; ``None`` where there is none of that number.
-
-    Raises
-    ------
-    CmmUqError : the records are damaged or locked.
-    """
+    """One entry; ``None`` where there is none of that number."""
     with told(records.place), records.engine.connect() as connection:
         row = connection.execute(select(entries).where(entries.c.number == number)).first()
     return None if row is None else Entry(*row)

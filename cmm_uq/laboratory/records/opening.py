@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.records.place import APPLICATION, ENVIRONMENT, NONE, is_url, place_of, shown
-from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.place import APPLICATION, ENVIRONMENT, NONE, is_url, place_of, shown, told
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine
@@ -71,12 +70,7 @@ def open_records(where: str | Path | None = None, *, create: bool = False, read_
 
 
 def engine_of(place: str | Path, *, create: bool = False, read_only: bool = False) -> Engine:
-    """Connections to a place.
-
-    Raises
-    ------
-    CmmUqError : there is nothing, or no driver for it.
-    """
+    """Connections to a place."""
     return _server(str(place), read_only) if is_url(place) else _file(Path(place), create, read_only)
 
 
@@ -152,12 +146,7 @@ def _server(url: str, read_only: bool) -> Engine:
 
 
 def state_of(connection: Connection) -> str:
-    """Revision of the tables; empty where there are none yet.
-
-    Raises
-    ------
-    CmmUqError : they are another program's.
-    """
+    """Revision of the tables; empty where there are none yet."""
     from sqlalchemy import inspect
 
     sqlite = connection.dialect.name == "sqlite"
@@ -173,12 +162,7 @@ def state_of(connection: Connection) -> str:
 
 
 def check_revision(state: str, place: str | Path) -> None:
-    """Refuse tables that this version does not know.
-
-    Raises
-    ------
-    CmmUqError : they are of a newer version, an older one, or not there.
-    """
+    """Refuse tables that this version does not know."""
     if state == REVISION:
         return
     if state == "":

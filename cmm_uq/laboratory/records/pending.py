@@ -20,27 +20,19 @@ from sqlalchemy import Connection, delete, insert, select
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import MANIFEST, InDoubtError, finish_interrupted, is_pending, sha256_of
 from cmm_uq.laboratory.records.entries import canonical, moment_of
-from cmm_uq.laboratory.records.place import shown
+from cmm_uq.laboratory.records.place import shown, told
 from cmm_uq.laboratory.records.queries import entry_of_results
-from cmm_uq.laboratory.records.refusals import told
 from cmm_uq.laboratory.records.store import Records, Writing
 from cmm_uq.laboratory.records.tables import pending
 
 
 class Intended:
-    """One entry that is to be added with a set of files; a :class:`~cmm_uq.base.output.staging.Ledger`.
-
-    Parameters
-    ----------
-    records : that it is added to.
-    kind, content : of the entry.
-    """
+    """One entry that is to be added with a set of files; a :class:`~cmm_uq.base.output.staging.Ledger`."""
 
     def __init__(self, records: Records, kind: str, content: Mapping[str, Any]) -> None:
         self.records, self.kind, self.content = records, kind, canonical(content)
 
     def intend(self, token: str, folder: Path, manifest: str) -> None:
-        """See :meth:`cmm_uq.base.output.staging.Ledger.intend`."""
         row = {
             "token": token, "host": socket.gethostname(), "folder": str(folder), "manifest": manifest,
             "at": moment_of(self.records.clock()), "kind": self.kind, "content": self.content,
@@ -49,7 +41,6 @@ class Intended:
             writing.connection.execute(insert(pending), row)
 
     def commit(self, token: str) -> None:
-        """See :meth:`cmm_uq.base.output.staging.Ledger.commit`."""
         try:
             with self.records.writing() as writing:
                 _record(writing, self.kind, json.loads(self.content))
@@ -59,7 +50,6 @@ class Intended:
                 raise
 
     def forget(self, token: str) -> None:
-        """See :meth:`cmm_uq.base.output.staging.Ledger.forget`; what cannot be forgotten now is found by the next opening."""
         with contextlib.suppress(CmmUqError, OSError), self.records.writing() as writing:
             writing.connection.execute(delete(pending).where(pending.c.token == token))
 

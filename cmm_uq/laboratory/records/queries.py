@@ -15,8 +15,17 @@ from typing import TYPE_CHECKING, Any
 from sqlalchemy import ColumnElement, Connection, Select, and_, func, or_, select
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.laboratory.records.facts import STANDING, ArtefactRow, Certificate, Machine, Series, Signature, Value
-from cmm_uq.laboratory.records.recognised import BY_NAME, spelled
+from cmm_uq.laboratory.records.facts import (
+    BY_NAME,
+    STANDING,
+    ArtefactRow,
+    RecordedCertificate,
+    RecordedMachine,
+    RecordedValue,
+    ReleaseSignature,
+    Series,
+    spelled,
+)
 from cmm_uq.laboratory.records.tables import (
     adjustments,
     artefacts,
@@ -41,7 +50,7 @@ _JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == cer
 
 
 @dataclass(frozen=True)
-class Wanted:
+class CertificateQuery:
     """Which certificates; see :meth:`cmm_uq.laboratory.records.store.Records.certificates`."""
 
     machine: str | None = None
@@ -53,7 +62,7 @@ class Wanted:
     job: str | None = None
 
 
-def machines_of(connection: Connection) -> list[Machine]:
+def machines_of(connection: Connection) -> list[RecordedMachine]:
     """All, by serial."""
     days: dict[int, list[dt.date]] = defaultdict(list)
     for row in connection.execute(select(adjustments.c.machine, adjustments.c.day).order_by(adjustments.c.day)):
@@ -62,15 +71,15 @@ def machines_of(connection: Connection) -> list[Machine]:
     return [_machine(row, days.get(row["id"], ())) for row in rows]
 
 
-def machine_of(connection: Connection, serial: str) -> Machine:
+def machine_of(connection: Connection, serial: str) -> RecordedMachine:
     """One; see :meth:`cmm_uq.laboratory.records.store.Records.machine`."""
     number = machine_id(connection, serial)
     row = connection.execute(select(machines).where(machines.c.id == number)).mappings().one()
     return _machine(row, [dt.date.fromisoformat(day) for day in _adjusted(connection, [number])[number]])
 
 
-def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> Machine:
-    return Machine(
+def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> RecordedMachine:
+    return RecordedMachine(
         row["called"], row["name"], row["manufacturer"], row["model"], row["place"], tuple(adjusted),
         row["recognised"].startswith(BY_NAME),
         json.loads(row["calibrate"]) if row["calibrate"] else None,
@@ -78,12 +87,7 @@ def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> Machine:
 
 
 def machine_id(connection: Connection, serial: str) -> int:
-    """Number of the machine of a serial, or of a name.
-
-    Raises
-    ------
-    CmmUqError : it is not known, or several are called so.
-    """
+    """Number of the machine of a serial, or of a name."""
     for column, said in (
         (machines.c.called, serial), (machines.c.spelled, spelled(serial)), (machines.c.named, spelled(serial)),
     ):  # fmt: skip
@@ -109,8 +113,8 @@ def artefacts_of(connection: Connection) -> list[ArtefactRow]:
 
 
 def certificates_of(
-    connection: Connection, wanted: Wanted, limit: int | None, offset: int, *, values: bool, home: Path | None
-) -> list[Certificate]:  # fmt: skip
+    connection: Connection, wanted: CertificateQuery, limit: int | None, offset: int, *, values: bool, home: Path | None
+) -> list[RecordedCertificate]:
     """By day, then entry; see :meth:`cmm_uq.laboratory.records.store.Records.certificates`."""
     c = certificates.c
     query = select(*_COLUMNS).select_from(_JOINED).where(*_conditions(connection, wanted))
@@ -118,7 +122,7 @@ def certificates_of(
     return _certificates(connection, query, values=values, home=home)[::-1]
 
 
-def _conditions(connection: Connection, wanted: Wanted) -> list[ColumnElement[bool]]:
+def _conditions(connection: Connection, wanted: CertificateQuery) -> list[ColumnElement[bool]]:
     c = certificates.c
     found: list[ColumnElement[bool]] = [
         column == value
@@ -142,7 +146,7 @@ def _conditions(connection: Connection, wanted: Wanted) -> list[ColumnElement[bo
     return found
 
 
-def certificate_of(connection: Connection, entry: int, home: Path | None) -> Certificate:
+def certificate_of(connection: Connection, entry: int, home: Path | None) -> RecordedCertificate:
     """One; see :meth:`cmm_uq.laboratory.records.store.Records.certificate`."""
     query = select(*_COLUMNS).select_from(_JOINED).where(certificates.c.entry == entry)
     found = _certificates(connection, query, values=True, home=home)
@@ -151,7 +155,7 @@ def certificate_of(connection: Connection, entry: int, home: Path | None) -> Cer
     return found[0]
 
 
-def named(connection: Connection, name: str, home: Path | None) -> list[Certificate]:
+def named(connection: Connection, name: str, home: Path | None) -> list[RecordedCertificate]:
     """By number, job, hash or entry; see :meth:`cmm_uq.laboratory.records.store.Records.named`."""
     c = certificates.c
     ways = [c.number == name, c.job == name, c.results_sha256 == name, c.folder == name]
@@ -166,7 +170,7 @@ def named(connection: Connection, name: str, home: Path | None) -> list[Certific
 
 def latest_of(
     connection: Connection, home: Path | None, until: dt.date | None = None, *, values: bool = True
-) -> list[Certificate]:  # fmt: skip
+) -> list[RecordedCertificate]:
     """Newest of each machine; see :meth:`cmm_uq.laboratory.records.store.Records.latest`."""
     newest = certificates.alias()
     of_machine = (
@@ -178,14 +182,14 @@ def latest_of(
     )  # fmt: skip
     found = connection.execute(select(of_machine).select_from(machines)).scalars()
     entries = sorted(entry for entry in found if entry is not None)
-    rows: list[Certificate] = []
+    rows: list[RecordedCertificate] = []
     for block in blocks(entries):
         query = select(*_COLUMNS).select_from(_JOINED).where(certificates.c.entry.in_(block))
         rows += _certificates(connection, query, values=values, home=home)
     return sorted(rows, key=lambda one: (one.machine, one.entry))
 
 
-def checks_of(connection: Connection, home: Path | None) -> list[Certificate]:
+def checks_of(connection: Connection, home: Path | None) -> list[RecordedCertificate]:
     """Interim checks of all machines; see :meth:`cmm_uq.laboratory.records.store.Records.checks`."""
     c = certificates.c
     query = select(*_COLUMNS).select_from(_JOINED).where(
@@ -212,11 +216,12 @@ def dated_after_of(connection: Connection, day: dt.date) -> dict[str, dt.date]:
     return {row[0]: dt.date.fromisoformat(row[1]) for row in connection.execute(query.group_by(machines.c.called))}
 
 
-def signatures_of(connection: Connection, certificate: int) -> list[Signature]:
-    """In order."""
+def signatures_of(connection: Connection, certificate: int) -> list[ReleaseSignature]:
     query = select(signatures).where(signatures.c.certificate == certificate).order_by(signatures.c.entry)
     return [
-        Signature(row.entry, row.certificate, row.what, row.by, row.reason, dt.datetime.fromisoformat(row.at), row.replaced_by)
+        ReleaseSignature(
+            row.entry, row.certificate, row.what, row.by, row.reason, dt.datetime.fromisoformat(row.at), row.replaced_by
+        )
         for row in connection.execute(query)
     ]  # fmt: skip
 
@@ -232,7 +237,7 @@ def entry_of_results(connection: Connection, results_sha256: str, *, standing: b
 
 def _certificates(
     connection: Connection, query: Select[Any], *, values: bool, home: Path | None
-) -> list[Certificate]:  # fmt: skip
+) -> list[RecordedCertificate]:
     rows = connection.execute(query).all()
     entries = [row.entry for row in rows]
     stated = _values(connection, entries) if values else {}
@@ -240,7 +245,7 @@ def _certificates(
     adjusted = _adjusted(connection, {row.machine for row in rows})
     base, day_of, moment_of = _folder(home), dt.date.fromisoformat, dt.datetime.fromisoformat
     return [
-        Certificate(
+        RecordedCertificate(
             entry, job, machine_called, artefact_called, kind, origin, day_of(day), moment_of(at),
             adjusted_before(since, day, adjusted[machine]), state, decision, diagnosis, bool(interim), base(folder), version,
             results, number, command, _day(due), tuple(stated.get(entry, ())), together.get(entry),
@@ -250,21 +255,19 @@ def _certificates(
     ]  # fmt: skip
 
 
-def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[Value]]:
+def _values(connection: Connection, entries: Sequence[int]) -> dict[int, list[RecordedValue]]:
     f, q = figures.c, quantities.c
     names = {row[0]: row[1:] for row in connection.execute(select(q.id, q.name, q.quantity, q.unit)).all()}
-    found: dict[int, list[Value]] = defaultdict(list)
+    found: dict[int, list[RecordedValue]] = defaultdict(list)
     for block in blocks(entries):
         query = select(f.certificate, f.quantity, f.value, f.u, f.lower, f.upper, f.u_artefact, f.at_most)
         query = query.where(f.certificate.in_(block)).order_by(f.certificate, f.place)
         for certificate, quantity, value, u, lower, upper, common, limit in connection.execute(query).all():
-            found[certificate].append(Value(*names[quantity], value, u, lower, upper, common, limit))
+            found[certificate].append(RecordedValue(*names[quantity], value, u, lower, upper, common, limit))
     return found
 
 
-def _together(
-    connection: Connection, entries: Sequence[int]
-) -> dict[int, tuple[tuple[str, ...], tuple[float, ...]]]:  # fmt: skip
+def _together(connection: Connection, entries: Sequence[int]) -> dict[int, tuple[tuple[str, ...], tuple[float, ...]]]:
     c, found = covariances.c, {}
     for block in blocks(entries):
         for row in connection.execute(select(covariances).where(c.certificate.in_(block))):
@@ -293,10 +296,7 @@ def adjusted_before(stated: str | None, day: str, adjusted: Sequence[str]) -> dt
     return dt.date.fromisoformat(adjusted[before - 1]) if before else None
 
 
-def series_of(
-    connection: Connection, machine: str, names: Collection[str] | None, origin: str
-) -> dict[str, Series]:  # fmt: skip
-    """See :meth:`cmm_uq.laboratory.records.store.Records.series`."""
+def series_of(connection: Connection, machine: str, names: Collection[str] | None, origin: str) -> dict[str, Series]:
     import numpy as np
 
     number = machine_id(connection, machine)
@@ -339,7 +339,6 @@ def _stated(names: Collection[str] | None, origin: str) -> Select[Any]:
 
 
 def all_series_of(connection: Connection, names: Collection[str] | None, origin: str) -> pd.DataFrame:
-    """See :meth:`cmm_uq.laboratory.records.store.Records.all_series`."""
     import pandas as pd
 
     rows = connection.execute(_stated(names, origin)).all()

@@ -13,10 +13,16 @@ from sqlalchemy import Connection, Engine, insert, select, text
 from cmm_uq.base.errors import OutputError
 from cmm_uq.laboratory.records import queries
 from cmm_uq.laboratory.records.entries import BEGINNING, Entry, following, now
-from cmm_uq.laboratory.records.facts import ArtefactRow, Certificate, Finding, Machine, Series, Signature
+from cmm_uq.laboratory.records.facts import (
+    ArtefactRow,
+    ChainFinding,
+    RecordedCertificate,
+    RecordedMachine,
+    ReleaseSignature,
+    Series,
+)
 from cmm_uq.laboratory.records.indexing import Indexer
-from cmm_uq.laboratory.records.place import APPLICATION, shown
-from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.place import APPLICATION, shown, told
 from cmm_uq.laboratory.records.tables import entries
 
 if TYPE_CHECKING:
@@ -46,7 +52,7 @@ class Records:
 
     def __init__(
         self, engine: Engine, place: str | Path, *, read_only: bool = False, clock: Callable[[], dt.datetime] = now
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.engine, self.place, self.read_only, self.clock = engine, place, read_only, clock
 
     def __enter__(self) -> Self:
@@ -74,11 +80,11 @@ class Records:
         """Folder of the file: folders of reports inside it are recorded relative to it; ``None`` for a server."""
         return self.place.absolute().parent if isinstance(self.place, Path) else None
 
-    def machines(self) -> list[Machine]:
+    def machines(self) -> list[RecordedMachine]:
         """All machines, by serial."""
         return self._read(queries.machines_of)
 
-    def machine(self, serial: str) -> Machine:
+    def machine(self, serial: str) -> RecordedMachine:
         """One machine, by serial however it is spelled, or by name.
 
         Raises
@@ -105,7 +111,7 @@ class Records:
         job: str | None = None,
         offset: int = 0,
         newest_first: bool = False,
-    ) -> list[Certificate]:
+    ) -> list[RecordedCertificate]:
         """Certificates and interim checks, by day, then entry.
 
         Parameters
@@ -125,11 +131,11 @@ class Records:
         ------
         CmmUqError : the machine is not known.
         """
-        wanted = queries.Wanted(machine, origin, states, artefact, since, command, job)
+        wanted = queries.CertificateQuery(machine, origin, states, artefact, since, command, job)
         found = self._read(lambda c: queries.certificates_of(c, wanted, limit, offset, values=values, home=self.home))
         return found[::-1] if newest_first else found
 
-    def certificate(self, entry: int) -> Certificate:
+    def certificate(self, entry: int) -> RecordedCertificate:
         """One certificate, by the number of its entry.
 
         Raises
@@ -138,14 +144,14 @@ class Records:
         """
         return self._read(lambda connection: queries.certificate_of(connection, entry, self.home))
 
-    def named(self, certificate: str) -> list[Certificate]:
+    def named(self, certificate: str) -> list[RecordedCertificate]:
         """Certificates by their number, id of the job, folder, hash of results.json, or number of the entry; by day.
 
         Values are not read.
         """
         return self._read(lambda connection: queries.named(connection, certificate, self.home))
 
-    def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[Certificate]:
+    def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[RecordedCertificate]:
         """Newest measured certificate, not withdrawn nor replaced, of each machine, by serial; interim checks are none.
 
         Parameters
@@ -163,13 +169,11 @@ class Records:
         """Machines with measured certificates or interim checks dated after a day, and the last such date of each."""
         return self._read(lambda connection: queries.dated_after_of(connection, day))
 
-    def checks(self) -> list[Certificate]:
+    def checks(self) -> list[RecordedCertificate]:
         """Measured interim checks of all machines, neither withdrawn nor replaced, by day, then entry."""
         return self._read(lambda connection: queries.checks_of(connection, self.home))
 
-    def series(
-        self, machine: str, names: Collection[str] | None = None, origin: str = "measured"
-    ) -> dict[str, Series]:  # fmt: skip
+    def series(self, machine: str, names: Collection[str] | None = None, origin: str = "measured") -> dict[str, Series]:
         """Each value of a machine over its standing certificates and interim checks.
 
         Parameters
@@ -194,7 +198,7 @@ class Records:
         """
         return self._read(lambda connection: queries.all_series_of(connection, names, origin))
 
-    def signatures(self, certificate: int) -> list[Signature]:
+    def signatures(self, certificate: int) -> list[ReleaseSignature]:
         """Who released, withdrew or replaced a certificate, in order."""
         return self._read(lambda connection: queries.signatures_of(connection, certificate))
 
@@ -284,7 +288,7 @@ class Records:
 
         return Intended(self, kind, content)
 
-    def verify(self, head: str | None = None, *, files: bool = True) -> list[Finding]:
+    def verify(self, head: str | None = None, *, files: bool = True) -> list[ChainFinding]:
         """Compare everything with the chain; see :mod:`cmm_uq.laboratory.records.verifying`.
 
         Parameters
@@ -306,12 +310,7 @@ class Records:
 
 
 class Writing:
-    """One transaction of one writer.
-
-    Parameters
-    ----------
-    records : that are written to.
-    """
+    """One transaction of one writer."""
 
     def __init__(self, records: Records) -> None:
         self.records = records
@@ -353,12 +352,7 @@ class Writing:
         self._told.__exit__(kind, error, trace)
 
     def add(self, new: Iterable[New]) -> list[Entry]:
-        """Add entries after the last one, with the rows that follow from them.
-
-        Raises
-        ------
-        CmmUqError : one says something that no entry before it allows.
-        """
+        """Add entries after the last one, with the rows that follow from them."""
         return self._all(self._following(new))
 
     def copy(self, whole: Iterable[Entry]) -> None:

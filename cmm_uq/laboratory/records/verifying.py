@@ -13,9 +13,9 @@ from sqlalchemy.pool import StaticPool
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.laboratory.records.entries import BEGINNING, Entry
-from cmm_uq.laboratory.records.facts import Finding
+from cmm_uq.laboratory.records.facts import ChainFinding
 from cmm_uq.laboratory.records.indexing import Indexer
-from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.place import told
 from cmm_uq.laboratory.records.tables import INDEX, META, certificates, entries
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ MOST = 1000
 _BLOCK = 2000
 
 
-def verified(records: Records, head: str | None, *, files: bool) -> list[Finding]:
+def verified(records: Records, head: str | None, *, files: bool) -> list[ChainFinding]:
     """What is wrong; see :meth:`cmm_uq.laboratory.records.store.Records.verify`."""
     with (
         told(records.place),
@@ -41,9 +41,9 @@ def verified(records: Records, head: str | None, *, files: bool) -> list[Finding
     return found[:MOST]
 
 
-def chain(connection: Connection, head: str | None = None) -> list[Finding]:
+def chain(connection: Connection, head: str | None = None) -> list[ChainFinding]:
     """What is wrong with the entries by themselves."""
-    found: list[Finding] = []
+    found: list[ChainFinding] = []
     number, previous, met = 0, BEGINNING, head is None
     for entry in _entries(connection):
         if entry.number != number + 1:
@@ -52,16 +52,18 @@ def chain(connection: Connection, head: str | None = None) -> list[Finding]:
                 if entry.number == number + 2
                 else f"entries {number + 1} to {entry.number - 1} are"
             )
-            found.append(Finding("chain", f"{gap} missing", number + 1))
+            found.append(ChainFinding("chain", f"{gap} missing", number + 1))
         elif entry.previous != previous:
-            found.append(Finding("chain", "does not follow the entry before it", entry.number))
+            found.append(ChainFinding("chain", "does not follow the entry before it", entry.number))
         if not entry.true:
-            found.append(Finding("chain", "was altered", entry.number))
+            found.append(ChainFinding("chain", "was altered", entry.number))
         number, previous, met = entry.number, entry.hash, met or entry.hash == head
         if len(found) >= MOST:
             return found
     if not met:
-        found.append(Finding("chain", f"no entry has the hash {head}: the last are missing, or all were written anew"))
+        found.append(
+            ChainFinding("chain", f"no entry has the hash {head}: the last are missing, or all were written anew")
+        )
     return found
 
 
@@ -92,7 +94,7 @@ def _entries(connection: Connection) -> Iterator[Entry]:
         number = rows[-1].number
 
 
-def _tables(connection: Connection) -> list[Finding]:
+def _tables(connection: Connection) -> list[ChainFinding]:
     """Rows that are not what the entries say."""
     engine = create_engine("sqlite://", poolclass=StaticPool)
     event.listen(engine, "connect", lambda raw, _: raw.execute("PRAGMA foreign_keys = OFF"))
@@ -102,19 +104,19 @@ def _tables(connection: Connection) -> list[Finding]:
             try:
                 _index(connection, fresh)
             except CmmUqError as error:
-                return [Finding("index", str(error))]
+                return [ChainFinding("index", str(error))]
             return [finding for table in INDEX for finding in _compared(table, connection, fresh)][:MOST]
     finally:
         engine.dispose()
 
 
-def _compared(table: Table, stored: Connection, fresh: Connection) -> Iterator[Finding]:
+def _compared(table: Table, stored: Connection, fresh: Connection) -> Iterator[ChainFinding]:
     about = next((name for name in ("entry", "certificate") if name in table.c), None)
     for there, wanted in zip_longest(_rows(table, stored), _rows(table, fresh)):
         if there != wanted:
             row: Any = dict(zip(table.c.keys(), wanted or there, strict=True))
             number = row[about] if about else None
-            yield Finding("index", f"the table {table.name} is not what the entries say", number)
+            yield ChainFinding("index", f"the table {table.name} is not what the entries say", number)
             return  # after a row that is too many or missing every one would differ
 
 
@@ -124,31 +126,31 @@ def _rows(table: Table, connection: Connection) -> Iterator[tuple[Any, ...]]:
         yield from (tuple(row) for row in block)
 
 
-def _files(connection: Connection, home: Path | None) -> list[Finding]:
+def _files(connection: Connection, home: Path | None) -> list[ChainFinding]:
     """Files of the newest set in each folder that were altered, and what is not there any more."""
     c, kept = certificates.c, _removed(connection)
     newest: dict[str, tuple[int, str]] = {}
     for row in connection.execute(select(c.folder, c.entry, c.results_sha256).order_by(c.entry)):
         if row.folder:
             newest[row.folder] = (row.entry, row.results_sha256)
-    found: list[Finding] = []
+    found: list[ChainFinding] = []
     for folder, (entry, results) in newest.items():
         if entry not in kept and len(found) < MOST:
             found += _of_folder(home / folder if home else Path(folder), entry, results)
     return found
 
 
-def _of_folder(folder: Path, entry: int, results: str) -> Iterator[Finding]:
+def _of_folder(folder: Path, entry: int, results: str) -> Iterator[ChainFinding]:
     digest = sha256_of(folder / "results.json")
     if digest is None:
-        yield Finding("missing", f"{folder} does not hold its results.json any more", entry)
+        yield ChainFinding("missing", f"{folder} does not hold its results.json any more", entry)
         return
     if digest != results:
-        yield Finding("file", f"{folder / 'results.json'} is not what was recorded", entry)
+        yield ChainFinding("file", f"{folder / 'results.json'} is not what was recorded", entry)
     manifest = read_manifest(folder)
     for name, wanted in (manifest.files if manifest else {}).items():
         if name != "results.json" and sha256_of(folder / name) != wanted:
-            yield Finding("file", f"{folder / name} was altered or removed", entry)
+            yield ChainFinding("file", f"{folder / name} was altered or removed", entry)
 
 
 def _removed(connection: Connection) -> set[int]:

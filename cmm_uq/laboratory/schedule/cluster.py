@@ -18,7 +18,7 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.talking import Answer, Packed, Talk, Work
+from cmm_uq.laboratory.schedule.processes import Packed, TaskAnswer, WorkerProcess, WorkerTask
 
 MOST_TASKS, MOST_BYTES = 100, 8 * 2**20
 """In one task of the cluster, unless a single one is larger."""
@@ -38,21 +38,9 @@ _GO_ON = "Mend the cluster; the same command with --resume goes on"
 
 
 def cluster_answers(
-    address: str, work: Work, tasks: Iterable[tuple[int, Any]], count: int
-) -> Generator[Answer, None, None]:
-    """Have every task answered, in the order in which they are done.
-
-    Parameters
-    ----------
-    address : of the scheduler, as ``tcp://host:8786``.
-    work : what processes are begun for.
-    tasks : each with its number.
-    count : how many there are, at most: the last ones go out in smaller portions, so that no worker is left with many.
-
-    Raises
-    ------
-    CmmUqError : no scheduler answers, it has no workers, or one of them has another version of this package.
-    """
+    address: str, work: WorkerTask, tasks: Iterable[tuple[int, Any]], count: int
+) -> Generator[TaskAnswer, None, None]:
+    """Have every task answered, in the order in which they are done."""
     client = _client(address)
     try:
         threads = _threads(client, address)
@@ -87,13 +75,13 @@ class _Chunks:
 class _Run:
     """Portions under way at a cluster."""
 
-    def __init__(self, client: Any, address: str, work: Work) -> None:
+    def __init__(self, client: Any, address: str, work: WorkerTask) -> None:
         self._client, self._address, self._work = client, address, work
         self._wait = import_module("distributed").wait
         self._asked: dict[Any, Chunk] = {}
         self._alone = time.monotonic()
 
-    def through(self, chunks: _Chunks, most: int) -> Iterator[Answer]:
+    def through(self, chunks: _Chunks, most: int) -> Iterator[TaskAnswer]:
         """Have all of them answered, ``most`` under way at a time."""
         more = True
         while more or self._asked:
@@ -133,9 +121,9 @@ class _Run:
         elif time.monotonic() - self._alone > PATIENCE_S:
             raise CmmUqError("has no workers any more", where=self._address, fix=_GO_ON)
 
-    def _answered(self, future: Any, chunk: Chunk) -> Iterator[Answer]:
+    def _answered(self, future: Any, chunk: Chunk) -> Iterator[TaskAnswer]:
         try:
-            answers: list[Answer] = future.result()
+            answers: list[TaskAnswer] = future.result()
         except CmmUqError:
             raise
         except Exception as error:
@@ -147,7 +135,7 @@ class _Run:
                 return
             why = str(error).split("\n", 1)[0]
             failure = CmmUqError(f"the cluster gave it up: {type(error).__name__}: {why}")
-            answers = [Answer(chunk[0][0], failure=failure, ended=("worker",))]
+            answers = [TaskAnswer(chunk[0][0], failure=failure, ended=("worker",))]
         yield from answers
         future.release()
 
@@ -181,23 +169,18 @@ def _threads(client: Any, address: str) -> int:
     return max(1, sum(map(int, client.nthreads().values())))
 
 
-_idle: dict[Work, list[Talk]] = {}
+_idle: dict[WorkerTask, list[WorkerProcess]] = {}
 _lock = threading.Lock()
 
 
-def chunk_answered(version: str, work: Work, chunk: Chunk) -> list[Answer]:
-    """Answers of a portion, by a process of this worker that stays for the next one.
-
-    Raises
-    ------
-    CmmUqError : this worker, which came later, has another version; or its process cannot begin.
-    """
+def chunk_answered(version: str, work: WorkerTask, chunk: Chunk) -> list[TaskAnswer]:
+    """Answers of a portion, by a process of this worker that stays for the next one."""
     if version != __version__:
         raise CmmUqError(f"a worker that came later has cmm-uq {__version__}, and this is {version}", where="--scheduler",
                          fix="Install the same version everywhere; the same command with --resume goes on")  # fmt: skip
     with _lock:
         waiting = _idle.get(work)
-        talk = waiting.pop() if waiting else Talk(work)
+        talk = waiting.pop() if waiting else WorkerProcess(work)
     answers = [talk.ask(number, task) for number, task in chunk]
     with _lock:
         _idle.setdefault(work, []).append(talk)
@@ -207,7 +190,7 @@ def chunk_answered(version: str, work: Work, chunk: Chunk) -> list[Answer]:
     return answers
 
 
-def _end_one(work: Work, talk: Talk) -> None:
+def _end_one(work: WorkerTask, talk: WorkerProcess) -> None:
     with _lock:
         waiting = _idle.get(work, [])
         if talk not in waiting:

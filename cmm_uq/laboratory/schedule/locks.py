@@ -25,12 +25,8 @@ _ATTEMPTS = 20
 class Turn:
     """The lock of a file, held.
 
-    Parameters
-    ----------
-    path : of the lock file.
-    descriptor : that holds the lock.
-    resumed : whether a run ended before it was through with what the lock is of.
-    through : whether this one is, so that it may be forgotten.
+    ``resumed``: whether a run ended before it was through with what the lock is of; ``through``: whether this one is,
+    so that it may be forgotten.
     """
 
     path: Path
@@ -39,7 +35,6 @@ class Turn:
     through: bool = True
 
     def end(self) -> None:
-        """Release the lock."""
         if self.through:
             try:
                 self.path.unlink()
@@ -50,16 +45,7 @@ class Turn:
 
 
 def turn_at(path: Path) -> Turn | None:
-    """Take a lock without waiting; ``None`` where another process holds it.
-
-    Parameters
-    ----------
-    path : of the lock file; its folder is made where there is none.
-
-    Raises
-    ------
-    OutputError : no such file can be made.
-    """
+    """Take a lock without waiting; ``None`` where another process holds it."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for _ in range(_ATTEMPTS):
@@ -81,12 +67,7 @@ def turn_at(path: Path) -> Turn | None:
 
 @contextlib.contextmanager
 def turn(path: Path, *, patience_s: float = 0.0) -> Iterator[Turn | None]:
-    """A lock while something is done; ``None`` where another process holds it for longer than ``patience_s`` seconds.
-
-    Raises
-    ------
-    OutputError : no such file can be made.
-    """
+    """A lock while something is done; ``None`` where another process holds it for longer than ``patience_s`` seconds."""
     deadline = time.monotonic() + patience_s
     taken = turn_at(path)
     while taken is None and time.monotonic() < deadline:

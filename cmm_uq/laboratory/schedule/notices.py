@@ -1,12 +1,13 @@
-"""What a person must hear of: a certificate that is no pass, a recording that contradicts its model, what is due, an error."""
+"""What a person must hear of, and the messages that say it: a certificate that is no pass, what is due, an error."""
 
 from __future__ import annotations
 
 import datetime as dt
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, Protocol, get_args
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, say
@@ -32,14 +33,8 @@ _CONTRADICTS = say("the recording contradicts its model")
 class Notice:
     """Something that a person must hear of, once.
 
-    Parameters
-    ----------
-    event : see :data:`Event`.
-    about : job, machine, artefact or folder that it is about.
-    title : in a few words; the subject of an e-mail.
-    text : one or several sentences.
-    state : which state of it: another state is told again, the same is not.
-    where : folder in which to look.
+    ``about``: job, machine, artefact or folder that it is about; ``title``: in a few words; the subject of an e-mail;
+    ``state``: which state of it: another state is told again, the same is not; ``where``: folder in which to look.
     """
 
     event: Event
@@ -57,14 +52,7 @@ class Notice:
 
 
 def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Notice]:
-    """What has to be said of a certificate, at most one notice an event; none where all is well.
-
-    Parameters
-    ----------
-    results : contents of results.json.
-    inputs : hash over the hashes of all that was read.
-    where : folder of the certificate.
-    """
+    """What has to be said of a certificate, at most one notice an event; none where all is well."""
     job = results.get("job", {})
     name, machine = Verbatim(str(job.get("id", ""))), Verbatim(str(job.get("machine") or ""))
     of = say("{machine} (job {name})", machine=machine, name=name) if machine else say("job {name}", name=name)
@@ -87,11 +75,7 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
 def of_error(error: CmmUqError, about: str, since: str) -> Notice:
     """What has to be said of a job or a folder that could not be reported.
 
-    Parameters
-    ----------
-    error : that ended it.
-    about : job id, or folder.
-    since : moment at which it was first met; where it was mended in between and comes back, it is told again.
+    ``since``: moment at which it was first met; where it was mended in between and comes back, it is told again.
     """
     title = say("error: {about}", about=Verbatim(about))
     return Notice("error", about, title, Verbatim(str(error)), f"{error} since {since}", error.where or "")
@@ -100,14 +84,7 @@ def of_error(error: CmmUqError, about: str, since: str) -> Notice:
 def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text, *, beyond: bool = False) -> Notice:
     """What has to be said of a machine or an artefact that is to be calibrated: once before its day, and once after it.
 
-    Parameters
-    ----------
-    item : machine or artefact.
-    called : its serial number or name.
-    due : day by which it is to be calibrated.
-    on : today.
-    why : it is due then.
-    beyond : whether its last certificate finds it beyond its limits.
+    ``due``: day by which it is to be calibrated.
     """
     overdue = beyond or due < on
     state = say("overdue since {due}", due=day(due)) if overdue else say("due on {due}", due=day(due))
@@ -118,14 +95,7 @@ def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text, *, beyo
 
 
 def of_drift(machine: str, changed: Sequence[Text], entry: int) -> Notice:
-    """What has to be said of a machine that changed by more than chance since the recording before.
-
-    Parameters
-    ----------
-    machine : its serial number.
-    changed : what did.
-    entry : number of the newer certificate's entry.
-    """
+    """What has to be said of a machine that changed by more than chance since the recording before."""
     of = say("machine {machine}", machine=Verbatim(machine))
     text = say(
         "{of} changed by more than chance since the recording before: {changed}.", of=of, changed=commas(changed)
@@ -145,3 +115,72 @@ def _statement(one: Verdict) -> Text:
     if not one.name:
         return say("{standard}: {decision}", standard=standard, decision=said)
     return say("{standard} {characteristic}: {decision}", standard=standard, characteristic=name, decision=said)
+
+
+class UndeliveredError(Exception):
+    """A message did not go out; a later attempt may succeed. Its text holds no secret."""
+
+
+@dataclass(frozen=True)
+class OutgoingMessage:
+    """What is sent of a notice; of texts only, so that it can wait in a file.
+
+    ``key``: the same whenever the same is sent the same way, so that a receiver knows a repetition; ``at``: moment at
+    which it was found, UTC, ISO 8601.
+    """
+
+    key: str
+    event: str
+    about: str
+    title: str
+    text: str
+    where: str
+    at: str
+
+    def as_data(self) -> dict[str, str]:
+        """For a file, or a webhook."""
+        return asdict(self)
+
+    @classmethod
+    def of(cls, notice: Notice, channel: str, at: str) -> OutgoingMessage:
+        """A notice on its way through a channel."""
+        key = hashlib.sha256(f"{channel}\0{notice.key}".encode()).hexdigest()[:32]
+        return cls(key, notice.event, notice.about, str(notice.title), str(notice.text), notice.where, at)
+
+
+class Channel(Protocol):
+    """A way of sending messages."""
+
+    @property
+    def name(self) -> str:
+        """What tells it from others, without a secret."""
+        ...
+
+    @property
+    def events(self) -> frozenset[str]:
+        """That it is told of."""
+        ...
+
+    def send(self, message: OutgoingMessage) -> str:
+        """Send a message; what is to be remarked of it, as a rule nothing."""
+        ...
+
+
+def within(seconds: float, call: Callable[[], str], who: str) -> str:
+    """What a call returns, or no answer after so long, whatever it hangs in: a name server, a handshake, one byte a minute."""
+    found: list[Any] = []
+
+    def attempt() -> None:
+        try:
+            found.append(call())
+        except Exception as error:
+            found.append(error)
+
+    thread = threading.Thread(target=attempt, name="message", daemon=True)
+    thread.start()
+    thread.join(seconds)
+    if not found:
+        raise UndeliveredError(f"{who} did not answer within {seconds:g} s")
+    if isinstance(found[0], Exception):
+        raise found[0]
+    return str(found[0])

@@ -22,8 +22,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.output.refusing import writing_to
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.schedule.locks import turn
-from cmm_uq.laboratory.schedule.message import Channel, Message, UndeliveredError
-from cmm_uq.laboratory.schedule.notices import Notice
+from cmm_uq.laboratory.schedule.notices import Channel, Notice, OutgoingMessage, UndeliveredError
 from cmm_uq.laboratory.schedule.state import PRIVATE, State
 
 _MENDED = "Free the disk, or mend the permissions"
@@ -44,15 +43,10 @@ _ABANDONED_S = 3600.0
 class Delivery:
     """What came of a message.
 
-    Parameters
-    ----------
-    message : that it is about.
-    channel : its name.
-    problem : why it did not go out; empty where it did.
-    remark : on one that went out.
+    ``problem``: why it did not go out; empty where it did; ``remark``: on one that went out.
     """
 
-    message: Message
+    message: OutgoingMessage
     channel: str
     problem: str = ""
     remark: str = ""
@@ -60,15 +54,7 @@ class Delivery:
 
 @dataclass(frozen=True)
 class Outbox:
-    """Messages of one folder of reports.
-
-    Parameters
-    ----------
-    out : folder of the reports.
-    channels : ways of sending.
-    state : which were sent.
-    now : this moment, UTC, ISO 8601.
-    """
+    """Messages of one folder of reports."""
 
     out: Path
     channels: Sequence[Channel]
@@ -77,22 +63,16 @@ class Outbox:
 
     @property
     def folder(self) -> Path:
-        """Where messages wait."""
         return self.out / PRIVATE / "outbox"
 
     def add(self, notices: Iterable[Notice]) -> list[Notice]:
-        """Let notices go out that have not yet; those of them that were new to any channel.
-
-        Raises
-        ------
-        OutputError : they cannot be written.
-        """
+        """Let notices go out that have not yet; those of them that were new to any channel."""
         added = []
         for notice in notices:
             new = False
             for channel in self.channels:
                 if notice.event in channel.events:
-                    new |= self._wait(Message.of(notice, channel.name, self.now()), channel.name)
+                    new |= self._wait(OutgoingMessage.of(notice, channel.name, self.now()), channel.name)
             if new:
                 added.append(notice)
         return added
@@ -103,7 +83,7 @@ class Outbox:
         for notice in notices:
             for channel in self.channels:
                 if notice.event in channel.events:
-                    message = Message.of(notice, channel.name, self.now())
+                    message = OutgoingMessage.of(notice, channel.name, self.now())
                     problem, remark = _attempt(channel, message)
                     done.append(Delivery(message, channel.name, problem, remark))
         return done
@@ -113,16 +93,7 @@ class Outbox:
         return sum(1 for _ in self.folder.glob(f"*{_WAITING}")) if self.folder.is_dir() else 0
 
     def deliver(self, patience_s: float) -> list[Delivery]:
-        """Send what waits, each channel until its first failure; nothing where another run is at it for longer.
-
-        Parameters
-        ----------
-        patience_s : how long to wait for another run that sends.
-
-        Raises
-        ------
-        OutputError : the folder cannot be written to.
-        """
+        """Send what waits, each channel until its first failure; nothing where another run is at it for longer."""
         if not self.folder.is_dir():
             return []
         with turn(self.out / PRIVATE / "messages.lock", patience_s=patience_s) as mine:
@@ -154,9 +125,9 @@ class Outbox:
                         path.rename(path.with_suffix(_SENT))
         return done
 
-    def _by_channel(self) -> dict[str, list[tuple[Message, Path]]]:
+    def _by_channel(self) -> dict[str, list[tuple[OutgoingMessage, Path]]]:
         """What waits for each channel, oldest first."""
-        found: dict[str, list[tuple[Message, Path]]] = {}
+        found: dict[str, list[tuple[OutgoingMessage, Path]]] = {}
         for path in self.folder.glob(f"*{_WAITING}"):
             read = _read(path)
             if read is not None:
@@ -184,7 +155,7 @@ class Outbox:
                 if time.time() - path.stat().st_mtime > _ABANDONED_S:
                     path.unlink()
 
-    def _wait(self, message: Message, channel: str) -> bool:
+    def _wait(self, message: OutgoingMessage, channel: str) -> bool:
         """Whether the message was new."""
         place = self.folder / f"{message.key}{_WAITING}"
         if self.state.sent(message.key) or place.exists() or place.with_suffix(_SENT).exists():
@@ -205,16 +176,16 @@ class Outbox:
         return True
 
 
-def _read(path: Path) -> tuple[Message, str] | None:
+def _read(path: Path) -> tuple[OutgoingMessage, str] | None:
     """A message and its channel; ``None`` of a file that is gone, or that somebody else put there."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
-        return Message(**{key: str(value) for key, value in data["message"].items()}), str(data["channel"])
+        return OutgoingMessage(**{key: str(value) for key, value in data["message"].items()}), str(data["channel"])
     except (OSError, ValueError, TypeError, KeyError, AttributeError):
         return None
 
 
-def _collected(waiting: Sequence[tuple[Message, Path]]) -> list[tuple[Message, list[Path]]]:
+def _collected(waiting: Sequence[tuple[OutgoingMessage, Path]]) -> list[tuple[OutgoingMessage, list[Path]]]:
     """Messages one by one with their files; of many the last is all the others together."""
     if len(waiting) <= MOST:
         return [(message, [path]) for message, path in waiting]
@@ -223,11 +194,13 @@ def _collected(waiting: Sequence[tuple[Message, Path]]) -> list[tuple[Message, l
     titles = [message.title for message, _ in rest]
     listed = "\n".join([*titles[:LISTED], *([f"and {len(titles) - LISTED} more"] if len(titles) > LISTED else [])])
     (first, _), *_ = rest
-    together = Message(key, first.event, "", str(say("{count} more messages", count=len(rest))), listed, "", first.at)
+    together = OutgoingMessage(
+        key, first.event, "", str(say("{count} more messages", count=len(rest))), listed, "", first.at
+    )
     return [*((message, [path]) for message, path in alone), (together, [path for _, path in rest])]
 
 
-def _attempt(channel: Channel, message: Message) -> tuple[str, str]:
+def _attempt(channel: Channel, message: OutgoingMessage) -> tuple[str, str]:
     """Why a message did not go out, and what is to be remarked of one that did; either may be empty."""
     try:
         return "", channel.send(message)

@@ -26,33 +26,14 @@ Columns = Sequence[tuple[str, str, str]]
 
 
 def check_parquet(path: Path, *, force: bool) -> None:
-    """Make sure, before there are any rows, that they could be written.
-
-    Raises
-    ------
-    CmmUqError : pyarrow is not installed.
-    OutputError : something is there, or its folder is not.
-    """
+    """Make sure, before there are any rows, that they could be written."""
     arrow("pyarrow")
     if not force:
         refuse_taken(path)
 
 
 def write_parquet(path: Path, columns: Columns, rows: Iterable[Row], *, force: bool) -> None:
-    """Rows as a new file.
-
-    Parameters
-    ----------
-    path : of the file.
-    columns : of the rows.
-    rows : each with a value for each column, of any number.
-    force : keep a file that is there as ``NAME.previous`` instead of refusing.
-
-    Raises
-    ------
-    CmmUqError : pyarrow is not installed.
-    OutputError : something is there, or it cannot be written.
-    """
+    """Rows as a new file."""
     module, parquet, left = arrow("pyarrow"), arrow("pyarrow.parquet"), iter(rows)
     schema = module.schema(
         [module.field(name, _type(module, kind), metadata={"meaning": told}) for name, kind, told in columns]
@@ -70,12 +51,7 @@ def write_parquet(path: Path, columns: Columns, rows: Iterable[Row], *, force: b
 
 
 def arrow(module: str) -> ModuleType:
-    """A module of pyarrow.
-
-    Raises
-    ------
-    CmmUqError : it is not installed.
-    """
+    """A module of pyarrow."""
     try:
         return import_module(module)
     except ModuleNotFoundError:

@@ -1,18 +1,23 @@
-"""How far a run of many jobs is: what is done, how fast, and how long it will still take."""
+"""How far a run of many jobs is, and what it did: its pace, and a log of a line each."""
 
 from __future__ import annotations
 
+import contextlib
+import logging
+import logging.handlers
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from cmm_uq.base.errors import CmmUqError, printable
+from cmm_uq.laboratory.schedule.locks import turn
 
 
 class Pace:
     """Counts what is done of a number of jobs.
 
-    Parameters
-    ----------
-    count : of all jobs.
-    clock : seconds, never going back.
+    ``clock``: seconds, never going back.
     """
 
     def __init__(self, count: int, clock: Callable[[], float] = time.monotonic) -> None:
@@ -28,7 +33,6 @@ class Pace:
 
     @property
     def seconds(self) -> float:
-        """Since the beginning."""
         return self._clock() - self._began
 
     @property
@@ -60,3 +64,41 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+_PATIENCE_S = 2.0
+"""How long to wait for another run that writes its line."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """A file of lines.
+
+    ``path``: of the file; ``None`` for no log; ``largest``: bytes at which a new one is begun.
+    """
+
+    path: Path | None
+    largest: int
+    kept: int
+
+    def write(self, text: str) -> None:
+        """One line; a log that cannot be written stops nothing."""
+        if self.path is None:
+            return
+        with (
+            contextlib.suppress(OSError, CmmUqError),
+            turn(self.path.with_name(f".{self.path.name}.lock"), patience_s=_PATIENCE_S),
+        ):
+            # opened for each line, so that a file that another run has begun anew is not written on
+            handler = logging.handlers.RotatingFileHandler(
+                self.path, maxBytes=self.largest, backupCount=self.kept, encoding="utf-8", errors="backslashreplace",
+                delay=True,
+            )  # fmt: skip
+            handler.handleError = _passed_over  # type: ignore[method-assign]
+            try:
+                handler.emit(logging.makeLogRecord({"msg": printable(text)}))
+            finally:
+                handler.close()
+
+
+def _passed_over(record: logging.LogRecord) -> None: ...

@@ -13,12 +13,25 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.schedule.found import Found, Snapshot, job_folders, quiet_since, snapshot
+from cmm_uq.laboratory.schedule.jobs import (
+    BUSY,
+    FAILED,
+    GONE,
+    UNCHANGED,
+    WAITING,
+    WOULD,
+    JobFolder,
+    JobOutcome,
+    JobReporting,
+    Snapshot,
+    job_folders,
+    quiet_since,
+    snapshot,
+)
 from cmm_uq.laboratory.schedule.notices import Notice, of_error
 from cmm_uq.laboratory.schedule.outbox import Delivery, Outbox
-from cmm_uq.laboratory.schedule.problems import Problems
 from cmm_uq.laboratory.schedule.settings import RunTable
-from cmm_uq.laboratory.schedule.work import BUSY, FAILED, GONE, UNCHANGED, WAITING, WOULD, Ended, Work
+from cmm_uq.laboratory.schedule.state import Problems
 
 SCHEMA = "cmm-uq/scheduled/1"
 
@@ -30,14 +43,11 @@ _PATIENCE_S = 60.0
 
 
 @dataclass(frozen=True)
-class Clock:
+class RunClock:
     """Time, as a run knows it.
 
-    Parameters
-    ----------
-    now : the moment, UTC; it may jump.
-    passed : seconds from some moment on; they do not.
-    sleep : waits so many seconds.
+    ``now``: the moment, UTC; it may jump; ``passed``: seconds from some moment on; they do not; ``sleep``: waits so
+    many seconds.
     """
 
     now: Callable[[], dt.datetime]
@@ -50,30 +60,22 @@ class Clock:
 
 
 @dataclass(frozen=True)
-class Run:
+class ScheduledRun:
     """What a scheduled run goes by.
 
-    Parameters
-    ----------
-    folders : with job folders in them.
-    settings : of ``[run]``.
-    work : how a job is reported.
-    outbox : takes messages.
-    due : what is due, or drifts, on a day.
-    tell : takes a line for a program.
-    log : takes a line for a person.
-    clock : time.
-    dry : say what would happen, and do nothing.
+    ``folders``: with job folders in them; ``work``: how a job is reported; ``due``: what is due, or drifts, on a day;
+    ``tell``: takes a line for a program; ``log``: takes a line for a person; ``dry``: say what would happen, and do
+    nothing.
     """
 
     folders: Sequence[Path]
     settings: RunTable
-    work: Work
+    work: JobReporting
     outbox: Outbox
     due: Callable[[dt.date], Iterable[Notice]]
     tell: Callable[[dict[str, Any]], None]
     log: Callable[[str], None]
-    clock: Clock
+    clock: RunClock
     dry: bool = False
     counted: dict[str, int] = field(default_factory=dict)
     codes: set[int] = field(default_factory=lambda: {0})
@@ -97,9 +99,9 @@ class Run:
         self._send(self.settings.tries, last=True)
         return self._conclude()
 
-    def _found(self, problems: Problems) -> list[Found]:
+    def _found(self, problems: Problems) -> list[JobFolder]:
         """Every job folder once; what is wrong with a folder of the schedule is told."""
-        found: dict[Path, Found] = {}
+        found: dict[Path, JobFolder] = {}
         for root in self.folders:
             try:
                 inside = list(job_folders(root, self.work.out))
@@ -107,16 +109,16 @@ class Run:
                     raise CmmUqError("holds no job", where=str(root),
                                      fix="A job is a folder with a job.toml; [run] may_be_empty allows none")  # fmt: skip
             except CmmUqError as error:
-                self._end(Ended.refused(Found(root, root), error), problems)
+                self._end(JobOutcome.refused(JobFolder(root, root), error), problems)
                 continue
             self._mended(str(root), problems)
             for job in inside:
                 found.setdefault(job.folder.resolve(), job)
         return list(found.values())
 
-    def _distinct(self, jobs: Sequence[Found], problems: Problems) -> list[Found]:
+    def _distinct(self, jobs: Sequence[JobFolder], problems: Problems) -> list[JobFolder]:
         """Jobs whose id no other one has; of the others neither is reported, or each would replace the other's."""
-        by_id: dict[str, list[Found]] = {}
+        by_id: dict[str, list[JobFolder]] = {}
         for job in jobs:
             by_id.setdefault(job.id.casefold() or str(job.folder), []).append(job)
         for same in by_id.values():
@@ -124,28 +126,28 @@ class Run:
                 if job is not other:
                     error = CmmUqError(f"its id {job.id!r} is that of {other.folder} too", where=str(job.folder),
                                        fix="Give each job an id of its own")  # fmt: skip
-                    self._end(Ended.refused(job, error), problems)
+                    self._end(JobOutcome.refused(job, error), problems)
         alone = [same[0] for same in by_id.values() if len(same) == 1]
         # a job in which the last run ended comes last, so that it cannot keep the others from being reported
         return sorted(alone, key=self.work.was_left)
 
-    def _would(self, job: Found) -> Ended:
+    def _would(self, job: JobFolder) -> JobOutcome:
         """What would come of a job."""
         if job.planned:
-            return Ended(job, WAITING, "not measured yet")
+            return JobOutcome(job, WAITING, "not measured yet")
         try:
             why = self.work.reason(job)
         except CmmUqError as error:
-            return Ended.refused(job, error)
+            return JobOutcome.refused(job, error)
         if not why:
-            return Ended(job, UNCHANGED)
+            return JobOutcome(job, UNCHANGED)
         unchanged_s = quiet_since(snapshot(job.folder), self.clock.now().timestamp())
         quiet = unchanged_s >= self.settings.quiet_s
-        return Ended(job, WOULD, why) if quiet else Ended(job, WAITING, "changed a moment ago")
+        return JobOutcome(job, WOULD, why) if quiet else JobOutcome(job, WAITING, "changed a moment ago")
 
     def _parted(
-        self, jobs: Iterable[Found], problems: Problems
-    ) -> tuple[list[Found], dict[Found, tuple[float, Snapshot]]]:
+        self, jobs: Iterable[JobFolder], problems: Problems
+    ) -> tuple[list[JobFolder], dict[JobFolder, tuple[float, Snapshot]]]:
         """Jobs that can be taken, and those that somebody may still be copying, as they are now."""
         ready, changing = [], {}
         for job in jobs:
@@ -159,16 +161,9 @@ class Run:
         return ready, changing
 
     def _settled(
-        self, changing: Mapping[Found, tuple[float, Snapshot]], ids: Collection[str], problems: Problems
-    ) -> list[Found]:
-        """Of the jobs that were changed a moment ago, or have times of the future, those that nobody changes now.
-
-        Parameters
-        ----------
-        changing : when each was looked at, and what lay in its folder.
-        ids : of all jobs, without regard to case.
-        problems : that stand.
-        """
+        self, changing: Mapping[JobFolder, tuple[float, Snapshot]], ids: Collection[str], problems: Problems
+    ) -> list[JobFolder]:
+        """Of the jobs that were changed a moment ago, or have times of the future, those that nobody changes now."""
         settled = []
         for job, (looked, seen) in changing.items():
             self.clock.sleep(max(0.0, looked + self.settings.quiet_s - self.clock.passed()))
@@ -177,10 +172,10 @@ class Run:
             if snapshot(job.folder) == seen and same_id and not again.planned:
                 settled.append(again)
             else:
-                self._end(Ended(job, WAITING, "is still being changed: left for the next run"), problems)
+                self._end(JobOutcome(job, WAITING, "is still being changed: left for the next run"), problems)
         return settled
 
-    def _report_all(self, jobs: Sequence[Found], problems: Problems) -> None:
+    def _report_all(self, jobs: Sequence[JobFolder], problems: Problems) -> None:
         """Report jobs; those whose output is impossible now again after the others."""
         left = list(jobs)
         for attempt in range(1, self.settings.tries + 1):
@@ -189,9 +184,9 @@ class Run:
                 return
             self._back_off(attempt)
 
-    def _attempt(self, jobs: Sequence[Found], problems: Problems, *, last: bool) -> list[Found]:
+    def _attempt(self, jobs: Sequence[JobFolder], problems: Problems, *, last: bool) -> list[JobFolder]:
         """Report jobs; those that are to be tried again."""
-        again: list[Found] = []
+        again: list[JobFolder] = []
         in_a_row = 0
         for i, job in enumerate(jobs):
             ended = self.work.take(job)
@@ -242,7 +237,7 @@ class Run:
         told = {"message": one.message.title, "channel": one.channel, "sent": not one.problem, "why": why}
         self._line(told, code)
 
-    def _end(self, ended: Ended, problems: Problems) -> None:
+    def _end(self, ended: JobOutcome, problems: Problems) -> None:
         """Tell what came of a job; an error goes out once while it stands."""
         self.counted[ended.state] = self.counted.get(ended.state, 0) + 1
         self.codes.add(ended.code)
@@ -290,7 +285,7 @@ class Run:
         return code
 
 
-def _looked_at_again(job: Found) -> Found:
+def _looked_at_again(job: JobFolder) -> JobFolder:
     """A job that may have been read while it was being copied."""
     try:
         again = next(job_folders(job.folder), job)

@@ -1,4 +1,6 @@
-"""What earlier runs have done: which inputs a job was last reported from, and which messages were sent.
+"""What earlier runs have done: which inputs a job was last reported from, which messages were sent, which problems stand.
+
+What earlier runs have done: which inputs a job was last reported from, and which messages were sent.
 
 The records of the laboratory keep it, or the folder of the reports where there are none: the manifest of a report says that
 it is whole, its results.json what it was made from.
@@ -6,6 +8,8 @@ it is whole, its results.json what it was made from.
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -17,10 +21,11 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.output import read_manifest, sha256_of
+from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.file_names import RESULTS
 
 if TYPE_CHECKING:
-    from cmm_uq.laboratory.records import Certificate
+    from cmm_uq.laboratory.records.facts import RecordedCertificate
     from cmm_uq.laboratory.records.store import Records
 
 PRIVATE = ".scheduled"
@@ -30,12 +35,10 @@ COMMAND = "report"
 
 
 @dataclass(frozen=True)
-class Reported:
+class ReportedInputs:
     """A certificate that was written.
 
-    Parameters
-    ----------
-    inputs : SHA-256 of every file that it was made from, by name.
+    ``inputs``: SHA-256 of every file that it was made from, by name.
     """
 
     inputs: Mapping[str, str]
@@ -44,7 +47,7 @@ class Reported:
 class State(Protocol):
     """What is remembered from run to run."""
 
-    def reported(self, job: str) -> Reported | None:
+    def reported(self, job: str) -> ReportedInputs | None:
         """The newest certificate of a job; ``None`` where it has none."""
         ...
 
@@ -57,28 +60,17 @@ class State(Protocol):
         ...
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
-        """Remember that a message was sent.
-
-        Raises
-        ------
-        OutputError : it cannot be remembered now.
-        """
+        """Remember that a message was sent."""
         ...
 
 
 @dataclass(frozen=True)
-class InFolder:
-    """State kept with the reports alone.
-
-    Parameters
-    ----------
-    out : folder with a folder for each job.
-    """
+class FolderState:
+    """State kept with the reports alone."""
 
     out: Path
 
-    def reported(self, job: str) -> Reported | None:
-        """See :meth:`State.reported`; a certificate that a person has written into since stands all the same."""
+    def reported(self, job: str) -> ReportedInputs | None:
         folder = self.out / job
         manifest = read_manifest(folder)
         if manifest is None or (manifest.owner.command, manifest.owner.job) != (COMMAND, job):
@@ -88,18 +80,15 @@ class InFolder:
         if not all(os.path.lexists(folder / name) for name in manifest.files):
             return None
         inputs = inputs_in(folder)
-        return None if inputs is None else Reported(inputs)
+        return None if inputs is None else ReportedInputs(inputs)
 
     def released(self, job: str) -> bool:
-        """See :meth:`State.released`; without records nobody releases anything."""
         return False
 
     def sent(self, key: str) -> bool:
-        """See :meth:`State.sent`."""
         return self._marker(key).exists()
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
-        """See :meth:`State.add_sent`."""
         marker = self._marker(key)
         try:
             marker.parent.mkdir(parents=True, exist_ok=True)
@@ -112,22 +101,15 @@ class InFolder:
         return self.out / PRIVATE / "sent" / f"{key}.json"
 
 
-class InRecords:
-    """State kept in the records; the folder of the reports says what they need not be asked for.
-
-    Parameters
-    ----------
-    records : opened.
-    out : folder with a folder for each job.
-    """
+class RecordsState:
+    """State kept in the records; the folder of the reports says what they need not be asked for."""
 
     def __init__(self, records: Records, out: Path) -> None:
-        self.records, self.folder = records, InFolder(out)
+        self.records, self.folder = records, FolderState(out)
         self._sent: set[str] = set()
         self._read = 0
 
-    def reported(self, job: str) -> Reported | None:
-        """See :meth:`State.reported`; a report that was taken away from its folder is one all the same."""
+    def reported(self, job: str) -> ReportedInputs | None:
         here = self.folder.reported(job)
         if here is not None and self._recorded(job):
             return here
@@ -135,29 +117,26 @@ class InRecords:
         if newest is None:
             return None
         inputs = next(self.records.entries(newest.entry)).data.get("inputs") or {}
-        return Reported({str(name): str(digest) for name, digest in inputs.items()}) if inputs else None
+        return ReportedInputs({str(name): str(digest) for name, digest in inputs.items()}) if inputs else None
 
     def released(self, job: str) -> bool:
-        """See :meth:`State.released`."""
         newest = self._newest(job)
         return newest is not None and newest.state == "released"
 
     def sent(self, key: str) -> bool:
-        """See :meth:`State.sent`; what another run has recorded meanwhile counts."""
         for entry in self.records.entries(self._read + 1, kind="sent"):
             self._sent.add(str(entry.data.get("key")))
             self._read = entry.number
         return key in self._sent
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
-        """See :meth:`State.add_sent`."""
         self.records.append("sent", {**content, "key": key})
 
     def _recorded(self, job: str) -> bool:
         digest = sha256_of(self.folder.out / job / RESULTS)
         return digest is not None and self.records.has_results(digest) is not None
 
-    def _newest(self, job: str) -> Certificate | None:
+    def _newest(self, job: str) -> RecordedCertificate | None:
         found = self.records.certificates(job=job, origin=None, values=False)
         return max(found, key=lambda one: one.entry, default=None)
 
@@ -169,3 +148,38 @@ def inputs_in(folder: Path) -> dict[str, str] | None:
         return {str(name): str(digest) for name, digest in data["job"]["inputs_sha256"].items()}
     except (CmmUqError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None
+
+
+class Problems:
+    """Problems of jobs and folders, a small file each."""
+
+    def __init__(self, out: Path) -> None:
+        self.folder = out / PRIVATE / "problems"
+        try:
+            self._known = {path.name for path in self.folder.iterdir()}
+        except OSError:
+            self._known = set()
+
+    def since(self, about: str, problem: str, now: str) -> str:
+        """The moment at which a problem was first met; now, where it is new."""
+        path = self.folder / f"{_short(about)}-{_short(problem)}"
+        with contextlib.suppress(OSError, OutputError):  # a full disk: it will be new again
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_new(path, now.encode())
+            self._known.add(path.name)
+        try:
+            return path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            return now
+
+    def mended(self, about: str) -> None:
+        """Forget what was wrong with a job or a folder."""
+        short = _short(about)
+        for name in [name for name in self._known if name.startswith(f"{short}-")] if self._known else ():
+            self._known.discard(name)
+            with contextlib.suppress(OSError):
+                (self.folder / name).unlink()
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()[:16]

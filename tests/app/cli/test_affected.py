@@ -180,7 +180,9 @@ def test_a_version_that_a_certificate_says_of_itself_is_never_an_error() -> None
 
 
 def _certificate() -> Any:
-    from cmm_uq.laboratory.records import Certificate
+    from cmm_uq.laboratory.records.facts import RecordedCertificate
 
-    return Certificate(1, "", "", "", "ballbar", "measured", dt.date(2026, 1, 1), dt.datetime(2026, 1, 1, tzinfo=dt.UTC), None,
-                       "draft", "", "", False, "", "0.3.0", "", "", "report")  # fmt: skip
+    day, at = dt.date(2026, 1, 1), dt.datetime(2026, 1, 1, tzinfo=dt.UTC)
+    return RecordedCertificate(
+        1, "", "", "", "ballbar", "measured", day, at, None, "draft", "", "", False, "", "0.3.0", "", "", "report"
+    )

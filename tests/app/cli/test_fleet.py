@@ -11,13 +11,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.due import what_is_due
-from cmm_uq.app.commands.fleet import fleet
+from cmm_uq.app.commands.laboratory.due import what_is_due
+from cmm_uq.app.commands.laboratory.fleet import fleet
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.due.crossing import crossing
-from cmm_uq.laboratory.due.drift import history
-from cmm_uq.laboratory.due.drift_prior import Prior
-from cmm_uq.laboratory.due.fleet_prior import FleetPrior
+from cmm_uq.laboratory.due.drift import DriftPrior, history
+from cmm_uq.laboratory.due.fleet_model import FleetPrior
 from cmm_uq.laboratory.records import open_records
 from tests.app.cli.process import run
 from tests.app.cli.test_due import recorded
@@ -87,7 +86,7 @@ def test_due_and_history_take_the_fleets_prior_where_its_file_is_named(
         series = records.series("new")[NAME]
     prior = FleetPrior.from_data(value["prior"]).prior(of["model"], of["place"])
     days = {}
-    asked: tuple[tuple[Prior | None, tuple[str | Path, ...], str], ...] = (
+    asked: tuple[tuple[DriftPrior | None, tuple[str | Path, ...], str], ...] = (
         (prior, ("--fleet", file), "with its fleet"), (None, (), "without a fleet"),
     )  # fmt: skip
     for given, further, words in asked:

@@ -14,11 +14,12 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands import batch_asked as module
-from cmm_uq.app.commands import batch_jobs, batch_run
-from cmm_uq.app.commands.batch import Asked, Batch, write_batch
-from cmm_uq.app.commands.batch_job import reported
-from cmm_uq.app.commands.batch_jobs import conforming
+from cmm_uq.app.commands.laboratory import batch as batch_run
+from cmm_uq.app.commands.laboratory import batch as module
+from cmm_uq.app.commands.laboratory import batch_jobs
+from cmm_uq.app.commands.laboratory.batch import Batch, BatchOptions, write_batch
+from cmm_uq.app.commands.laboratory.batch_job import reported
+from cmm_uq.app.commands.laboratory.batch_jobs import conforming
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError, OutputError
@@ -41,14 +42,14 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def done(jobs: Path, out: Path, **asked: Any) -> Batch:
-    return write_batch([jobs], out, Asked(**{"workers": 1, **asked}))
+    return write_batch([jobs], out, BatchOptions(**{"workers": 1, **asked}))
 
 
 def test_a_batch_writes_what_report_writes_whatever_the_number_of_workers(tmp_path: Path) -> None:
     jobs = tmp_path / "jobs"
     folders = [small_job(jobs, f"plane-{i}", shift_um=0.2 * i) for i in range(3)]
     one = done(jobs, tmp_path / "one")
-    three = write_batch(folders[::-1], tmp_path / "three", Asked(workers=3, results_only=True))
+    three = write_batch(folders[::-1], tmp_path / "three", BatchOptions(workers=3, results_only=True))
     assert (one.written, one.failed, three.written) == (3, [], 3)
     write_report(folders[1], tmp_path / "alone")
     whole = contents(tmp_path / "one")
@@ -61,9 +62,7 @@ def test_a_batch_writes_what_report_writes_whatever_the_number_of_workers(tmp_pa
 
 def test_figures_alone_are_the_same_and_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = small_job(tmp_path, "plane")
-    monkeypatch.setattr(
-        "cmm_uq.certificate.plots.style.new_figure", lambda height_mm: pytest.fail("a picture is drawn")
-    )
+    monkeypatch.setattr("cmm_uq.certificate.plot_style.new_figure", lambda height_mm: pytest.fail("a picture is drawn"))
     found = reported((str(job), dict(read_job(job).inputs)), (0, True))
     assert list(found) == ["results.json"]
 
@@ -132,7 +131,7 @@ def test_every_report_is_recorded_with_its_files_once(tmp_path: Path, monkeypatc
     jobs, out = tmp_path / "jobs", tmp_path / "out"
     for name in "abc":
         small_job(jobs, name, "refuse" if name == "b" else "")
-    asked = Asked(workers=2, resume=True)
+    asked = BatchOptions(workers=2, resume=True)
     found = write_batch([jobs], out, asked, records=None)
     assert found.records == str(out / "records.db")
     assert write_batch([jobs], out, asked, records=None).already == 2
@@ -183,19 +182,19 @@ def test_no_job_and_no_sense_are_refused(tmp_path: Path) -> None:
     with pytest.raises(CmmUqError, match="no job was found"):
         done(tmp_path, tmp_path / "out")
     with pytest.raises(CmmUqError, match="--workers or --scheduler"):
-        Asked(workers=2, scheduler="tcp://127.0.0.1:1")
+        BatchOptions(workers=2, scheduler="tcp://127.0.0.1:1")
     with pytest.raises(CmmUqError, match="time limit of 0 s"):
-        Asked(seconds=0)
+        BatchOptions(seconds=0)
     with pytest.raises(CmmUqError, match="0 tries"):
-        Asked(tries=0)
+        BatchOptions(tries=0)
     with pytest.raises(CmmUqError, match="a seed of -1"):
-        Asked(seed=-1)
+        BatchOptions(seed=-1)
 
 
 @pytest.mark.usefixtures("canned")
 def test_one_folder_given_twice_is_one_job(tmp_path: Path) -> None:
     job = small_job(tmp_path / "jobs", "a")
-    found = write_batch([job, job.parent, job / "job.toml"], tmp_path / "out", Asked(workers=1))
+    found = write_batch([job, job.parent, job / "job.toml"], tmp_path / "out", BatchOptions(workers=1))
     assert (found.count, found.written) == (1, 1)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq import __version__
-from cmm_uq.app.commands.batch_table import COLUMNS, rows, write_table
+from cmm_uq.app.commands.laboratory.batch_jobs import COLUMNS, rows, write_table
 from tests.artefacts.simulated import outcome
 from tests.conftest import ROOT
 from tests.laboratory.schedule import canned

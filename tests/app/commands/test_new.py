@@ -25,8 +25,8 @@ from cmm_uq.app.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.artefacts import BUILT_IN, kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import origin_warnings
-from cmm_uq.certificate.results.keys import RESULTS, described
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.results_keys import RESULTS, described
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.recording import REQUIRED

@@ -20,10 +20,10 @@ from cmm_uq.app.commands.part_machine import machine_found
 from cmm_uq.app.commands.part_plan import plan_of, refuse_unfit
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
+from cmm_uq.certificate.as_json import as_json
 from cmm_uq.certificate.part.found import PartFound
 from cmm_uq.certificate.part.results import part_results
 from cmm_uq.certificate.part.results_keys import PART_RESULTS
-from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.jobs.part.beginning import TABLES
 from tests.conftest import ROOT
 from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys

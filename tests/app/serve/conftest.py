@@ -9,8 +9,9 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from cmm_uq.app.serve import Server, Site
-from cmm_uq.app.serve.exchange import Answer, Asked, read_address
+from cmm_uq.app.serve.exchange import Request, Response, read_address
+from cmm_uq.app.serve.server import RecordsServer
+from cmm_uq.app.serve.site import Site
 from tests.app.serve.laboratory import TODAY, opened_in
 
 
@@ -20,8 +21,8 @@ class Looked:
     def __init__(self, place: Path) -> None:
         self.place, self.site = place, Site(place, today=lambda: TODAY)
 
-    def get(self, target: str) -> Answer:
-        return self.site.answer(Asked("GET", *read_address(target)))
+    def get(self, target: str) -> Response:
+        return self.site.answer(Request("GET", *read_address(target)))
 
     def text(self, target: str) -> str:
         return self.get(target).body.decode()
@@ -39,8 +40,8 @@ def looked(laboratory: Path) -> Looked:
 
 
 @pytest.fixture(scope="package")
-def server(looked: Looked) -> Iterator[Server]:
-    with Server(looked.site.answer, port=0) as server:
+def server(looked: Looked) -> Iterator[RecordsServer]:
+    with RecordsServer(looked.site.answer, port=0) as server:
         thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
         thread.start()
         yield server
@@ -49,7 +50,7 @@ def server(looked: Looked) -> Iterator[Server]:
 
 
 @pytest.fixture(scope="package")
-def host(server: Server) -> tuple[str, int]:
+def host(server: RecordsServer) -> tuple[str, int]:
     parts = urlsplit(server.url)
     assert parts.hostname is not None
     assert parts.port is not None

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.app.serve.drawing import BOTTOM, HEIGHT, RIGHT, TOP, WIDTH, Trend, drawn, new_years, ticks
+from cmm_uq.app.serve.trends import BOTTOM, HEIGHT, RIGHT, TOP, WIDTH, Trend, drawn, new_years, ticks
 from cmm_uq.base.messages import say
 
 DAY = dt.date(2020, 1, 1).toordinal()

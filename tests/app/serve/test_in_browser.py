@@ -12,7 +12,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
-from cmm_uq.app.serve import Server
+from cmm_uq.app.serve.server import RecordsServer
 from tests.app.serve.laboratory import entry_of, files
 from tests.certificate.test_html_layout import CONTRASTS, LABELS_COLLIDING
 
@@ -46,7 +46,7 @@ def addresses(laboratory: Path) -> list[str]:
 
 
 @pytest.fixture
-def tab(browser: Browser, server: Server) -> Iterator[Tab]:
+def tab(browser: Browser, server: RecordsServer) -> Iterator[Tab]:
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     yield Tab(context.new_page(), server.url)
     context.close()

@@ -8,19 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.serve.file_page import verdict
-from cmm_uq.app.serve.looking_up import Known, look_up, number_in
-from cmm_uq.app.serve.uploaded import Dropped
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.app.serve.checks_page import FileMatch, look_up, number_in, verdict
+from cmm_uq.app.serve.exchange import UploadedFile
+from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.pdf import render_pdf
 from cmm_uq.laboratory.records import open_records
 from tests.app.serve.laboratory import files
 from tests.certificate.samples import document_of
 
 
-def known(place: Path, content: bytes) -> Known:
+def known(place: Path, content: bytes) -> FileMatch:
     with open_records(place, read_only=True) as records:
-        return look_up(records, Dropped("file", len(content), sha256(content).hexdigest(), content))
+        return look_up(records, UploadedFile("file", len(content), sha256(content).hexdigest(), content))
 
 
 @pytest.mark.parametrize("name", ["results.json", "certificate.html", "certificate.pdf"])

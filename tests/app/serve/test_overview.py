@@ -6,10 +6,9 @@ import datetime as dt
 
 import pytest
 
-from cmm_uq.app.serve.due import Due
-from cmm_uq.app.serve.overview import Stands, groups, in_order
+from cmm_uq.app.serve.overview import DueDate, MachineStanding, groups, in_order
 from cmm_uq.base.messages import say
-from cmm_uq.laboratory.records.listing import Called, Listed, Newest
+from cmm_uq.laboratory.records.listing import Called, ListedCertificate, Newest
 
 TODAY = dt.date(2026, 11, 22)
 
@@ -17,13 +16,15 @@ TODAY = dt.date(2026, 11, 22)
 def newest(
     serial: str = "1", *, decision: str = "pass", diagnosis: str = "consistent", state: str = "released"
 ) -> Newest:
-    listed = Listed(1, "j", "n", serial, "", "a", "ballbar", "measured", dt.date(2026, 1, 31), state, decision, diagnosis,
-                    False, "report")  # fmt: skip
+    day = dt.date(2026, 1, 31)
+    listed = ListedCertificate(
+        1, "j", "n", serial, "", "a", "ballbar", "measured", day, state, decision, diagnosis, False, "report"
+    )
     return Newest(Called(serial, "", "", "", "", False), listed)
 
 
-def due(days: int) -> Due:
-    return Due(TODAY + dt.timedelta(days=days), say("so many days"))
+def due(days: int) -> DueDate:
+    return DueDate(TODAY + dt.timedelta(days=days), say("so many days"))
 
 
 @pytest.mark.parametrize(("days", "group"), [(-1, "overdue"), (0, "due"), (60, "due"), (61, "order")])
@@ -57,7 +58,7 @@ def test_what_is_longest_overdue_comes_first_then_what_fails() -> None:
     }
     machines = [newest(name, **said) for name, (said, _) in known.items()]
     stands = [
-        Stands(one, due(days), groups(one, due(days), TODAY))
+        MachineStanding(one, due(days), groups(one, due(days), TODAY))
         for one, (_, days) in zip(machines, known.values(), strict=True)
     ]
     assert [one.serial for one in in_order(stands)] == ["later", "late", "fails", "soon", "in order"]

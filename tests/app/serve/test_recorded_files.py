@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.serve.exchange import Refused
+from cmm_uq.app.serve.exchange import RefusedRequest
 from cmm_uq.app.serve.recorded_files import RecordedFile, content_of, files_of, results_of, sent
 from cmm_uq.laboratory.records.entries import Entry
 
@@ -34,7 +34,7 @@ def test_a_file_is_read_while_it_is_the_recorded_one(folder: Path) -> None:
     assert content_of(file, folder) == CONTENT
     assert results_of((file,), folder) == {"a": 1}
     (folder / "results.json").write_bytes(b'{"a": 2}')
-    with pytest.raises(Refused, match="altered since"):
+    with pytest.raises(RefusedRequest, match="altered since"):
         content_of(file, folder)
     assert results_of((file,), folder) == {}
 
@@ -51,7 +51,7 @@ def test_a_file_that_was_signed_since_is_handed_out_as_it_was_signed(folder: Pat
 @pytest.mark.parametrize("name", ["../secret", "/etc/passwd", "..", "", "a/../../secret", "C:secret", "a\\b", "x\0"])
 def test_no_name_leads_out_of_the_folder(folder: Path, name: str) -> None:
     assert files_of(entry(files={name: HASH}), folder) == ()
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(RefusedRequest) as refused:
         content_of(RecordedFile(name, HASH), folder)
     assert refused.value.status == 404
 
@@ -59,15 +59,15 @@ def test_no_name_leads_out_of_the_folder(folder: Path, name: str) -> None:
 def test_a_link_is_not_followed_though_its_bytes_are_right(folder: Path, tmp_path: Path) -> None:
     (folder / "results.json").unlink()
     (folder / "results.json").symlink_to(tmp_path / "secret")
-    with pytest.raises(Refused, match="a link to another place"):
+    with pytest.raises(RefusedRequest, match="a link to another place"):
         content_of(RecordedFile("results.json", HASH), folder)
     (folder / "inside").symlink_to(tmp_path)
-    with pytest.raises(Refused, match="a link to another place"):
+    with pytest.raises(RefusedRequest, match="a link to another place"):
         content_of(RecordedFile("inside/secret", HASH), folder)
 
 
 def test_what_is_gone_is_said_to_be_gone(folder: Path) -> None:
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(RefusedRequest) as refused:
         content_of(RecordedFile("certificate.pdf", HASH), folder)
     assert refused.value.status == 410
 

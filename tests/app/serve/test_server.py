@@ -13,8 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.serve import Server, server
-from cmm_uq.app.serve.exchange import Answer
+from cmm_uq.app.serve import server
+from cmm_uq.app.serve.exchange import Response
+from cmm_uq.app.serve.server import RecordsServer
 from cmm_uq.base.errors import CmmUqError, OutputError
 from tests.app.serve.laboratory import files
 from tests.app.serve.test_uploaded import BOUNDARY, form
@@ -150,14 +151,14 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> Iterator[Host]:
     for name, value in {"HEAD_S": 0.4, "BODY_S": 0.4, "ANSWER_S": 0.4, "AT_ONCE": 2}.items():
         monkeypatch.setattr(server, name, value)
 
-    def answer(asked: object) -> Answer:
+    def answer(asked: object) -> Response:
         body = getattr(asked, "body", None)
         try:
-            return Answer(body.read(5) if body is not None else b"x" * 50_000_000)
+            return Response(body.read(5) if body is not None else b"x" * 50_000_000)
         except TimeoutError:
-            return Answer(b"too slow")
+            return Response(b"too slow")
 
-    with Server(answer, port=0) as made:
+    with RecordsServer(answer, port=0) as made:
         thread = threading.Thread(target=made.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
         thread.start()
         yield "127.0.0.1", made.server_port
@@ -211,17 +212,17 @@ def test_more_than_it_has_room_for_are_turned_away(hasty: Host) -> None:
 
 def test_a_port_that_is_taken_is_said_so(host: Host) -> None:
     with pytest.raises(OutputError, match=rf"--port {host[1]}: cannot be listened on.*Name another port"):
-        Server(lambda asked: Answer(b""), port=host[1])
+        RecordsServer(lambda asked: Response(b""), port=host[1])
 
 
 def test_an_address_must_be_one() -> None:
     with pytest.raises(CmmUqError, match="--bind lab-pc: is no address of a network card"):
-        Server(lambda asked: Answer(b""), bind="lab-pc", port=0)
+        RecordsServer(lambda asked: Response(b""), bind="lab-pc", port=0)
 
 
 def test_beyond_this_machine_it_answers_to_numbers_and_to_names_that_it_was_told() -> None:
     """A number cannot be rebound; any other name could be."""
-    with Server(lambda asked: Answer(b""), bind="0.0.0.0", port=0, names=["Lab.example"]) as made:
+    with RecordsServer(lambda asked: Response(b""), bind="0.0.0.0", port=0, names=["Lab.example"]) as made:
         port = made.server_port
         assert not made.alone
         assert made.answers_to(f"192.0.2.7:{port}")

@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.due import due_in
-from cmm_uq.app.serve import Due, Site
-from cmm_uq.app.serve.checking import Checking
-from cmm_uq.app.serve.exchange import Asked, read_address
-from cmm_uq.app.serve.page import Page
-from cmm_uq.app.serve.site import PAGES
+from cmm_uq.app.commands.laboratory.due import due_in
+from cmm_uq.app.serve.exchange import Request, read_address
+from cmm_uq.app.serve.overview import DueDate
+from cmm_uq.app.serve.page import WebPage
+from cmm_uq.app.serve.site import PAGES, Site
+from cmm_uq.app.serve.view import ChainComparing
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.laboratory.records import open_records
@@ -181,16 +181,19 @@ def test_a_page_of_a_long_list_leads_to_its_neighbours(tmp_path: Path) -> None:
 def test_due_dates_are_asked_of_who_serves(laboratory: Path) -> None:
     asked: list[dt.date] = []
 
-    def due(records: object, today: dt.date) -> dict[str, Due]:
+    def due(records: object, today: dt.date) -> dict[str, DueDate]:
         asked.append(today)
-        return {"K1": Due(dt.date(2026, 12, 24), say("it drifts")), "K3": Due(None, say("nothing is known of it"))}
+        return {
+            "K1": DueDate(dt.date(2026, 12, 24), say("it drifts")),
+            "K3": DueDate(None, say("nothing is known of it")),
+        }
 
     site = Site(laboratory, due=due, today=lambda: TODAY)
-    machine = site.answer(Asked("GET", *read_address("/machine?serial=K1"))).body.decode()
+    machine = site.answer(Request("GET", *read_address("/machine?serial=K1"))).body.decode()
     assert "Due soon, on 2026-12-24" in machine
     assert "it drifts" in machine
-    assert "nothing is known of it" in site.answer(Asked("GET", *read_address("/machine?serial=K3"))).body.decode()
-    site.answer(Asked("GET", "/"))
+    assert "nothing is known of it" in site.answer(Request("GET", *read_address("/machine?serial=K3"))).body.decode()
+    site.answer(Request("GET", "/"))
     assert len(asked) == 1, "worked out again although the records are the same"
 
 
@@ -204,12 +207,12 @@ def test_a_machine_is_due_by_its_own_rule_as_the_command_says(tmp_path: Path) ->
     found = {one.serial: one.due for one in site.machines()}
     with open_records(tmp_path / "records.db", read_only=True) as records:
         assert found == {
-            one.serial: Due(one.due, one.why) for one in due_in(records, (), TODAY) if one.item == "machine"
+            one.serial: DueDate(one.due, one.why) for one in due_in(records, (), TODAY) if one.item == "machine"
         }
     assert {serial: one and one.day for serial, one in found.items()} == {
         "H": dt.date(2026, 9, 2), "Y": dt.date(2027, 3, 2),
     }  # fmt: skip
-    machine = site.answer(Asked("GET", *read_address("/machine?serial=H"))).body.decode()
+    machine = site.answer(Request("GET", *read_address("/machine?serial=H"))).body.decode()
     assert "Overdue since 2026-09-02" in machine
     assert "fixed interval of 6 months" in machine
 
@@ -288,7 +291,7 @@ def test_without_records_nothing_is_served(tmp_path: Path) -> None:
 
 
 def test_a_fault_is_told_on_its_page_and_the_others_go_on(looked: Looked, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(view: object, asked: object) -> Page:
+    def fail(view: object, asked: object) -> WebPage:
         raise ZeroDivisionError("<b>")
 
     monkeypatch.setitem(PAGES, "/file", fail)  # type: ignore[arg-type]
@@ -302,7 +305,7 @@ def test_the_comparison_finds_what_the_records_find(tmp_path: Path) -> None:
     place = opened_in(tmp_path)
     looked = Looked(place)
     assert "Not compared since" in looked.text("/integrity")
-    looked.site.answer(Asked("POST", "/integrity/chain"))
+    looked.site.answer(Request("POST", "/integrity/chain"))
     looked.site.checking.wait(20)
     assert "The records agree with their chain" in looked.text("/integrity")
     with open_records(place, read_only=True) as records:
@@ -315,7 +318,7 @@ def test_the_comparison_finds_what_the_records_find(tmp_path: Path) -> None:
     connection.close()
     with open_records(place, read_only=True) as records:
         findings = records.verify(files=False)
-    looked.site.answer(Asked("POST", "/integrity/chain"))
+    looked.site.answer(Request("POST", "/integrity/chain"))
     looked.site.checking.wait(20)
     page = Shown(looked.text("/integrity")).texts
     assert findings
@@ -329,7 +332,7 @@ def test_only_one_comparison_goes_on_at_a_time(monkeypatch: pytest.MonkeyPatch) 
         begun.append(1)
         raise CmmUqError("locked") if len(begun) > 1 else ValueError("a fault")
 
-    checking = Checking(opened)
+    checking = ChainComparing(opened)
     checking.begin(files=False)
     checking.wait(5)
     assert checking.last is not None
@@ -363,7 +366,7 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
     """As in documents: what stands in none of both could not be said in another language."""
     from cmm_uq.app.serve import site
 
-    seen: list[Page] = []
+    seen: list[WebPage] = []
     render = site.render_page
     monkeypatch.setattr(site, "render_page", lambda page, foot: [seen.append(page), render(page, foot)][1])
     for address in every_address(looked):
@@ -379,7 +382,7 @@ def test_every_text_of_every_page_is_a_message_or_of_the_records(
 
 
 def test_the_template_has_no_word_of_its_own() -> None:
-    from cmm_uq.certificate.render.html import template_folder
+    from cmm_uq.certificate.templates import template_folder
 
     template = (template_folder() / "serve" / "page.html").read_text(encoding="utf-8")
     bare = re.sub(r"\{#.*?#\}|\{%.*?%\}|\{\{.*?\}\}", "", template, flags=re.DOTALL)

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.app.serve import uploaded
-from cmm_uq.app.serve.exchange import Asked, Refused
-from cmm_uq.app.serve.uploaded import read_dropped
+from cmm_uq.app.serve import exchange as uploaded
+from cmm_uq.app.serve.exchange import RefusedRequest, Request, read_dropped
 
 BOUNDARY = "----WebKitFormBoundary7MA4YWxk"
 
@@ -24,9 +23,9 @@ def form(content: bytes, name: str = "certificate.pdf", boundary: str = BOUNDARY
     )
 
 
-def asked(body: bytes, length: int | None = None, boundary: str = BOUNDARY) -> Asked:
+def asked(body: bytes, length: int | None = None, boundary: str = BOUNDARY) -> Request:
     headers = {"content-type": f"multipart/form-data; boundary={boundary}"}
-    return Asked("POST", "/file", {}, headers, io.BytesIO(body), len(body) if length is None else length)
+    return Request("POST", "/file", {}, headers, io.BytesIO(body), len(body) if length is None else length)
 
 
 @given(content=st.binary(max_size=3000) | st.text("\r\n-WebKit", max_size=300).map(str.encode),
@@ -46,8 +45,8 @@ def test_a_file_too_large_to_be_held_is_hashed_all_the_same(monkeypatch: pytest.
 
 def test_a_file_larger_than_any_certificate_is_refused_before_it_is_read() -> None:
     body = io.BytesIO(form(b"x"))
-    huge = Asked("POST", "/file", {}, {"content-type": f"multipart/form-data; boundary={BOUNDARY}"}, body, 2**40)
-    with pytest.raises(Refused) as refused:
+    huge = Request("POST", "/file", {}, {"content-type": f"multipart/form-data; boundary={BOUNDARY}"}, body, 2**40)
+    with pytest.raises(RefusedRequest) as refused:
         read_dropped(huge)
     assert refused.value.status == 413
     assert body.tell() == 0
@@ -58,7 +57,7 @@ def test_a_file_larger_than_any_certificate_is_refused_before_it_is_read() -> No
     form(b"x", name=""), b"--" + BOUNDARY.encode() + b"\r\nContent-Disposition: form-data; name=a\r\n\r\nx",
 ])  # fmt: skip
 def test_a_form_that_is_not_this_page_s_is_refused_in_words(body: bytes) -> None:
-    with pytest.raises(Refused) as refused:
+    with pytest.raises(RefusedRequest) as refused:
         read_dropped(asked(body))
     assert refused.value.status == 400
     assert refused.value.problem
@@ -72,6 +71,6 @@ def test_a_file_s_name_has_no_folder() -> None:
     "media", ["", "application/json", "multipart/form-data", "multipart/form-data; boundary=" + "x" * 80]
 )
 def test_only_the_form_s_own_media_type_is_read(media: str) -> None:
-    with pytest.raises(Refused) as refused:
-        read_dropped(Asked("POST", "/file", {}, {"content-type": media}, io.BytesIO(b"x"), 1))
+    with pytest.raises(RefusedRequest) as refused:
+        read_dropped(Request("POST", "/file", {}, {"content-type": media}, io.BytesIO(b"x"), 1))
     assert refused.value.status == 415

@@ -15,11 +15,12 @@ from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
 from cmm_uq.certificate.document import Document, Overview, Table
-from cmm_uq.certificate.pages.fleet import fleet_document
-from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data, fleet_summary
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
-from cmm_uq.laboratory.due.fleet_found import FleetFound
+from cmm_uq.certificate.fleet.data import fleet_csv, fleet_data
+from cmm_uq.certificate.fleet.page import fleet_document
+from cmm_uq.certificate.fleet.summary import fleet_summary
+from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.laboratory.due.fleet import FleetResult
 from tests.certificate.fleets import alone, many, two
 from tests.certificate.saying import strangers
 from tests.certificate.test_every_layout import HEADS_RUN_TOGETHER, HIDDEN_COLUMNS
@@ -37,13 +38,13 @@ def tables(document: Document) -> dict[str, Table]:
     }
 
 
-def overview(found: FleetFound) -> Overview:
+def overview(found: FleetResult) -> Overview:
     shown = fleet_document(found).overview
     assert shown is not None
     return shown
 
 
-def odd(found: FleetFound) -> FleetFound:
+def odd(found: FleetResult) -> FleetResult:
     """The same, its first machine not belonging."""
     of = found.values[0]
     return replace(found, values=(replace(of, belongs=np.arange(len(of.members)) > 0),))
@@ -83,7 +84,11 @@ def test_one_table_has_all_values_and_how_many_machines_matter() -> None:
     """Day 0 and the 365 days after it have one crossing each."""
     (row,) = tables(fleet_document(many()))[ALL_VALUES].rows
     assert row == ("Scale (a.ppm)", "3000", "0.5 ± 0.2 ppm/year", "40", "20", "365")
-    assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == ("not compared", "–", "–")
+    assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == (
+        "not compared",
+        "–",
+        "–",
+    )
 
 
 def test_ten_times_the_machines_make_neither_the_page_nor_the_terminal_longer() -> None:
@@ -98,7 +103,7 @@ def test_ten_times_the_machines_make_neither_the_page_nor_the_terminal_longer() 
 def test_a_fleet_without_limits_shows_those_that_drift_fastest() -> None:
     of = many(40).values[0]
     fast = replace(of.fleet.estimates, rate=-np.arange(40.0), crossing=None)
-    found = FleetFound((replace(of, fleet=replace(of.fleet, estimates=fast)),), 1)
+    found = FleetResult((replace(of, fleet=replace(of.fleet, estimates=fast)),), 1)
     assert [row[0] for row in tables(fleet_document(found))["Machines that drift fastest"].rows] == [
         str(i) for i in range(39, 24, -1)
     ]
@@ -173,7 +178,7 @@ def page(browser: Browser) -> Iterator[Page]:
 
 @pytest.mark.parametrize("fleet", [alone, many])
 def test_nothing_is_off_a_screen_of_any_width_and_everybody_can_read_it(
-    page: Page, fleet: Callable[[], FleetFound], tmp_path: Path
+    page: Page, fleet: Callable[[], FleetResult], tmp_path: Path
 ) -> None:
     path = tmp_path / "fleet.html"
     path.write_text(render_html(fleet_document(fleet())), encoding="utf-8")

@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.decision import Outcome
-from cmm_uq.analysis.conformity.limits import LimitDecision
+from cmm_uq.analysis.conformity.limits import Judged
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.displaced import Displaced
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Document, Overview, Section, Table
 from cmm_uq.certificate.effect_words import title_of
+from cmm_uq.certificate.html import render_html
 from cmm_uq.certificate.part.budget_section import by_family, unseen_section, ways_section
 from cmm_uq.certificate.part.found import Further, PartFound, Unseen
 from cmm_uq.certificate.part.machine_section import machine_section
@@ -29,8 +30,7 @@ from cmm_uq.certificate.part.overview import overview_of
 from cmm_uq.certificate.part.page import lacking_of, part_document
 from cmm_uq.certificate.part.pictured import errors_section
 from cmm_uq.certificate.part.results_section import results_section
-from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.pdf import render_pdf
 from cmm_uq.jobs.part.beginning import TABLES
 from tests.certificate.parts_found import ERRORS, found_of, measured_points
 from tests.certificate.parts_found import STANDING as CERTIFICATE
@@ -385,7 +385,7 @@ def test_pictures_show_what_was_found_of_the_points(measured: PartFound) -> None
 
 def test_what_no_cause_moves_has_no_uncertainty_and_a_page_all_the_same(measured: PartFound) -> None:
     still = replace(measured.stated[0], u=0.0, interval=(30.0, 30.0), k=float("nan"), value=30.0)
-    judged = LimitDecision(29.95, 30.05, "pass", 1.0, 0.0, (29.95, 30.05), say("rule"))
+    judged = Judged(29.95, 30.05, "pass", 1.0, 0.0, (29.95, 30.05), say("rule"))
     found = replace(measured, stated=(still, *measured.stated[1:]), judged=(judged, *measured.judged[1:]))
     (table,) = in_section(results_section(found))
     assert table.rows[0][2:5] == ("30", "0", "–")

@@ -19,8 +19,8 @@ from cmm_uq.certificate.part.errors_picture import MOST, errors_picture, form_pi
 from cmm_uq.certificate.part.margin_plot import A_PAGE, Margin, margin_plot, margin_plots
 from cmm_uq.certificate.part.picture import part_picture
 from cmm_uq.certificate.part.views import ABOVE, FRONT, OBLIQUE, SIDE, VIEWS, panels
-from cmm_uq.certificate.plots.plans import _seen
-from cmm_uq.certificate.plots.style import WIDTH_MM, house_style
+from cmm_uq.certificate.plan_picture import _seen
+from cmm_uq.certificate.plot_style import WIDTH_MM, house_style
 from tests.certificate.saying import leaves
 from tests.parts_drawn import UP, bore, plane
 

@@ -8,8 +8,7 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.due.drift import YEAR, History
-from cmm_uq.laboratory.due.drift_prior import WRONG, WRONG_TIMES, Prior
+from cmm_uq.laboratory.due.drift import WRONG, WRONG_TIMES, YEAR, DriftHistory, DriftPrior
 
 FIRST = 730_000.0
 
@@ -21,17 +20,17 @@ def machine(
     shared: float | list[float] = 0.0,
     artefacts: str = "",
     adjusted: list[float] | None = None,
-) -> History:
+) -> DriftHistory:
     """A history: times in years, a letter an artefact, times of the last adjustment in years."""
     n = len(years)
     since = np.full(n, np.nan) if adjusted is None else FIRST + YEAR * np.array(adjusted)
-    return History(
+    return DriftHistory(
         FIRST + YEAR * np.array(years), np.array(values, dtype=float), np.broadcast_to(u, n).astype(float),
         np.broadcast_to(shared, n).astype(float), tuple(artefacts or "A" * n), since,
     )  # fmt: skip
 
 
-def one_node(**of: float) -> Prior:
+def one_node(**of: float) -> DriftPrior:
     """A prior of one node."""
     usual = {
         "rate": 0.0,
@@ -42,11 +41,11 @@ def one_node(**of: float) -> Prior:
         "steps_per_year": 0.2,
         "step_sd": 2.5,
     }
-    return Prior(**{name: np.array([value]) for name, value in (usual | of).items()}, weight=np.ones(1),
+    return DriftPrior(**{name: np.array([value]) for name, value in (usual | of).items()}, weight=np.ones(1),
                  group=np.zeros(1, dtype=np.int64))  # fmt: skip
 
 
-def dense(of: History, prior: Prior) -> tuple[float, Floats, Floats]:
+def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
     """Log evidence, mean and covariance of (level at the last certificate, rate): every tale, one normal distribution each.
 
     All is a linear map of independent normal variables: first level, rate, levels as left, increments of the walk, steps,

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.laboratory.records import Certificate, Machine, Series, Value
+from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedMachine, RecordedValue, Series
 
 FIRST = dt.date(2024, 3, 1)
-MACHINE = Machine("1102", "Iota", "DEA", "Iota 1102", "Hall 1")
+MACHINE = RecordedMachine("1102", "Iota", "DEA", "Iota 1102", "Hall 1")
 
 
 def value(
     number: float, *, name: str = "scale_x.ppm", u: float = 0.5, u_artefact: float = 0.0, limit: float | None = 8.0
-) -> Value:
+) -> RecordedValue:
     """A value with its usual 95 % interval."""
-    return Value(name, f"quantity {name}", "ppm", number, u, number - 2 * u, number + 2 * u, u_artefact, limit)
+    return RecordedValue(name, f"quantity {name}", "ppm", number, u, number - 2 * u, number + 2 * u, u_artefact, limit)
 
 
-def certificate(day: dt.date, *values: Value, entry: int = 1, **further: Any) -> Certificate:
+def certificate(day: dt.date, *values: RecordedValue, entry: int = 1, **further: Any) -> RecordedCertificate:
     """A certificate of a day; one value of 1 ppm where none is given."""
     usual: dict[str, Any] = {
         "job": f"job-{day}", "machine": "1102", "artefact": "BB-7", "kind": "some kind", "origin": "measured",
@@ -29,7 +29,7 @@ def certificate(day: dt.date, *values: Value, entry: int = 1, **further: Any) ->
         "decision": "pass", "diagnosis": "consistent", "interim": False, "folder": "f", "version": "0.5.0",
         "results_sha256": "", "number": f"K-{day}", "command": "report",
     }  # fmt: skip
-    return Certificate(entry=entry, day=day, values=values or (value(1.0),), **(usual | further))
+    return RecordedCertificate(entry=entry, day=day, values=values or (value(1.0),), **(usual | further))
 
 
 def series(

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 
 from cmm_uq.laboratory.due.checks import check_standings, limit_for
-from cmm_uq.laboratory.records import Certificate
+from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.laboratory.due.made import FIRST, certificate, value
 
 CALIBRATION = certificate(FIRST, value(1.0, u=0.5, u_artefact=0.4))
@@ -16,7 +16,7 @@ U = 0.18**0.5
 """Of a difference from it: 0.25 + 0.25 − 2·0.4·0.4, with the same artefact."""
 
 
-def check(month: int, ratio: float, **further: object) -> Certificate:
+def check(month: int, ratio: float, **further: object) -> RecordedCertificate:
     """An interim check, so many standard uncertainties from the calibration."""
     day = FIRST + dt.timedelta(days=30 * month)
     return certificate(day, value(1.0 + ratio * U, u=0.5, u_artefact=0.4), interim=True, **further)

@@ -9,8 +9,8 @@ import pytest
 from scipy.special import ndtr
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.crossing import DAYS, HORIZON, Crossing, crossing, crossings
-from cmm_uq.laboratory.due.drift import YEAR, history, side_by_side
+from cmm_uq.laboratory.due.crossing import DAYS, Crossing, crossing, crossings
+from cmm_uq.laboratory.due.drift import HORIZON, YEAR, history, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
 from tests.laboratory.due.drifting import machine, one_node
 

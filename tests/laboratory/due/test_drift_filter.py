@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.due.drift import History, side_by_side
+from cmm_uq.laboratory.due.drift import DriftHistory, DriftPrior, default_prior, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
-from cmm_uq.laboratory.due.drift_prior import Prior, default_prior
 from tests.laboratory.due.drifting import dense, machine, one_node
 
 HISTORIES = {
@@ -28,7 +27,7 @@ HISTORIES = {
 }
 
 
-def found(of: History, prior: Prior) -> tuple[float, Floats, Floats]:
+def found(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
     state = filtered(side_by_side([of]), prior, kept=10**6)
     mean, covariance = state.collapsed()
     return float(state.log_evidence[0, 0]), mean[:2, 0, 0], covariance[:2, :2, 0, 0]
@@ -107,7 +106,7 @@ def test_sign_and_unit_of_the_values_are_a_matter_of_words(
 
 
 def test_nodes_of_a_group_are_weighed_by_the_data_and_groups_are_not() -> None:
-    prior = Prior(*(np.repeat(getattr(one_node(), name), 4) for name in
+    prior = DriftPrior(*(np.repeat(getattr(one_node(), name), 4) for name in
                     ("rate", "rate_sd", "walk", "first_sd", "as_left_sd", "steps_per_year", "step_sd")),
                   weight=np.array([0.1, 0.4, 0.2, 0.3]), group=np.array([0, 0, 1, 1]))  # fmt: skip
     prior.walk[:] = [0.01, 1.0, 0.01, 3.0]

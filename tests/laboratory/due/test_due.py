@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.laboratory.due.drift_interval import series_from
-from cmm_uq.laboratory.due.due import Due, Known, after_months, artefact_due, in_order, machine_due
+from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, after_months, artefact_due, in_order, machine_due
 from cmm_uq.laboratory.due.history import machine_history
+from cmm_uq.laboratory.due.methods import series_from
 from cmm_uq.laboratory.due.rule import Rule
-from cmm_uq.laboratory.records import ArtefactRow, Certificate, Machine
+from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
 from tests.laboratory.due.made import FIRST, MACHINE, certificate, value
 
 ON = dt.date(2025, 1, 1)
@@ -21,18 +21,18 @@ BALLBAR = ArtefactRow("BB-7", "ballbar", "PTB 1", "PTB", dt.date(2024, 1, 1), dt
 
 
 def due(
-    *certificates: Certificate,
+    *certificates: RecordedCertificate,
     rule: Mapping[str, Any] | None = None,
-    machine: Machine = MACHINE,
+    machine: RecordedMachine = MACHINE,
     artefacts: Sequence[ArtefactRow] = (BALLBAR,),
     late: dt.date | None = None,
     limited: bool = True,
-) -> Due:
-    known = Known(machine, Rule.of(rule), certificates, limited, late)
+) -> DueItem:
+    known = CalibrationRecord(machine, Rule.of(rule), certificates, limited, late)
     return machine_due(known, {one.serial: one for one in artefacts}, ON, list)
 
 
-def check(day: dt.date, number: float, **further: Any) -> Certificate:
+def check(day: dt.date, number: float, **further: Any) -> RecordedCertificate:
     return certificate(day, value(number), interim=True, **further)
 
 

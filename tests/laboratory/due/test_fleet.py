@@ -9,14 +9,14 @@ from scipy.stats import false_discovery_control
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.due.drift import side_by_side
 from cmm_uq.laboratory.due.drift_filter import usual_start
-from cmm_uq.laboratory.due.fleet import Fleet, Member, belonging, fit_fleet
+from cmm_uq.laboratory.due.fleet import Fleet, FleetMember, belonging, fit_fleet
 from tests.laboratory.due.drifting import machine
 
 YEARS = np.arange(5.0)
 ODD, NEW, MODELS = 7, 10, ("slow", "fast")
 
 
-def members() -> list[Member]:
+def members() -> list[FleetMember]:
     """Ten machines of two models that drift at 0.2 and 1.2 a year, one slow one at 3; an eleventh, fast, seen once."""
     random = np.random.default_rng(5)
     found = []
@@ -24,9 +24,9 @@ def members() -> list[Member]:
         rate = 3.0 if i == ODD else (0.2, 1.2)[i % 2 == 0] + 0.1 * random.standard_normal()
         values = random.standard_normal() + rate * YEARS + 0.3 * random.standard_normal(5)
         found.append(
-            Member(str(i), MODELS[i % 2 == 0], "hall", machine(list(YEARS), list(values), 0.3, 0.1, "AABBB"), 10.0)
+            FleetMember(str(i), MODELS[i % 2 == 0], "hall", machine(list(YEARS), list(values), 0.3, 0.1, "AABBB"), 10.0)
         )
-    return [*found, Member("new", "fast", "hall", machine([4], [0.5], 0.3, 0.1, "B"), 10.0)]
+    return [*found, FleetMember("new", "fast", "hall", machine([4], [0.5], 0.3, 0.1, "B"), 10.0)]
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_a_machine_s_own_certificates_do_not_count_among_what_the_others_say(lea
     """What is expected of a machine stays as it is whatever its certificates say, at the same hyper-parameters."""
     from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
 
-    def expected(all_members: list[Member]) -> float:
+    def expected(all_members: list[FleetMember]) -> float:
         arrays = side_by_side([each.history for each in all_members])
         shared = shared_by(arrays, [each.model for each in all_members], [each.place for each in all_members])
         said = messages(arrays, shared, learnt.theta, learnt.unit)
@@ -72,7 +72,7 @@ def test_a_machine_s_own_certificates_do_not_count_among_what_the_others_say(lea
 
     one = members()
     other = members()
-    other[3] = Member("3", one[3].model, "hall", machine([0, 4], [0.0, 9.0], 0.3, 0.1, "AB"), 10.0)
+    other[3] = FleetMember("3", one[3].model, "hall", machine([0, 4], [0.0, 9.0], 0.3, 0.1, "AB"), 10.0)
     assert expected(one) == pytest.approx(expected(other), rel=1e-9)
 
 

@@ -7,16 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.laboratory.due.fleet import Fleet, Member
-from cmm_uq.laboratory.due.fleet_found import comparable, judged
+from cmm_uq.laboratory.due.fleet import Fleet, FleetMember, comparable, judged
 from tests.certificate.fleets import alone, two
 from tests.laboratory.due.drifting import machine
 
 ONE_DAY, TWO_DAYS = ((0.0, 0.0), (0.0, 1.0))
 
 
-def seen(*days: tuple[float, float]) -> tuple[Member, ...]:
-    return tuple(Member(f"{i}", "", "", machine(list(each), [0.0, 0.0])) for i, each in enumerate(days))
+def seen(*days: tuple[float, float]) -> tuple[FleetMember, ...]:
+    return tuple(FleetMember(f"{i}", "", "", machine(list(each), [0.0, 0.0])) for i, each in enumerate(days))
 
 
 @pytest.mark.parametrize(

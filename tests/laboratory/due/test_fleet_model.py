@@ -7,9 +7,9 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.due import drift_filter, drift_prior, fleet_model
-from cmm_uq.laboratory.due.drift import YEAR, side_by_side
-from cmm_uq.laboratory.due.drift_prior import MEDIANS, NAMES, USUAL_RATE_SD, learnt_prior
+from cmm_uq.laboratory.due import drift as drift_prior
+from cmm_uq.laboratory.due import drift_filter, fleet_model
+from cmm_uq.laboratory.due.drift import MEDIANS, NAMES, USUAL_RATE_SD, YEAR, learnt_prior, side_by_side
 from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
 from tests.laboratory.due.drifting import machine
 
@@ -82,7 +82,7 @@ def test_what_the_others_say_of_a_machine_is_the_conditional_of_one_normal_distr
     said = messages(arrays, shared, THETA, UNIT)
     start = others(said, together(said, shared, THETA, UNIT), shared, THETA, UNIT)
     prior = learnt_prior(THETA, np.zeros(2), np.ones(2), UNIT)
-    some = drift_filter.Start(start.mean[..., prior.group], start.covariance[..., prior.group])
+    some = drift_filter.DriftStart(start.mean[..., prior.group], start.covariance[..., prior.group])
     mean, covariance = drift_filter.filtered(arrays, prior, some).collapsed()
     of = np.concatenate([[i] * len(each.day) for i, each in enumerate(MACHINES)])
     for w, theta in enumerate(THETA):

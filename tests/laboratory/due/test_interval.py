@@ -7,16 +7,16 @@ import datetime as dt
 import numpy as np
 import pytest
 
+from cmm_uq.laboratory.due.attributes import interval_test
 from cmm_uq.laboratory.due.interval import interval_by
-from cmm_uq.laboratory.due.interval_test import interval_test
-from cmm_uq.laboratory.due.observed import Ended, ended_intervals
+from cmm_uq.laboratory.due.observed import CompletedInterval, ended_intervals
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, Rule
-from cmm_uq.laboratory.due.variables import Start, fitted_drift, interval_of_reliability
-from cmm_uq.laboratory.records import Certificate
+from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability
+from cmm_uq.laboratory.records.facts import RecordedCertificate
 from tests.laboratory.due.made import FIRST, certificate, value
 
 
-def yearly(*numbers: float, adjusted: int | None = None) -> list[Certificate]:
+def yearly(*numbers: float, adjusted: int | None = None) -> list[RecordedCertificate]:
     """A certificate every 365 days; before the one of this number the machine was adjusted."""
     found = []
     for i, number in enumerate(numbers):
@@ -26,12 +26,15 @@ def yearly(*numbers: float, adjusted: int | None = None) -> list[Certificate]:
 
 
 def test_each_calibration_ends_an_interval_with_what_it_found() -> None:
-    assert ended_intervals(yearly(0.0, 4.0, -8.8)) == [Ended(365, 0.5), Ended(365, 1.1)]
+    assert ended_intervals(yearly(0.0, 4.0, -8.8)) == [CompletedInterval(365, 0.5), CompletedInterval(365, 1.1)]
     assert [one.in_tolerance for one in ended_intervals(yearly(0.0, 8.0, -8.8))] == [True, False]
 
 
 def test_after_an_adjustment_nobody_knows_what_would_have_been_found() -> None:
-    assert ended_intervals(yearly(0.0, 4.0, 0.0, 6.0, adjusted=2)) == [Ended(365, 0.5), Ended(365, 0.75)]
+    assert ended_intervals(yearly(0.0, 4.0, 0.0, 6.0, adjusted=2)) == [
+        CompletedInterval(365, 0.5),
+        CompletedInterval(365, 0.75),
+    ]
 
 
 def test_as_found_ends_an_interval_and_as_left_begins_the_next() -> None:
@@ -41,7 +44,7 @@ def test_as_found_ends_an_interval_and_as_left_begins_the_next() -> None:
         certificate(day, value(0.0), entry=3, adjusted_since=day),
         certificate(day + dt.timedelta(days=365), value(1.0), entry=4, adjusted_since=day),
     ]  # fmt: skip
-    assert ended_intervals(both) == [Ended(365, 1.125), Ended(365, 0.125)]
+    assert ended_intervals(both) == [CompletedInterval(365, 1.125), CompletedInterval(365, 0.125)]
 
 
 def test_without_limits_the_decision_counts_and_without_either_nothing() -> None:
@@ -53,13 +56,13 @@ def test_without_limits_the_decision_counts_and_without_either_nothing() -> None
 def test_interim_checks_end_no_interval() -> None:
     done = yearly(0.0, 4.0)
     between = certificate(FIRST + dt.timedelta(days=100), value(7.0), interim=True)
-    assert ended_intervals([done[0], between, done[1]]) == [Ended(365, 0.5)]
+    assert ended_intervals([done[0], between, done[1]]) == [CompletedInterval(365, 0.5)]
 
 
 def test_a3_takes_intervals_like_the_assigned_one() -> None:
     """Eight weeks about 365.2 days: 309.2 to 421.2."""
-    like = [Ended(310, 0.1)] * 6 + [Ended(421, 2.0)] * 2
-    unlike = [Ended(309, 2.0), Ended(422, 2.0), Ended(30, 2.0)]
+    like = [CompletedInterval(310, 0.1)] * 6 + [CompletedInterval(421, 2.0)] * 2
+    unlike = [CompletedInterval(309, 2.0), CompletedInterval(422, 2.0), CompletedInterval(30, 2.0)]
     found = interval_by(Rule.of({"method": "A3", "reliability": 0.95}), yearly(0.0, 1.0), lambda: like + unlike)
     wanted = interval_test(6, 8, 12 * DAYS_A_MONTH, 0.95, Rule("A3").changing)
     assert found.days == wanted.recommended
@@ -80,7 +83,7 @@ def test_the_control_chart_takes_the_first_value_to_leave_its_limit() -> None:
     ]
     days = np.diff([one.day.toordinal() for one in done]).astype(float)
     drift = fitted_drift(days, np.array([1.0, 1.4, 1.1]))
-    wanted = interval_of_reliability(drift, Start(3.5, 0.5), 0.9, -8, 8)
+    wanted = interval_of_reliability(drift, LastValue(3.5, 0.5), 0.9, -8, 8)
     found = interval_by(Rule.of({"method": "control chart", "reliability": 0.9}), done, list)
     assert found.days == pytest.approx(wanted)
     assert "quantity scale_x.ppm" in found.why
@@ -95,7 +98,7 @@ def test_the_control_chart_has_no_change_across_an_adjustment() -> None:
 def test_s2_asks_all_machines_of_the_model() -> None:
     days = [60] * 20 + [150] * 20 + [300] * 20 + [500] * 20
     failed = [1] * 1 + [0] * 19 + [1] * 2 + [0] * 18 + [1] * 5 + [0] * 15 + [1] * 8 + [0] * 12
-    pool = [Ended(day, 2.0 if bad else 0.5) for day, bad in zip(days, failed, strict=True)]
+    pool = [CompletedInterval(day, 2.0 if bad else 0.5) for day, bad in zip(days, failed, strict=True)]
     found = interval_by(Rule.of({"method": "S2", "reliability": 0.9}), yearly(0.0), lambda: pool)
     assert found.days is not None
     assert 100 < found.days < 200  # 90 % lies between 95 % at 60 and 150 days of the observed numbers, and 75 % at 300

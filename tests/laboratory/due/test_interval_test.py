@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.stats import beta, binomtest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.changing import Changing
-from cmm_uq.laboratory.due.interval_test import interval_test, reliability_range
+from cmm_uq.laboratory.due.attributes import interval_test, reliability_range
+from cmm_uq.laboratory.due.rule import IntervalBounds
 
 PRINTED = [
     ((15, 20, 365, 0.95), 0.5, (231, 0.9949, 0.6516, 0.8286)),
@@ -25,7 +25,7 @@ PRINTED = [
 def test_the_printed_figures(
     asked: tuple[int, int, float, float], confidence: float, printed: tuple[float, ...]
 ) -> None:
-    found = interval_test(*asked, Changing(confidence=confidence))
+    found = interval_test(*asked, IntervalBounds(confidence=confidence))
     assert (
         round(found.recommended),
         *(round(x, 4) for x in (found.rejection, found.low, found.high)),

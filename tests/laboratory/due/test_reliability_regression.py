@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.reliability_models import MODELS
-from cmm_uq.laboratory.due.reliability_regression import Grouped, grouped, reliability_regression
+from cmm_uq.laboratory.due.reliability import MODELS, ReliabilityData, grouped, reliability_regression
 
 WEEKS = np.array([4.0, 7, 10, 13, 21, 28, 40, 48])
 TESTED = np.array([4.0, 6, 14, 13, 22, 49, 18, 6])
@@ -33,7 +32,7 @@ POWERS = {
 
 
 def test_suncals_parameters_follow_from_the_counts_that_it_takes() -> None:
-    found = {one.name: one for one in reliability_regression(Grouped(WEEKS, TESTED, TRUNCATED), 0.75).models}
+    found = {one.name: one for one in reliability_regression(ReliabilityData(WEEKS, TESTED, TRUNCATED), 0.75).models}
     for name, theirs in SUNCAL.items():
         ours = found[name].parameters * 48.0 ** -np.array(POWERS[name], dtype=float)
         assert ours == pytest.approx(theirs, rel=2e-4, abs=1e-6), name
@@ -41,26 +40,26 @@ def test_suncals_parameters_follow_from_the_counts_that_it_takes() -> None:
 
 def test_rp1s_example_gives_the_printed_seven_weeks() -> None:
     """Suncal prints 7 (rounded to whole weeks), of the random walk, as here."""
-    found = reliability_regression(Grouped(WEEKS, TESTED, TRUNCATED), 0.75)
+    found = reliability_regression(ReliabilityData(WEEKS, TESTED, TRUNCATED), 0.75)
     assert (found.best.name, round(found.interval)) == ("random walk", 7)
 
 
 def test_the_counts_that_were_observed_give_eight() -> None:
-    found = reliability_regression(Grouped(WEEKS, TESTED, PASSED), 0.75)
+    found = reliability_regression(ReliabilityData(WEEKS, TESTED, PASSED), 0.75)
     assert (found.best.name, found.interval) == ("random walk", pytest.approx(7.92, abs=0.005))
     assert found.low < found.interval < found.high
 
 
 def test_the_random_walks_interval_by_hand() -> None:
     """With its first parameter at its bound 0: R = 2Φ(1/√(θt)) − 1, so t = 1/(θ·Φ⁻¹((1 + R)/2)²)."""
-    best = reliability_regression(Grouped(WEEKS, TESTED, PASSED), 0.75).best
+    best = reliability_regression(ReliabilityData(WEEKS, TESTED, PASSED), 0.75).best
     theta = best.parameters[1] / 48
     assert best.interval == pytest.approx(1 / (theta * norm.ppf(0.875) ** 2), rel=1e-6)
 
 
 def test_the_exponentials_maximum_by_its_equation() -> None:
     """Σ (x − (n − x)·R/(1 − R))·t = 0 where the likelihood of R = exp(−λt) is largest."""
-    found = {one.name: one for one in reliability_regression(Grouped(WEEKS, TESTED, PASSED), 0.75).models}[
+    found = {one.name: one for one in reliability_regression(ReliabilityData(WEEKS, TESTED, PASSED), 0.75).models}[
         "exponential"
     ]
     r = found.reliability(WEEKS)
@@ -72,7 +71,7 @@ def test_the_exponentials_maximum_by_its_equation() -> None:
 def test_suncal_fits_the_same_to_the_counts_as_they_are() -> None:
     suncal = pytest.importorskip("suncal.intervals")
     theirs = suncal.s2_binom_interval(suncal.S2Params(target=0.75, ti=WEEKS, ni=TESTED, ri=PASSED / TESTED + 1e-12))
-    ours = {one.name: one for one in reliability_regression(Grouped(WEEKS, TESTED, PASSED), 0.75).models}
+    ours = {one.name: one for one in reliability_regression(ReliabilityData(WEEKS, TESTED, PASSED), 0.75).models}
     for name, them in (("Weibull", "Weibull"), ("log-normal", "Log Normal"), ("mixed exponential", "Mixed Exponential"),
                        ("exponential", "Exponential"), ("modified gamma", "Modified Gamma")):  # fmt: skip
         assert ours[name].rejection == pytest.approx(theirs.models[them].C / 100, abs=2e-4), name
@@ -97,11 +96,11 @@ def test_groups_have_the_mean_of_their_intervals_and_all_calibrations() -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (Grouped(WEEKS, TESTED, TESTED), "ever out of tolerance"),
-        (Grouped(WEEKS[:3], TESTED[:3], PASSED[:3]), "four lengths"),
-        (Grouped(WEEKS, np.ones(8), np.array([1.0, 1, 1, 1, 0, 1, 0, 0])), "four lengths"),
+        (ReliabilityData(WEEKS, TESTED, TESTED), "ever out of tolerance"),
+        (ReliabilityData(WEEKS[:3], TESTED[:3], PASSED[:3]), "four lengths"),
+        (ReliabilityData(WEEKS, np.ones(8), np.array([1.0, 1, 1, 1, 0, 1, 0, 0])), "four lengths"),
     ],
 )
-def test_what_bears_no_regression_is_refused(data: Grouped, words: str) -> None:
+def test_what_bears_no_regression_is_refused(data: ReliabilityData, words: str) -> None:
     with pytest.raises(CmmUqError, match=words):
         reliability_regression(data, 0.9)

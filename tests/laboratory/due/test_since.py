@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.laboratory.due.drift import YEAR
-from cmm_uq.laboratory.due.since import change_since
+from cmm_uq.laboratory.due.drift_filter import change_since
 from tests.laboratory.due.drifting import machine, one_node
 
 STILL = {"rate_sd": 1e-9, "walk": 1e-9, "steps_per_year": 1e-9}

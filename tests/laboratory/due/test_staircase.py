@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cmm_uq.laboratory.due.changing import Changing
-from cmm_uq.laboratory.due.staircase import staircase, steps
+from cmm_uq.laboratory.due.attributes import staircase, steps
+from cmm_uq.laboratory.due.rule import IntervalBounds
 
-WIDE = Changing(factor=1e9, shortest_days=1e-9, longest_days=1e12)
+WIDE = IntervalBounds(factor=1e9, shortest_days=1e-9, longest_days=1e12)
 
 
 def test_up_kept_down_by_hand() -> None:

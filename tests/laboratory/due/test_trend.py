@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.laboratory.due.trend import YEAR, epochs, trend
+from cmm_uq.laboratory.due.history import YEAR, epochs, trend
 from tests.laboratory.due.made import series
 
 DAYS, VALUES = [0, 360, 740, 1100], [1.0, 1.9, 3.4, 3.8]

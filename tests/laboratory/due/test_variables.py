@@ -7,16 +7,11 @@ import pytest
 from scipy.stats import norm, t
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.due.variables import (
-    Drift,
-    Start,
-    fitted_drift,
-    interval_of_reliability,
-)
+from cmm_uq.laboratory.due.variables import DriftPolynomial, LastValue, fitted_drift, interval_of_reliability
 
 DAYS = np.array([70.0, 86, 104, 135, 167, 173])
 CHANGES = np.array([0.1, 0.11, 0.251, 0.299, 0.403, 0.615])
-START = Start(10.03, 0.28)
+START = LastValue(10.03, 0.28)
 
 
 def test_the_fit_is_that_of_table_7_3() -> None:
@@ -35,7 +30,7 @@ def test_the_predicted_values_are_those_of_tables_7_4_and_7_7() -> None:
 def test_with_the_scatter_in_it_the_uncertainty_reaches_its_target_as_in_table_7_7() -> None:
     """The handbook adds the scatter about the curve to the uncertainty; suncal 1.7.1 does not (328.93 days)."""
     fit = fitted_drift(DAYS, CHANGES, 2)
-    single = Start(10.03, float(np.hypot(0.28, fit.scatter)))
+    single = LastValue(10.03, float(np.hypot(0.28, fit.scatter)))
     before, after = np.hypot(single.u, fit.u_change(np.array([327.145, 327.155])))
     assert before < 0.5 < after
 
@@ -68,7 +63,7 @@ def test_suncal_itself() -> None:
 def test_a_value_beyond_what_is_wanted_from_the_beginning_has_no_interval() -> None:
     """Handbook, table 7-6, prints 153.04 and suncal 136.03: where the probability rises again through the target."""
     fit = fitted_drift(DAYS, CHANGES, 2)
-    assert interval_of_reliability(fit, Start(9.03, 0.28), 0.9, 9, None) == 0
+    assert interval_of_reliability(fit, LastValue(9.03, 0.28), 0.9, 9, None) == 0
 
 
 def test_without_a_drift_there_is_no_end() -> None:
@@ -77,8 +72,8 @@ def test_without_a_drift_there_is_no_end() -> None:
 
 def test_a_known_drift_by_hand() -> None:
     """0.001 a day, u = 0.1, limit 1 one-sided at 97.5 %: (1 − 1.96·0.1)/0.001 days."""
-    known = Drift(np.array([1e-3]), np.zeros((1, 1)), 0.0, 100, 1000.0)
-    assert interval_of_reliability(known, Start(0, 0.1), 0.975, None, 1) == pytest.approx(
+    known = DriftPolynomial(np.array([1e-3]), np.zeros((1, 1)), 0.0, 100, 1000.0)
+    assert interval_of_reliability(known, LastValue(0, 0.1), 0.975, None, 1) == pytest.approx(
         1000 - 100 * norm.ppf(0.975), rel=1e-6
     )
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.laboratory.live.blocks import Blocks, readings_of
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.journal import Journal, Moment, opened
+from cmm_uq.laboratory.live.instruments.source import Reading
+from cmm_uq.laboratory.live.journal import Moment, RecordingJournal, opened
+from cmm_uq.laboratory.live.recorder import Blocks, readings_of
 
 NOW = Moment(1, 2)
 READING = st.builds(
@@ -24,7 +24,7 @@ READING = st.builds(
 @settings(max_examples=50, deadline=None)
 def test_every_reading_comes_back_with_its_bytes_values_and_clocks(tmp_path_factory, readings: list[Reading]) -> None:  # type: ignore[no-untyped-def]
     path: Path = tmp_path_factory.mktemp("b") / "j"
-    journal, blocks = Journal(path), Blocks()
+    journal, blocks = RecordingJournal(path), Blocks()
     for reading in readings:
         blocks.add(reading)
     blocks.put(journal, NOW)

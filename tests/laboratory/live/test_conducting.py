@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.acquire import begin_acquisition
+from cmm_uq.app.commands.laboratory.acquire import begin_acquisition
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.laboratory.live.folder import read_story
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
+from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.source import Gap, Returned
 from cmm_uq.laboratory.live.journal import Moment
 from tests.laboratory.live.session import FakeClock, job_folder, probed, said, session, temperature, type_in
@@ -35,7 +35,7 @@ def clock() -> FakeClock:
 
 @pytest.fixture
 def no_instruments(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmm_uq.app.commands.acquire._sources", lambda job, **_: ([], None))
+    monkeypatch.setattr("cmm_uq.app.commands.laboratory.acquire._sources", lambda job, **_: ([], None))
 
 
 def rows(folder: Path) -> list[dict[str, str]]:
@@ -379,7 +379,7 @@ def test_the_picture_has_every_point_and_a_cross_where_to_go(tmp_path: Path, clo
 
 
 def test_a_machine_goes_on_after_an_error_once_the_operator_says_so(tmp_path: Path) -> None:
-    machine = SimulatedMachine()
+    machine = SimulatedIppServer()
     more = f'[[acquire.source]]\nname = "cmm"\nprofile = "ipp-position"\nport = "{machine.url}"\n'
     taking = begin_acquisition(job_folder(tmp_path / "job", more))
     (source,) = taking.listening.sources

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.dropped import Watched
+from cmm_uq.laboratory.live.running import WatchedFolder
 from tests.laboratory.live.session import FakeClock
 
 
 def test_a_growing_file_is_read_when_it_stands_still_and_once(tmp_path: Path) -> None:
     clock = FakeClock()
-    watched, path, read = Watched(tmp_path, clock), tmp_path / "result.txt", []
+    watched, path, read = WatchedFolder(tmp_path, clock), tmp_path / "result.txt", []
     for text in ("a", "ab", "abc"):
         path.write_text(text, encoding="utf-8")
         read += watched.look()
@@ -31,8 +31,8 @@ def test_a_growing_file_is_read_when_it_stands_still_and_once(tmp_path: Path) ->
 
 
 def test_files_come_in_the_order_in_which_they_were_written_and_unfinished_ones_do_not(tmp_path: Path) -> None:
-    clock, watched = FakeClock(), Watched(tmp_path, FakeClock())
-    watched = Watched(tmp_path, clock)
+    clock, watched = FakeClock(), WatchedFolder(tmp_path, FakeClock())
+    watched = WatchedFolder(tmp_path, clock)
     for name, age in (("b.txt", 20), ("a.txt", 10), ("c.txt.part", 30), (".d.txt", 30)):
         (tmp_path / name).write_text(name, encoding="utf-8")
         os.utime(tmp_path / name, (1_000_000 - age, 1_000_000 - age))
@@ -43,4 +43,4 @@ def test_files_come_in_the_order_in_which_they_were_written_and_unfinished_ones_
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(CmmUqError, match="is no folder"):
-        Watched(tmp_path / "none", FakeClock())
+        WatchedFolder(tmp_path / "none", FakeClock())

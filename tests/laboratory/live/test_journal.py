@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.laboratory.live.folder import begin, read_story, sessions_in
 from cmm_uq.laboratory.live.journal import (
-    Journal,
     Moment,
     NoRoomError,
     Record,
+    RecordingJournal,
     line_of,
     opened,
     record_of,
@@ -31,7 +31,7 @@ SAID = st.dictionaries(st.text(max_size=5), st.none() | st.integers() | st.float
 def journal(folder: Path, count: int) -> Path:
     path = folder / "0001-events.jsonl"
     path.unlink(missing_ok=True)
-    kept = Journal(path)
+    kept = RecordingJournal(path)
     for number in range(count):
         kept.append("note", {"text": f"nº {number}\n"}, NOW)
     kept.commit()
@@ -132,7 +132,7 @@ def test_two_programs_do_not_record_one_job(tmp_path: Path) -> None:
 def test_with_a_full_disk_records_wait_and_are_kept_when_there_is_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = Journal(tmp_path / "j")
+    kept = RecordingJournal(tmp_path / "j")
     kept.append("note", {"text": "one"}, NOW)
     kept.commit()
     kept.append("note", {"text": "two"}, NOW)

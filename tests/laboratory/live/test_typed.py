@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.typed import Typed, understood
+from cmm_uq.laboratory.live.screen import OperatorInput, understood
 
 
 def test_numbers_words_and_nothing() -> None:
-    assert understood("1.5 -2 3e1") == Typed("point", "1.5 -2 3e1", (1.5, -2.0, 30.0))
-    assert understood("404.2") == Typed("point", "404.2", (404.2,))
-    assert understood("  ") == Typed("take")
-    assert understood("u the ball slipped") == Typed("undo", "the ball slipped")
-    assert understood("QUIT") == Typed("quit")
+    assert understood("1.5 -2 3e1") == OperatorInput("point", "1.5 -2 3e1", (1.5, -2.0, 30.0))
+    assert understood("404.2") == OperatorInput("point", "404.2", (404.2,))
+    assert understood("  ") == OperatorInput("take")
+    assert understood("u the ball slipped") == OperatorInput("undo", "the ball slipped")
+    assert understood("QUIT") == OperatorInput("quit")
 
 
 @pytest.mark.parametrize(("line", "told"), [

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.laboratory.records import Certificate, open_records
-from cmm_uq.laboratory.records.listing import Choice, chosen, courses, entry_of, standing_of_all
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.facts import RecordedCertificate
+from cmm_uq.laboratory.records.listing import CertificateFilter, chosen, courses, entry_of, standing_of_all
 from cmm_uq.laboratory.records.store import Records
 from tests.laboratory.records.histories import certificate, made, moment
 
@@ -35,7 +36,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 CHOICES = st.builds(
-    Choice,
+    CertificateFilter,
     text=st.sampled_from(["", "", "1000", "K-", "k 4", "K4", "MACHINE", "%", "_", "/", "\\", "ÄÖ", "m100003-1"]),
     machine=st.sampled_from(["", "", "K 3", "100001", "nobody"]), artefact=st.sampled_from(["", "", "BB-7", "BB-1"]),
     origin=st.sampled_from(["", "measured", "measured", "simulated"]),
@@ -47,7 +48,7 @@ CHOICES = st.builds(
 )  # fmt: skip
 
 
-def fits(one: Certificate, choice: Choice, names: dict[str, str]) -> bool:
+def fits(one: RecordedCertificate, choice: CertificateFilter, names: dict[str, str]) -> bool:
     """The same, one condition after the other."""
     key = "".join(choice.text.casefold().split())
     spelled = ["".join(text.casefold().split()) for text in (one.machine, names[one.machine])]
@@ -63,7 +64,7 @@ def fits(one: Certificate, choice: Choice, names: dict[str, str]) -> bool:
 
 
 @pytest.fixture(scope="module")
-def every(place: Path) -> Iterator[tuple[Records, list[Certificate], dict[str, str]]]:
+def every(place: Path) -> Iterator[tuple[Records, list[RecordedCertificate], dict[str, str]]]:
     """The records, every certificate in them, newest first, and what machines are called."""
     with open_records(place, read_only=True) as records:
         found = records.certificates(origin=None, command=None, values=False, newest_first=True)
@@ -72,7 +73,7 @@ def every(place: Path) -> Iterator[tuple[Records, list[Certificate], dict[str, s
 
 @given(choice=CHOICES, most=st.integers(1, 7), left_out=st.integers(0, 9))
 def test_a_page_has_what_fits_newest_first(
-    every: tuple[Records, list[Certificate], dict[str, str]], choice: Choice, most: int, left_out: int
+    every: tuple[Records, list[RecordedCertificate], dict[str, str]], choice: CertificateFilter, most: int, left_out: int
 ) -> None:  # fmt: skip
     records, found, names = every
     listed, count = chosen(records, choice, most, left_out)

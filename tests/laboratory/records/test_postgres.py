@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.backup import back_up, restore
-from cmm_uq.laboratory.records.listing import Choice, chosen, courses, entry_of, standing_of_all
+from cmm_uq.laboratory.records.listing import CertificateFilter, chosen, courses, entry_of, standing_of_all
 from cmm_uq.laboratory.records.migrations import migrate, upgrade
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, engine_of
 from tests.laboratory.records.histories import certificate, history
@@ -159,9 +159,10 @@ def test_another_programs_database_is_left_alone(url: str) -> None:
 def test_lists_are_the_same_on_a_server_as_in_a_file(url: str, tmp_path: Path) -> None:
     """Texts in any case, pages, each machine's newest certificate, courses: what ``listing`` asks."""
     choices = [
-        Choice(), Choice(text="M10000%"), Choice(text="M100001-"), Choice(text="k-100002"), Choice(text="cmm 100002"),
-        Choice(machine="100001", states=["released"]), Choice(artefact="BB-1", command="", origin="", interim=False),
-    ]  # fmt: skip
+        *(CertificateFilter(text=text) for text in ("", "M10000%", "M100001-", "k-100002", "cmm 100002")),
+        CertificateFilter(machine="100001", states=["released"]),
+        CertificateFilter(artefact="BB-1", command="", origin="", interim=False),
+    ]
     with open_records(url, create=True) as server, open_records(tmp_path / "records.db", create=True) as file:
         for records in (server, file):
             records.append_all(history(5, 3, released=True))

@@ -15,7 +15,7 @@ from cmm_uq import __version__
 from cmm_uq.app.commands.certificates import affected as corrected
 from cmm_uq.app.commands.certificates.affected import Correction, Inputs, affected, between, corrections
 from cmm_uq.app.commands.certificates.release import release, withdraw
-from cmm_uq.app.commands.records_kept import import_reports, inputs_of, remove_retained, retention
+from cmm_uq.app.commands.laboratory.records import import_reports, inputs_of, remove_retained, retention
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.records import open_records

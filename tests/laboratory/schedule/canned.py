@@ -17,7 +17,7 @@ from typing import Any
 
 from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.talking import serve
+from cmm_uq.laboratory.schedule.processes import serve
 
 
 def begin(setting: tuple[int, bool]) -> Callable[[int, Any], dict[str, bytes]]:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.talking import serve
+from cmm_uq.laboratory.schedule.processes import serve
 
 Record = dict[str, Any]
 

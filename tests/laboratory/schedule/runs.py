@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.output import Owner, staged
-from cmm_uq.laboratory.schedule.found import Found
+from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
 from cmm_uq.laboratory.schedule.notices import Notice
 from cmm_uq.laboratory.schedule.outbox import Outbox
-from cmm_uq.laboratory.schedule.run import Clock, Run
+from cmm_uq.laboratory.schedule.run import RunClock, ScheduledRun
 from cmm_uq.laboratory.schedule.settings import RunTable
-from cmm_uq.laboratory.schedule.state import InFolder, State
-from cmm_uq.laboratory.schedule.work import Work
+from cmm_uq.laboratory.schedule.state import FolderState, State
 from tests.laboratory.schedule.told import Kept
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
@@ -41,7 +40,7 @@ class Jobs:
 
     root: Path
     channel: Kept = field(default_factory=Kept)
-    before: Callable[[Found], None] = lambda job: None
+    before: Callable[[JobFolder], None] = lambda job: None
     settings: dict[str, Any] = field(default_factory=dict)
     now: dt.datetime = field(default_factory=lambda: dt.datetime.now(dt.UTC) + dt.timedelta(minutes=10))
     state: State | None = None
@@ -57,7 +56,7 @@ class Jobs:
     def out(self) -> Path:
         return self.root / "reports"
 
-    def report(self, job: Found) -> bytes:
+    def report(self, job: JobFolder) -> bytes:
         self.before(job)
         inputs = {name: (job.folder / name).read_bytes() for name in ("job.toml", "points.csv")}
         word = inputs["points.csv"].decode().strip()
@@ -75,13 +74,13 @@ class Jobs:
     def run(self, *, dry: bool = False) -> int:
         self.lines.clear()
         self.reported.clear()
-        state = self.state or InFolder(self.out)
-        clock = Clock(lambda: self.now, lambda: sum(self.slept), self._sleep)
+        state = self.state or FolderState(self.out)
+        clock = RunClock(lambda: self.now, lambda: sum(self.slept), self._sleep)
         outbox = Outbox(self.out, [self.channel], state, clock.moment)
         settings = RunTable(**{"back_off_s": 1.0, **self.settings})
-        work = Work(self.out, state, self.report, outbox.add)
-        return Run(self.folders or [self.root], settings, work, outbox, self.due, self.lines.append, self.logged.append,
-                   clock, dry).through()  # fmt: skip
+        work = JobReporting(self.out, state, self.report, outbox.add)
+        tell, log, folders = self.lines.append, self.logged.append, self.folders or [self.root]
+        return ScheduledRun(folders, settings, work, outbox, self.due, tell, log, clock, dry).through()
 
     def _sleep(self, seconds: float) -> None:
         self.slept.append(seconds)

@@ -14,12 +14,12 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.schedule.channels import channels
-from cmm_uq.laboratory.schedule.message import Channel, Message, UndeliveredError, within
+from cmm_uq.laboratory.schedule.notices import Channel, OutgoingMessage, UndeliveredError, within
 from cmm_uq.laboratory.schedule.settings import ScheduleFile
 from tests.laboratory.schedule.servers import HOST, Post, Taken, certificate, hanging_server, mail_server, web_server
 from tests.laboratory.schedule.told import NOW, notice
 
-MESSAGE = Message.of(notice("Zeiß 3 · µm"), "x", NOW)
+MESSAGE = OutgoingMessage.of(notice("Zeiß 3 · µm"), "x", NOW)
 
 
 @pytest.fixture(scope="module")

@@ -16,15 +16,14 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.schedule import cluster
 from cmm_uq.laboratory.schedule.cluster import _Chunks, chunk_answered, cluster_answers, end_idle
-from cmm_uq.laboratory.schedule.pool import answers
-from cmm_uq.laboratory.schedule.talking import Answer, Packed, Work
+from cmm_uq.laboratory.schedule.processes import Packed, TaskAnswer, WorkerTask, answers
 from tests.conftest import ROOT
 
 distributed = pytest.importorskip("distributed")
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask's own parts say of each other
 
-WORK = Work("tests.laboratory.schedule.echo", 0.0)
+WORK = WorkerTask("tests.laboratory.schedule.echo", 0.0)
 
 
 @dataclass
@@ -66,7 +65,7 @@ def test_it_answers_as_processes_here_do_also_where_a_process_or_a_worker_is_kil
     local: Cluster, tmp_path: Path
 ) -> None:
     tasks: dict[int, Any] = {**dict.fromkeys(range(30)), 30: "refuse", 31: tmp_path / "killed"}
-    found: dict[int, Answer] = {}
+    found: dict[int, TaskAnswer] = {}
     for one in cluster_answers(local.address, WORK, tasks.items(), len(tasks)):
         if not found:
             local.workers[0].kill()  # with whatever it was asked
@@ -98,7 +97,7 @@ def test_a_process_of_a_worker_stays_for_the_next_portion_and_goes_when_nobody_a
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(cluster, "IDLE_S", 0.3)
-    packed = Work(WORK.program, Packed.of(0.0))
+    packed = WorkerTask(WORK.program, Packed.of(0.0))
     assert chunk_answered(cluster.__version__, packed, ((3, Packed.of(None)),))[0].value["square"] == 9
     (talk,) = cluster._idle[packed]
     process = talk._process
@@ -131,7 +130,7 @@ def test_a_cluster_that_loses_its_workers_is_said(local: Cluster, monkeypatch: p
     monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
 
     def killing() -> None:
-        for _ in cluster_answers(local.address, Work(WORK.program, 0.05), dict.fromkeys(range(40)).items(), 40):
+        for _ in cluster_answers(local.address, WorkerTask(WORK.program, 0.05), dict.fromkeys(range(40)).items(), 40):
             for worker in local.workers:
                 worker.kill()
 

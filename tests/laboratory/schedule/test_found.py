@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import sha256_of
-from cmm_uq.laboratory.schedule.found import Found, differing, job_folders, quiet_since, snapshot
+from cmm_uq.laboratory.schedule.jobs import JobFolder, differing, job_folders, quiet_since, snapshot
 
 JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
 
@@ -26,7 +26,7 @@ def found(root: Path, out: Path | None = None) -> list[str]:
     return [job.folder.relative_to(root).as_posix() for job in job_folders(root, out)]
 
 
-def inputs_of(job: Found) -> dict[str, str]:
+def inputs_of(job: JobFolder) -> dict[str, str]:
     return {name: str(sha256_of(job.folder / name)) for name in ("job.toml", "points.csv")}
 
 
@@ -62,7 +62,7 @@ def test_a_job_file_that_says_nothing_is_found_all_the_same(tmp_path: Path, text
     made(tmp_path / "x")
     (tmp_path / "x" / "job.toml").write_bytes(text.encode("utf-8", "surrogateescape"))
     (job,) = job_folders(tmp_path)
-    assert job == Found(tmp_path / "x", tmp_path)
+    assert job == JobFolder(tmp_path / "x", tmp_path)
 
 
 def test_a_plan_without_a_recording_is_still_to_be_measured_and_a_job_without_one_is_not(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cmm_uq.laboratory.schedule.log import Log
+from cmm_uq.laboratory.schedule.progress import Log
 
 WRITE = """
 import sys

@@ -13,14 +13,14 @@ import pytest
 
 from cmm_uq.base.errors import OutputError
 from cmm_uq.laboratory.schedule.locks import turn
-from cmm_uq.laboratory.schedule.message import Channel, Message
+from cmm_uq.laboratory.schedule.notices import Channel, OutgoingMessage
 from cmm_uq.laboratory.schedule.outbox import MOST, Outbox
-from cmm_uq.laboratory.schedule.state import InFolder, Reported
+from cmm_uq.laboratory.schedule.state import FolderState, ReportedInputs
 from tests.laboratory.schedule.told import NOW, Kept, notice, notices
 
 
 def outbox(out: Path, *channels: Channel) -> Outbox:
-    return Outbox(out, channels, InFolder(out), lambda: NOW)
+    return Outbox(out, channels, FolderState(out), lambda: NOW)
 
 
 def test_what_is_found_again_and_again_goes_out_once(tmp_path: Path) -> None:
@@ -93,7 +93,7 @@ class Locked:
     failures: int
     keys: set[str] = field(default_factory=set)
 
-    def reported(self, job: str) -> Reported | None:
+    def reported(self, job: str) -> ReportedInputs | None:
         return None
 
     def released(self, job: str) -> bool:
@@ -183,11 +183,14 @@ def test_where_it_cannot_wait_it_is_told_and_can_be_sent_at_once(
 
 def test_a_key_tells_channel_event_what_it_is_about_and_its_state_apart() -> None:
     keys = {
-        Message.of(notice(about, event, state), channel, NOW).key
+        OutgoingMessage.of(notice(about, event, state), channel, NOW).key
         for about in "ab" for event in ("fail", "due") for state in "12" for channel in ("x", "y")
     }  # fmt: skip
     assert len(keys) == 16
-    assert Message.of(notice("a"), "x", NOW).key == Message.of(notice("a"), "x", "2027-01-01T00:00:00Z").key
+    assert (
+        OutgoingMessage.of(notice("a"), "x", NOW).key
+        == OutgoingMessage.of(notice("a"), "x", "2027-01-01T00:00:00Z").key
+    )
 
 
 def test_what_a_kill_left_of_a_message_is_removed_once_nobody_can_be_writing_it(tmp_path: Path) -> None:

@@ -15,24 +15,23 @@ from typing import Any
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.pool import answers, check_workers
-from cmm_uq.laboratory.schedule.talking import Answer, Talk, Work
+from cmm_uq.laboratory.schedule.processes import TaskAnswer, WorkerProcess, WorkerTask, answers, check_workers
 
 PROGRAM = "tests.laboratory.schedule.echo"
 
 
-def answered(tasks: dict[int, Any], workers: int, **limits: Any) -> dict[int, Answer]:
-    return {one.number: one for one in answers(Work(PROGRAM, 0.0, **limits), tasks.items(), workers)}
+def answered(tasks: dict[int, Any], workers: int, **limits: Any) -> dict[int, TaskAnswer]:
+    return {one.number: one for one in answers(WorkerTask(PROGRAM, 0.0, **limits), tasks.items(), workers)}
 
 
-def values(found: dict[int, Answer]) -> dict[int, Any]:
+def values(found: dict[int, TaskAnswer]) -> dict[int, Any]:
     return {number: one.value for number, one in found.items()}
 
 
 def test_one_process_and_three_answer_alike_each_on_one_thread() -> None:
     tasks = dict.fromkeys(range(12))
     one, three = answered(tasks, 1), answered(tasks, 3)
-    assert one == three == {i: Answer(i, {"number": i, "square": i**2, "threads": "1"}) for i in tasks}
+    assert one == three == {i: TaskAnswer(i, {"number": i, "square": i**2, "threads": "1"}) for i in tasks}
 
 
 def test_a_process_that_is_killed_loses_nothing_and_is_told(tmp_path: Path) -> None:
@@ -69,7 +68,7 @@ def test_a_refusal_and_a_fault_are_answers_in_words() -> None:
 @pytest.mark.parametrize(("setting", "said"), [("refuse", "the setting is refused"), ("end", "exit code 7")])
 def test_a_process_that_cannot_begin_ends_the_run(setting: str, said: str) -> None:
     with pytest.raises(CmmUqError, match=said):
-        list(answers(Work(PROGRAM, setting), {0: None, 1: None}.items(), 2))
+        list(answers(WorkerTask(PROGRAM, setting), {0: None, 1: None}.items(), 2))
 
 
 def test_tasks_are_taken_only_as_far_as_processes_need_them() -> None:
@@ -80,7 +79,7 @@ def test_tasks_are_taken_only_as_far_as_processes_need_them() -> None:
             taken.append(number)
             yield number, None
 
-    with closing(answers(Work(PROGRAM, 0.0), tasks(), 2)) as found:
+    with closing(answers(WorkerTask(PROGRAM, 0.0), tasks(), 2)) as found:
         for count in range(1, 6):
             next(found)
             time.sleep(0.05)  # more would be answered meanwhile, if more were asked
@@ -88,7 +87,7 @@ def test_tasks_are_taken_only_as_far_as_processes_need_them() -> None:
 
 
 def test_who_stops_listening_leaves_no_process_behind() -> None:
-    talk = Talk(Work(PROGRAM, 0.0))
+    talk = WorkerProcess(WorkerTask(PROGRAM, 0.0))
     talk.ask(0, None)
     process = talk._process
     assert process is not None

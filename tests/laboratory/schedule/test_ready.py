@@ -12,19 +12,19 @@ from pathlib import Path, PureWindowsPath
 
 import pytest
 
-from cmm_uq.app.commands.schedule import ready_files, write_ready
+from cmm_uq.app.commands.laboratory.schedule import ready_files, write_ready
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.ready import Call, cron, encoded, systemd, windows
+from cmm_uq.laboratory.schedule.schedulers import ScheduledCall, cron, encoded, systemd, windows
 
 SHOW = (sys.executable, "-c", "import json, os, sys; print(json.dumps([os.getcwd(), sys.argv[1:]]))")
 AWKWARD = ["plain", "two words", "50%", "o'neil", 'quo"te', "$HOME", "a;b", "ünï", "a&b"]
 TASK = "{http://schemas.microsoft.com/windows/2004/02/mit/task}"
 
 
-def call(tmp_path: Path, name: str, **further: object) -> Call:
+def call(tmp_path: Path, name: str, **further: object) -> ScheduledCall:
     folder = tmp_path / name
     folder.mkdir()
-    return Call(SHOW, (folder, folder / "x"), folder / "schedule.toml", folder, 6, 5, **further)  # type: ignore[arg-type]
+    return ScheduledCall(SHOW, (folder, folder / "x"), folder / "schedule.toml", folder, 6, 5, **further)  # type: ignore[arg-type]
 
 
 @pytest.mark.skipif(shutil.which("sh") is None, reason="no sh")
@@ -92,7 +92,9 @@ def test_systemd_finds_nothing_wrong_with_the_units(tmp_path: Path) -> None:
 def test_a_task_of_windows_keeps_to_its_schema(tmp_path: Path) -> None:
     """Task Scheduler Schema: one namespace, these elements, times as xs:dateTime, durations as xs:duration."""
     folder = PureWindowsPath(r"C:\CMM & Söhne\jobs")
-    made = Call((r"C:\Program Files\Python\python.exe", "-m", "cmm_uq"), (folder,), None, folder, 6, 5, ("TUE",))
+    made = ScheduledCall(
+        (r"C:\Program Files\Python\python.exe", "-m", "cmm_uq"), (folder,), None, folder, 6, 5, ("TUE",)
+    )
     ((name, text),) = windows(made).items()
     task = ET.fromstring(encoded(name, text))
     assert task.tag == f"{TASK}Task"

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.schedule.found import Found, Snapshot, snapshot
+from cmm_uq.laboratory.schedule.jobs import JobFolder, Snapshot, snapshot
 from cmm_uq.laboratory.schedule.locks import turn, turn_at
-from cmm_uq.laboratory.schedule.state import InFolder
+from cmm_uq.laboratory.schedule.state import FolderState
 from tests.laboratory.schedule.runs import Jobs, made
 from tests.laboratory.schedule.told import notice
 
@@ -27,7 +27,7 @@ def jobs(tmp_path: Path) -> Jobs:
 def failing(name: str, error: Exception, times: int = 10**6) -> object:
     left = [times]
 
-    def before(job: Found) -> None:
+    def before(job: JobFolder) -> None:
         if job.id == name and left[0]:
             left[0] -= 1
             raise error
@@ -126,7 +126,7 @@ def test_a_job_named_twice_is_reported_once(jobs: Jobs) -> None:
 
 
 def test_a_folder_that_vanishes_meanwhile_is_no_error(jobs: Jobs) -> None:
-    def archived(job: Found) -> None:
+    def archived(job: JobFolder) -> None:
         shutil.rmtree(jobs.root / "b", ignore_errors=True)
         if job.id == "b":
             raise CmmUqError("no such file")
@@ -138,7 +138,7 @@ def test_a_folder_that_vanishes_meanwhile_is_no_error(jobs: Jobs) -> None:
 
 
 def test_a_schedules_folder_that_vanishes_meanwhile_is_one(jobs: Jobs) -> None:
-    def unmounted(job: Found) -> None:
+    def unmounted(job: JobFolder) -> None:
         (jobs.root / "jobs").rename(jobs.root / "away")
         raise CmmUqError("no such file")
 
@@ -224,7 +224,7 @@ def test_where_output_is_impossible_for_several_in_a_row_no_more_are_computed_be
         made(tmp_path, f"job-{i}")
     asked: list[str] = []
 
-    def full(job: Found) -> None:
+    def full(job: JobFolder) -> None:
         asked.append(job.id)
         if not jobs.slept:
             raise OutputError("No space left on device")
@@ -239,7 +239,7 @@ def test_folders_that_cannot_be_written_keep_no_other_job_from_its_turn(tmp_path
     for name in ("a", "b", "c", "d", "e"):
         made(tmp_path, name)
 
-    def refused(job: Found) -> None:
+    def refused(job: JobFolder) -> None:
         if job.id in "abc":
             raise OutputError("Permission denied")
 
@@ -261,7 +261,7 @@ def test_where_even_a_message_cannot_be_kept_it_is_sent_at_once(jobs: Jobs, monk
 
 
 def test_records_that_are_lost_in_the_middle_stop_neither_the_jobs_nor_the_messages(jobs: Jobs) -> None:
-    class Lost(InFolder):
+    class Lost(FolderState):
         def sent(self, key: str) -> bool:
             raise CmmUqError("the server closed the connection")
 

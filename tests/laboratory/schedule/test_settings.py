@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.schedule.channels import channels
-from cmm_uq.laboratory.schedule.mail import Mail
+from cmm_uq.laboratory.schedule.channels import Mail, channels
 from cmm_uq.laboratory.schedule.notices import EVENTS
 from cmm_uq.laboratory.schedule.settings import read_schedule
 

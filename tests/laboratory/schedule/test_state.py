@@ -14,9 +14,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
-from cmm_uq.laboratory.schedule.found import Found
-from cmm_uq.laboratory.schedule.state import InFolder, InRecords, Reported
-from cmm_uq.laboratory.schedule.work import Work
+from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
+from cmm_uq.laboratory.schedule.state import FolderState, RecordsState, ReportedInputs
 from tests.laboratory.records.histories import certificate
 from tests.laboratory.schedule.runs import Jobs, made
 
@@ -42,10 +41,10 @@ def record(records: Records, digest: str, job: str = "a", inputs: dict[str, str]
 
 
 def test_a_folder_knows_its_own_whole_reports_alone(tmp_path: Path) -> None:
-    state = InFolder(tmp_path)
+    state = FolderState(tmp_path)
     assert state.reported("a") is None
     report(tmp_path)
-    assert state.reported("a") == Reported(INPUTS)
+    assert state.reported("a") == ReportedInputs(INPUTS)
     report(tmp_path, "diagnosed", command="diagnose")
     assert state.reported("diagnosed") is None
     (tmp_path / "a" / "results.json").write_text('{"job": {"inputs_sha256": {}}}')
@@ -53,30 +52,30 @@ def test_a_folder_knows_its_own_whole_reports_alone(tmp_path: Path) -> None:
 
 
 def test_what_the_folder_has_and_the_records_have_not_is_to_be_recorded_yet(tmp_path: Path, records: Records) -> None:
-    state = InRecords(records, tmp_path / "reports")
+    state = RecordsState(records, tmp_path / "reports")
     digest = report(tmp_path / "reports")
     assert state.reported("a") is None
     record(records, digest)
-    assert state.reported("a") == Reported(INPUTS)
+    assert state.reported("a") == ReportedInputs(INPUTS)
 
 
 def test_a_report_that_was_taken_away_is_not_made_again_and_of_several_the_newest_counts(
     tmp_path: Path, records: Records
 ) -> None:
     """The laboratory's archive is no reason for a second certificate."""
-    state = InRecords(records, tmp_path / "reports")
+    state = RecordsState(records, tmp_path / "reports")
     record(records, "a" * 64, inputs={"job.toml": "0" * 64})
     record(records, report(tmp_path / "reports"))
     shutil.rmtree(tmp_path / "reports" / "a")
-    assert state.reported("a") == Reported(INPUTS)
+    assert state.reported("a") == ReportedInputs(INPUTS)
 
 
 def test_a_released_certificate_is_not_replaced(tmp_path: Path, records: Records) -> None:
     folder = made(tmp_path, "a")
-    state = InRecords(records, tmp_path / "reports")
+    state = RecordsState(records, tmp_path / "reports")
     entry = record(records, report(tmp_path / "reports"))
-    work = Work(tmp_path / "reports", state, lambda job: b"", lambda notices: None)
-    job = Found(folder, tmp_path, "a", "points.csv")
+    work = JobReporting(tmp_path / "reports", state, lambda job: b"", lambda notices: None)
+    job = JobFolder(folder, tmp_path, "a", "points.csv")
     assert work.reason(job) == "changed: job.toml, points.csv"
     assert not state.released("a")
     records.append("release", {"certificate": entry, "by": "A. Person", "reason": "reviewed"})
@@ -86,7 +85,7 @@ def test_a_released_certificate_is_not_replaced(tmp_path: Path, records: Records
 
 
 def test_a_message_that_any_run_has_sent_is_known(tmp_path: Path, records: Records) -> None:
-    mine, others = (InRecords(records, tmp_path / "reports") for _ in range(2))
+    mine, others = (RecordsState(records, tmp_path / "reports") for _ in range(2))
     assert not mine.sent("k")
     others.add_sent("k", {"about": "a"})
     assert mine.sent("k")
@@ -97,7 +96,7 @@ def test_a_message_that_any_run_has_sent_is_known(tmp_path: Path, records: Recor
 
 def test_runs_with_records_send_once_and_their_chain_holds(tmp_path: Path, records: Records) -> None:
     made(tmp_path, "a", "fail")
-    jobs = Jobs(tmp_path, state=InRecords(records, tmp_path / "reports"))
+    jobs = Jobs(tmp_path, state=RecordsState(records, tmp_path / "reports"))
     jobs.run()
     results = jobs.out / "a" / "results.json"
     digest = hashlib.sha256(results.read_bytes()).hexdigest()

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.laboratory.schedule.message import Message, UndeliveredError
-from cmm_uq.laboratory.schedule.notices import EVENTS, Event, Notice
+from cmm_uq.laboratory.schedule.notices import EVENTS, Event, Notice, OutgoingMessage, UndeliveredError
 
 NOW = "2026-11-22T06:15:00Z"
 
@@ -19,10 +18,10 @@ class Kept:
     name: str = "kept"
     events: frozenset[str] = frozenset(EVENTS)
     failures: int = 0
-    messages: list[Message] = field(default_factory=list)
+    messages: list[OutgoingMessage] = field(default_factory=list)
     asked: int = 0
 
-    def send(self, message: Message) -> str:
+    def send(self, message: OutgoingMessage) -> str:
         self.asked += 1
         if self.failures > 0:
             self.failures -= 1

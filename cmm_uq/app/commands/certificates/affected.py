@@ -16,18 +16,18 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
 from cmm_uq.app.commands.files import Stage, called, silent
+from cmm_uq.app.commands.laboratory.records import RESULTS, inputs_of
 from cmm_uq.app.commands.reading import in_language, job_of
-from cmm_uq.app.commands.records_kept import RESULTS, inputs_of
 from cmm_uq.app.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import ENGLISH, code_of
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.certificate.results_file import as_json
 from cmm_uq.jobs.job import Job, Recorded
 from cmm_uq.jobs.recording_file import header, is_own
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents
-from cmm_uq.laboratory.records.facts import STANDING, Certificate, Value
+from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedValue
 from cmm_uq.laboratory.records.place import NONE
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Correction:
     keys: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
 
-    def touches(self, certificate: Certificate, inputs: Inputs | None) -> bool:
+    def touches(self, certificate: RecordedCertificate, inputs: Inputs | None) -> bool:
         """Whether it may touch a certificate.
 
         Parameters
@@ -222,7 +222,7 @@ class Affected:
     written : folder of the draft that is to replace it.
     """
 
-    certificate: Certificate
+    certificate: RecordedCertificate
     corrections: tuple[Correction, ...]
     changes: tuple[Change, ...] | None = None
     decision: str = ""
@@ -288,7 +288,7 @@ def affected(
             yield Affected(certificate, touching, problem=problem)
 
 
-def _inputs(records: Records, certificate: Certificate) -> tuple[dict[str, bytes], str]:
+def _inputs(records: Records, certificate: RecordedCertificate) -> tuple[dict[str, bytes], str]:
     """Files of its job as its PDF carries them, or why they are not to be had."""
     try:
         files = inputs_of(Path(certificate.folder))
@@ -303,13 +303,13 @@ def _inputs(records: Records, certificate: Certificate) -> tuple[dict[str, bytes
 
 
 def _again(
-    certificate: Certificate, touching: tuple[Correction, ...], files: Mapping[str, bytes], folder: Path | None,
+    certificate: RecordedCertificate, touching: tuple[Correction, ...], files: Mapping[str, bytes], folder: Path | None,
     where: str | None,
 ) -> Affected:  # fmt: skip
     try:
         job, outcome = _outcome(certificate, job_of(files))
         data = json.loads(as_json(outcome.results))
-        changes = tuple(compared(certificate.values, [Value(*row) for row in contents.values(data, called)]))
+        changes = tuple(compared(certificate.values, [RecordedValue(*row) for row in contents.values(data, called)]))
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
         found = Affected(certificate, touching, changes, Verdicts.of_results(data).overall, verdict)
         if folder is None or not found.changed:
@@ -322,7 +322,7 @@ def _again(
         return Affected(certificate, touching, problem=str(error))
 
 
-def _outcome(certificate: Certificate, job: Job) -> tuple[Job, Outcome]:
+def _outcome(certificate: RecordedCertificate, job: Job) -> tuple[Job, Outcome]:
     """In the language and with the seed of the first time."""
     before: Mapping[str, Any] = json.loads((Path(certificate.folder) / RESULTS).read_bytes())
     seed = int((before.get("sampling") or {}).get("seed") or 0)
@@ -331,7 +331,7 @@ def _outcome(certificate: Certificate, job: Job) -> tuple[Job, Outcome]:
     return job, again(job, seed=seed)
 
 
-def compared(before: tuple[Value, ...], after: list[Value]) -> Iterator[Change]:
+def compared(before: tuple[RecordedValue, ...], after: list[RecordedValue]) -> Iterator[Change]:
     """Figures that differ, or are only there before or after, in the order of those before."""
     new = {value.name: value for value in after}
     old = {value.name: value for value in before}
@@ -344,10 +344,10 @@ def compared(before: tuple[Value, ...], after: list[Value]) -> Iterator[Change]:
             yield Change(name, told.quantity, told.unit, _figures(a), _figures(b))
 
 
-def _same(a: Value, b: Value) -> bool:
+def _same(a: RecordedValue, b: RecordedValue) -> bool:
     pairs = zip(_figures(a) or (), _figures(b) or (), strict=True)
     return all(isclose(x, y, rel_tol=SAME, abs_tol=SAME * max(a.u, b.u)) for x, y in pairs)
 
 
-def _figures(value: Value | None) -> tuple[float, float, float, float] | None:
+def _figures(value: RecordedValue | None) -> tuple[float, float, float, float] | None:
     return None if value is None else (value.value, value.u, value.lower, value.upper)

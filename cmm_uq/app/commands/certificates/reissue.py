@@ -22,9 +22,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, 
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.results.reissue import KEY
-from cmm_uq.certificate.results.reissue import ChangedFigure as Difference
-from cmm_uq.certificate.results.reissue import Reissue as Comparison
+from cmm_uq.certificate.reissue import KEY, Comparison, Difference
 from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.job import Job
@@ -33,13 +31,13 @@ from cmm_uq.jobs.replaced import FILE, denies_a_change
 from cmm_uq.jobs.results_named import results_named
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
+from cmm_uq.laboratory.records.facts import spelled
 from cmm_uq.laboratory.records.place import DEFAULT, beside, place_of
-from cmm_uq.laboratory.records.recognised import spelled
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.rounding import rounded
 
 if TYPE_CHECKING:
-    from cmm_uq.laboratory.records.facts import Certificate
+    from cmm_uq.laboratory.records.facts import RecordedCertificate as Certificate
     from cmm_uq.laboratory.records.store import Records
 
 _ENTRY = "cmm-uq/replaced/1"

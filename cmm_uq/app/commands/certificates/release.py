@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.app.commands.certificates.reissue import refuse_denial, refuse_unlike
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.jobs.verdicts import NONE, Verdicts
-from cmm_uq.laboratory.records.facts import STANDING, Certificate
-from cmm_uq.laboratory.records.recognised import spelled
+from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, spelled
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
@@ -32,11 +31,11 @@ class Signed:
     waiting : how many persons more must release it.
     """
 
-    certificate: Certificate
+    certificate: RecordedCertificate
     waiting: int = 0
 
 
-def certificate_named(records: Records, name: str, states: Collection[str]) -> Certificate:
+def certificate_named(records: Records, name: str, states: Collection[str]) -> RecordedCertificate:
     """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest.
 
     Parameters
@@ -155,7 +154,7 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
     return Signed(records.certificate(certificate.entry))
 
 
-def blocked(certificate: Certificate) -> str | None:
+def blocked(certificate: RecordedCertificate) -> str | None:
     """Why a certificate must not be released; ``None`` where nothing stands against it."""
     if certificate.origin != "measured":
         return f"its recording is {certificate.origin}"
@@ -168,7 +167,7 @@ def blocked(certificate: Certificate) -> str | None:
     return None
 
 
-def no_pass(certificate: Certificate, content: Mapping[str, Any]) -> str:
+def no_pass(certificate: RecordedCertificate, content: Mapping[str, Any]) -> str:
     """What a certificate states that is no pass, in words; empty where nobody has to say a word of it.
 
     Parameters
@@ -189,7 +188,7 @@ def _person(name: str) -> str:
 
 
 def _sign(
-    records: Records, kind: str, certificate: Certificate, by: str, reason: str, **further: bool | int | str
+    records: Records, kind: str, certificate: RecordedCertificate, by: str, reason: str, **further: bool | int | str
 ) -> None:  # fmt: skip
     content = {"certificate": certificate.entry, "by": by, "reason": reason.strip(), **further}
     records.append(kind, content | {"results_sha256": certificate.results_sha256})

@@ -25,8 +25,8 @@ from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.notebook import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.clauses import Requirement as Clause
-from cmm_uq.certificate.clauses import certifies, clauses, contradictions, missing
+from cmm_uq.certificate.clauses import Clause, certifies, clauses, missing
+from cmm_uq.certificate.completeness import contradictions
 from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED

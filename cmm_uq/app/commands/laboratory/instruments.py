@@ -14,11 +14,10 @@ from pathlib import Path
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.acquire import DeclaredSource
-from cmm_uq.laboratory.live.instruments.draft import Drafted, drafted
-from cmm_uq.laboratory.live.instruments.library import ENDING, profile_named, profile_of, ready
-from cmm_uq.laboratory.live.instruments.opening import open_source
+from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.library import ENDING, ProfileDraft, drafted, profile_named, profile_of, ready
 from cmm_uq.laboratory.live.instruments.ports import serial_ports
-from cmm_uq.laboratory.live.instruments.source import Event, Source
+from cmm_uq.laboratory.live.instruments.source import Event, LiveSource
 from cmm_uq.laboratory.live.instruments.trial import Trial
 
 
@@ -83,7 +82,7 @@ class Attempt:
     def __init__(self, what: str, port: str, job: Path | None) -> None:
         source, folder = declared(what, port, job)
         self.trial = Trial(profile_named(source.profile, folder), source.port)
-        self.source: Source = open_source(source, folder=folder)
+        self.source: LiveSource = open_source(source, folder=folder)
         self._stop = threading.Event()
 
     def events(self, seconds: float | None) -> Iterator[Event]:
@@ -102,7 +101,7 @@ class Attempt:
             self.source.close()
 
 
-def write_profile(out: Path, wanted: Drafted) -> None:
+def write_profile(out: Path, wanted: ProfileDraft) -> None:
     """Write a new profile that reads its own example.
 
     Raises
@@ -130,11 +129,11 @@ def simulating(profile: str, way: str) -> Iterator[str]:
     ------
     CmmUqError : there is no simulation of it, or no such way.
     """
-    from cmm_uq.laboratory.live.instruments.simulated.line import WAYS, simulated
-    from cmm_uq.laboratory.live.instruments.simulated.speakers import SPEAKERS
+    from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, simulated
+    from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 
     if profile_named(profile).protocol == "ipp":
-        from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
+        from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer as SimulatedMachine
 
         machine = SimulatedMachine()
         try:

@@ -1,9 +1,13 @@
-"""When which question is asked, and which message answers it; knows no port, and no clock but the time that it is told."""
+"""When which question is asked, which message answers it, and which instrument says it is there."""
 
 from __future__ import annotations
 
-from cmm_uq.laboratory.live.instruments.control_codes import bytes_of
-from cmm_uq.laboratory.live.instruments.profile import Send
+import re
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.live.instruments.parsing import FramedMessage
+from cmm_uq.laboratory.live.instruments.profile import Identify, Send, bytes_of
+from cmm_uq.laboratory.live.instruments.source import Identity
 
 SECOND = 1_000_000_000
 """ns."""
@@ -15,17 +19,11 @@ PAUSE = SECOND // 2
 class Conversation:
     """Questions to one instrument, one after the other, a round every so often.
 
-    Parameters
-    ----------
-    send : what the instrument is sent.
-    now : monotonic clock, ns.
-    replayed : whether the answers come from a file, where nothing is asked.
-
-    Attributes
-    ----------
-    asked : which question waits for its answer, or was answered last; −1 before the first.
-    waiting : whether an answer is waited for.
-    gap : whether the instrument is silent: it is then asked without regard to the rounds, so that its return is noticed.
+    ``send``: what the instrument is sent; ``now``: monotonic clock, ns; ``replayed``: whether the answers come from a
+    file, where nothing is asked.
+    ``asked``: which question waits for its answer, or was answered last; −1 before the first; ``waiting``: whether an
+    answer is waited for; ``gap``: whether the instrument is silent: it is then asked without regard to the rounds, so
+    that its return is noticed.
     """
 
     def __init__(self, send: Send, now: int, *, replayed: bool = False) -> None:
@@ -64,10 +62,7 @@ class Conversation:
     def heard(self, now: int, *, answer: bool) -> None:
         """A message came.
 
-        Parameters
-        ----------
-        now : monotonic clock, ns.
-        answer : whether it answers a question.
+        ``now``: monotonic clock, ns.
         """
         self._heard_at = now
         if answer:
@@ -87,3 +82,41 @@ class Conversation:
                 self._heard_at = now
                 return True
         return False
+
+
+_TOLD = ("maker", "model", "serial", "firmware")
+
+
+class Introduction:
+    """The lines that follow the question who it is."""
+
+    def __init__(self, wanted: Identify) -> None:
+        self._pattern = re.compile(wanted.pattern)
+        self._lines: list[str] = []
+        self._span = (0, 0)
+        self.found: Identity | None = None
+        """What it said; ``None`` until it did."""
+
+    def hear(self, message: FramedMessage) -> None:
+        self._lines.append(message.body.decode("latin-1").strip("\r\n"))
+        found = self._pattern.search("\n".join(self._lines))
+        if found is not None and self.found is None:
+            given = {key: text.strip() for key, text in found.groupdict().items() if key in _TOLD and text}
+            self.found = Identity("", **given)
+            whole = "\n".join(self._lines)
+            self._span = whole.count("\n", 0, found.start()), whole.count("\n", 0, max(found.start(), found.end() - 1))
+
+    def tells(self, place: int) -> bool:
+        """Whether a message is part of the introduction, counted from 0."""
+        return self.found is not None and self._span[0] <= place <= self._span[1]
+
+
+def another(known: Identity, found: Identity, declared: Identity) -> CmmUqError | None:
+    """What is wrong where the serial number is another than that of the job, or of the instrument that was there before."""
+    for expected, whose in ((declared.serial, "the job names"), (known.serial, "before it was")):
+        if expected and found.serial and expected.casefold() != found.serial.casefold():
+            return CmmUqError(
+                f"another instrument answers: it says serial number {found.serial!r}, {whose} {expected!r}",
+                where=declared.name, fix="Connect the right one, or correct its serial number",
+            )  # fmt: skip
+    return None

@@ -6,20 +6,38 @@ import contextlib
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.laboratory.live.instruments.control_codes import bytes_of
-from cmm_uq.laboratory.live.instruments.conversation import SECOND, Conversation
-from cmm_uq.laboratory.live.instruments.framing import Framed, Framer
-from cmm_uq.laboratory.live.instruments.introduction import Introduction, another
-from cmm_uq.laboratory.live.instruments.parsing import Parser, Understood
-from cmm_uq.laboratory.live.instruments.port import Port, PortLostError
-from cmm_uq.laboratory.live.instruments.ports import Opened
-from cmm_uq.laboratory.live.instruments.profile import ProfileFile
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.replay import EndOfFileError, ReplayedFile
-from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, Returned
+from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.laboratory.live.instruments.conversation import SECOND, Conversation, Introduction, another
+from cmm_uq.laboratory.live.instruments.ipp.machine import open_machine
+from cmm_uq.laboratory.live.instruments.library import profile_named
+from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Framer, Parser, Understood
+from cmm_uq.laboratory.live.instruments.ports import (
+    FILE,
+    NETWORK,
+    RFC2217,
+    EndOfFileError,
+    PortOpener,
+    ReplayedFile,
+    opener,
+)
+from cmm_uq.laboratory.live.instruments.profile import ProfileFile, bytes_of
+from cmm_uq.laboratory.live.instruments.source import (
+    SYSTEM,
+    Clock,
+    Event,
+    Gap,
+    Identity,
+    LiveSource,
+    Port,
+    PortLostError,
+    Reading,
+    Returned,
+)
 
 RETRY_S = 0.25
 """Between two attempts to open a port that is gone; a return is to be noticed within 2 s."""
@@ -36,24 +54,15 @@ class Stamp:
     monotonic_ns: int
 
 
-class Instrument:
+class LiveInstrument:
     """An instrument at a port.
 
-    Parameters
-    ----------
-    identity : what the job says of it.
-    profile : how it speaks.
-    opened : opens its port.
-    clock : that stamps.
-    reopen_when_silent : whether the connection is made anew where nothing comes: one over a network may be dead unnoticed.
-
-    Raises
-    ------
-    CmmUqError : the port cannot be opened, or another instrument is there.
+    ``identity``: what the job says of it; ``reopen_when_silent``: whether the connection is made anew where nothing
+    comes: one over a network may be dead unnoticed.
     """
 
     def __init__(
-        self, identity: Identity, profile: ProfileFile, opened: Opened, clock: Clock, *, reopen_when_silent: bool = False
+        self, identity: Identity, profile: ProfileFile, opened: PortOpener, clock: Clock, *, reopen_when_silent: bool = False
     ) -> None:  # fmt: skip
         self.name = identity.name
         self._declared, self._identity = identity, identity
@@ -77,11 +86,9 @@ class Instrument:
             raise
 
     def identity(self) -> Identity:
-        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.identity`."""
         return self._identity
 
     def close(self) -> None:
-        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.close`."""
         self._closed = True
         port, self._port = self._port, None
         if port is not None:
@@ -91,7 +98,6 @@ class Instrument:
             port.close()
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
-        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.events`; those of a replayed file end with it."""
         held, self._held = self._held, []
         yield from held
         while not stop.is_set() and not self._closed:
@@ -129,7 +135,7 @@ class Instrument:
         if self._conversation.overdue(self._clock.monotonic_ns()):
             yield from self._overdue(port)
 
-    def _message(self, framed: Framed, stamp: Stamp, port: Port | None = None) -> Iterator[Event]:
+    def _message(self, framed: FramedMessage, stamp: Stamp, port: Port | None = None) -> Iterator[Event]:
         """What came, with the return of an instrument that was silent; with a port, that is asked first who it is."""
         understood = self._parser.read(framed, max(self._conversation.asked, 0))
         if self._conversation.several and not self._conversation.waiting and understood.answers:
@@ -140,7 +146,9 @@ class Instrument:
         else:
             yield self._reading(framed, understood, stamp)
 
-    def _returned(self, framed: Framed, understood: Understood, stamp: Stamp, port: Port | None) -> Iterator[Event]:
+    def _returned(
+        self, framed: FramedMessage, understood: Understood, stamp: Stamp, port: Port | None
+    ) -> Iterator[Event]:
         """The first that an instrument says after a gap."""
         gap, self._gap_at = self._gap_at, -1
         try:
@@ -165,7 +173,7 @@ class Instrument:
             self._told, stamp = why, self._stamp()
             yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(why))
 
-    def _reading(self, framed: Framed, understood: Understood, stamp: Stamp) -> Reading:
+    def _reading(self, framed: FramedMessage, understood: Understood, stamp: Stamp) -> Reading:
         self._number += 1
         return Reading(
             self.name, self._number, stamp.utc_ns, stamp.monotonic_ns, framed.raw, dict(understood.values), understood.status
@@ -251,9 +259,9 @@ class Instrument:
 
     def _answers(
         self, port: Port, introduction: Introduction, until: int
-    ) -> tuple[list[tuple[Framed, Stamp]], PortLostError | None]:  # fmt: skip
+    ) -> tuple[list[tuple[FramedMessage, Stamp]], PortLostError | None]:
         """What comes until the instrument has said who it is, or the time is over, or the port is lost."""
-        came: list[tuple[Framed, Stamp]] = []
+        came: list[tuple[FramedMessage, Stamp]] = []
         while introduction.found is None and self._clock.monotonic_ns() < until:
             try:
                 received = port.read()
@@ -277,3 +285,23 @@ def _completed(found: Identity, declared: Identity) -> Identity:
     """What the instrument says, and what only the job says."""
     said = {key: value for key, value in vars(found).items() if value is not None}
     return replace(declared, **(said | {"name": declared.name, "certificate": declared.certificate}))
+
+
+def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path = Path()) -> LiveSource:
+    """The source that a job declares, with its port open."""
+    profile = profile_named(declared.profile, folder)
+    identity = Identity(
+        declared.name, profile.maker or None, profile.model or None, declared.serial or None,
+        certificate=declared.certificate or None,
+    )  # fmt: skip
+    if profile.protocol == "ipp":
+        return open_machine(identity, profile, declared.port, clock)
+    return instrument(identity, profile, declared.port, clock, folder)
+
+
+def instrument(identity: Identity, profile: ProfileFile, port: str, clock: Clock, folder: Path) -> LiveInstrument:
+    """An instrument that speaks as a profile says."""
+    if port.startswith(FILE):
+        return LiveInstrument(identity, profile, partial(ReplayedFile, port, folder, clock), clock)
+    far = port.startswith((*NETWORK, RFC2217))
+    return LiveInstrument(identity, profile, opener(port, profile.connection), clock, reopen_when_silent=far)

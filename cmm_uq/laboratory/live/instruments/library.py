@@ -1,17 +1,21 @@
-"""Profiles by name: those that are ready, and users' own beside a job."""
+"""Profiles by name, those that are ready and users' own beside a job; and a new one from an example line."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.cells import column_problem
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TEXT
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.laboratory.live.instruments.parsing import check_profile
-from cmm_uq.laboratory.live.instruments.profile import ProfileFile
+from cmm_uq.laboratory.live.instruments.profile import ProfileFile, bytes_of
 
 ENDING = ".toml"
 
@@ -22,17 +26,6 @@ def ready() -> tuple[str, ...]:
 
 
 def profile_named(name: str, folder: Path = Path()) -> ProfileFile:
-    """A profile.
-
-    Parameters
-    ----------
-    name : of a ready one, or a file's.
-    folder : in which the file lies.
-
-    Raises
-    ------
-    CmmUqError : there is none, or it contradicts itself.
-    """
     if name.endswith(ENDING):
         return read_profile(folder / name)
     if name not in ready():
@@ -42,12 +35,7 @@ def profile_named(name: str, folder: Path = Path()) -> ProfileFile:
 
 
 def read_profile(path: Path) -> ProfileFile:
-    """A profile of a user's own.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read, or contradicts itself.
-    """
+    """A profile of a user's own."""
     content = content_of(path, JOB_BYTES, "Name a profile: cmm-uq instruments list shows those that are ready")
     return profile_of(content, path)
 
@@ -67,3 +55,132 @@ def profile_of(content: bytes, path: Path) -> ProfileFile:
 
 def _folder() -> Path:
     return Path(str(files("cmm_uq") / "laboratory" / "live" / "instruments" / "profiles"))
+
+
+NUMBER = r"[-+]?\s*\d+\.?\d*(?:[Ee][-+]?\d+)?"
+"""A number in a line."""
+
+_FOUND = re.compile(r"(?:[-+]\s*|(?<![\w.]))\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[A-Za-z_])\d+\.\d+")
+"""The 1 of CH1 is none, the 20.1 of T20.1 is one."""
+
+
+@dataclass(frozen=True)
+class ProfileDraft:
+    """What a new profile says.
+
+    ``line``: an example, as it comes, with or without its end; ``quantities``: name of the quantity for each number
+    of the line that is one, by its place, counted from 1; ``ranges``: least and largest plausible value by quantity;
+    ``ask``: what is sent to get a line; empty where they come by themselves; ``every_s``: how often it is asked.
+    """
+
+    name: str
+    title: str
+    line: str
+    quantities: Mapping[int, str]
+    ranges: Mapping[str, Sequence[float]]
+    ask: str = ""
+    every_s: float = 1.0
+    settings: Mapping[str, str | int] | None = None
+
+
+def numbers_in(line: str) -> list[str]:
+    """The numbers of an example line, in turn."""
+    return [found[0] for found in _FOUND.finditer(without_end(line))]
+
+
+def without_end(text: str) -> str:
+    """An example without its end."""
+    return re.sub(r"(?:<CR>|<LF>|\r|\n)+$", "", text)
+
+
+def terminator_of(text: str) -> str:
+    """The end of an example; a line feed where it shows none, which nearly all lines end with."""
+    end = text[len(without_end(text)) :].replace("\r", "<CR>").replace("\n", "<LF>")
+    return end or "<LF>"
+
+
+def range_of(text: str, name: str) -> tuple[float, float]:
+    """Least and largest value, of ``0:40``."""
+    low, _, high = text.partition(":")
+    try:
+        found = float(low), float(high)
+    except ValueError:
+        found = (1.0, 0.0)
+    if not found[0] < found[1]:
+        raise CmmUqError(f"{text!r} is no range", where=f"range of {name}", fix="Write it as 0:40")
+    return found
+
+
+def drafted(wanted: ProfileDraft) -> bytes:
+    """The profile's file."""
+    line = without_end(wanted.line)
+    found = list(_FOUND.finditer(line))
+    for place, name in wanted.quantities.items():
+        if not 1 <= place <= len(found):
+            raise CmmUqError(f"the line has {len(found)} numbers, so none with the number {place}", where="--quantity",
+                             fix="Count them from 1")  # fmt: skip
+        if problem := column_problem(name) or ("" if name.isidentifier() else "letters, digits and _ only"):
+            raise CmmUqError(f"{name!r} cannot name a quantity: {problem}", where="--quantity",
+                             fix="Name it as temp_c or x_mm, with its unit at its end")  # fmt: skip
+    if not wanted.quantities:
+        raise CmmUqError(
+            "no quantity is named", where="--quantity", fix="Name one as temp_c=1, the line's first number"
+        )
+    pattern, place = "^", 0
+    for number, one in enumerate(found, 1):
+        pattern += _literal(line[place : one.start()])
+        named = wanted.quantities.get(number)
+        pattern += f"(?P<{named}>{NUMBER})" if named else NUMBER
+        place = one.end()
+    pattern += _literal(line[place:]) + r"\s*$"
+    values = {name: float("".join(found[number - 1][0].split())) for number, name in wanted.quantities.items()}
+    return "\n".join(_lines(wanted, pattern, values)).encode()
+
+
+def _lines(wanted: ProfileDraft, pattern: str, values: Mapping[str, float]) -> list[str]:
+    end = terminator_of(wanted.line)
+    settings = wanted.settings or {}
+    lines = [
+        f"name = {_toml_text(_plain_name(wanted.name))}", f"title = {_toml_text(wanted.title)}", "", "[connection]",
+        *(f"{key} = {_toml_text(given) if isinstance(given, str) else given}" for key, given in settings.items()),
+        "", "[frame]", f"terminator = {_toml_text(end)}", "", "[send]",
+    ]  # fmt: skip
+    if wanted.ask:
+        lines += [f"poll = [{{ send = {_toml_text(wanted.ask)} }}]", f"every_s = {wanted.every_s:g}"]
+    else:
+        lines += ["silent_after_s = 10"]
+    lines += ["", "[parse]", "# Each number that is a quantity has its name in the pattern; blanks fit any number of blanks.",
+              f"pattern = {_toml_text(pattern)}", "ignore = ['\\s*']"]  # fmt: skip
+    for name in values:
+        if name in wanted.ranges:
+            low, high = wanted.ranges[name]
+            lines += ["", f"[quantities.{name}]", f"range = [{low:g}, {high:g}]"]
+    told = ", ".join(f"{name} = {value!r}" for name, value in values.items())
+    body = without_end(wanted.line)
+    lines += [
+        "", "[[example]]", f"received = {_toml_text(body + end)}", f"values = {{ {told} }}", "", "[facts]",
+        'not_found = ["what the instrument says when something is wrong: add [[ill]] for it"]', "",
+    ]  # fmt: skip
+    return lines
+
+
+def _plain_name(name: str) -> str:
+    """A name as profiles have it."""
+    return re.sub(r"[^a-z0-9.-]+", "-", name.lower()).strip("-.") or "instrument"
+
+
+def _literal(text: str) -> str:
+    """Text that must be there, with as many blanks as there may be."""
+    return r"\s*".join("".join(map(_escaped, bytes_of(part))) for part in re.split(r"\s+", text))
+
+
+def _escaped(byte: int) -> str:
+    return re.escape(chr(byte)) if 32 <= byte < 127 else f"\\x{byte:02x}"
+
+
+def _toml_text(text: str) -> str:
+    """A literal text of TOML; one with a single quote in it in the other way."""
+    if "'" not in text and text.isprintable():
+        return f"'{text}'"
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped) + '"'

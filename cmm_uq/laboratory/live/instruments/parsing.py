@@ -1,25 +1,174 @@
-"""What a message says: values by quantity, or in words what is wrong; whatever comes in, an answer comes out."""
+"""What a message says: where it begins and ends, its values by quantity, or in words what is wrong with it."""
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from math import isclose
+from functools import cache
+from math import isclose, isfinite
+from types import MappingProxyType
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.sentences import unit_of
-from cmm_uq.base.messages import Text, Verbatim, say, semicolons
-from cmm_uq.laboratory.live.instruments.control_codes import bytes_of, shown
-from cmm_uq.laboratory.live.instruments.framing import Framed, Framer
-from cmm_uq.laboratory.live.instruments.profile import Example, Parse, ProfileFile, Quantity
-from cmm_uq.laboratory.live.instruments.quantities import NoValueError, conversion, number_of, value_of
+from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
+from cmm_uq.base.units import pint_units
+from cmm_uq.laboratory.live.instruments.profile import (
+    Example,
+    MessageFrame,
+    Parse,
+    ProfileFile,
+    ProfileQuantity,
+    bytes_of,
+    shown,
+)
+
+
+@dataclass(frozen=True)
+class FramedMessage:
+    """Bytes that belong together.
+
+    ``body``: without terminator, first and last byte; ``whole``: whether it is a message; else bytes between
+    messages, or a message without its end.
+    """
+
+    raw: bytes
+    body: bytes
+    whole: bool = True
+
+
+class Framer:
+    """Messages out of a stream of bytes; no byte is lost, none is in two messages."""
+
+    def __init__(self, frame: MessageFrame) -> None:
+        self._terminator, self._start, self._stop = map(bytes_of, (frame.terminator, frame.start, frame.stop))
+        self._length, self._longest = frame.length, frame.longest
+        self._waiting = bytearray()
+        self._looked = 0
+
+    def feed(self, received: bytes) -> list[FramedMessage]:
+        """Messages that are complete with these bytes."""
+        self._waiting += received
+        found = []
+        while (one := self._next()) is not None:
+            found.append(one)
+        return found
+
+    def rest(self) -> FramedMessage | None:
+        """What waits for its end and will not get it; afterwards nothing waits."""
+        raw, self._waiting, self._looked = bytes(self._waiting), bytearray(), 0
+        return FramedMessage(raw, raw, whole=False) if raw else None
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a message has begun."""
+        return bool(self._waiting)
+
+    def _next(self) -> FramedMessage | None:
+        if self._start:
+            place = self._waiting.find(self._start)
+            if place:
+                before = len(self._waiting) if place < 0 else place
+                return self._taken(min(before, self._longest)) if place > 0 or before >= self._longest else None
+        size = self._size()
+        if size is None:
+            return self._taken(self._longest) if len(self._waiting) >= self._longest else None
+        if size > self._longest:
+            return self._taken(self._longest)
+        raw = bytes(self._waiting[:size])
+        del self._waiting[:size]
+        self._looked = 0
+        return FramedMessage(raw, raw[len(self._start) : len(raw) - len(self._terminator or self._stop)])
+
+    def _size(self) -> int | None:
+        """Bytes of the message that waits; ``None`` where its end has not come."""
+        if self._length:
+            return self._length if len(self._waiting) >= self._length else None
+        end = self._terminator or self._stop
+        place = self._waiting.find(end, max(self._looked, len(self._start)))
+        if place < 0:
+            # What was looked at once need not be looked at again, but an end may have begun in its last bytes.
+            self._looked = max(0, len(self._waiting) - len(end) + 1)
+            return None
+        return place + len(end)
+
+    def _taken(self, size: int) -> FramedMessage:
+        """Bytes that are no message."""
+        raw = bytes(self._waiting[:size])
+        del self._waiting[:size]
+        self._looked = 0
+        return FramedMessage(raw, raw, whole=False)
+
+
+_PINT: Mapping[str, str] = MappingProxyType({
+    "K/h": "kelvin/hour", "1/K": "1/kelvin", "µm/m": "micrometer/meter", "mm/s": "millimeter/second", "″": "arcsecond",
+    "µm": "micrometer", "°": "degree", "°C": "degC", "K": "kelvin", "h": "hour", "%": "percent",
+})  # fmt: skip
+"""Units of the ends of names as pint spells them, where it does otherwise."""
+
+
+class NoValueError(Exception):
+    """A number that is none; what is wrong with it, in words."""
+
+    def __init__(self, why: Text) -> None:
+        self.why = why
+        super().__init__(why)
+
+
+def number_of(text: str, decimal: str) -> float:
+    """A number in a message; blanks between sign and digits are passed over."""
+    plain = "".join(text.split())
+    if decimal == ",":
+        plain = plain.replace(".", "?").replace(",", ".")  # a point would be one of thousands, or of another setting
+    try:
+        return float(plain.replace("_", "?"))  # which Python allows between digits
+    except ValueError:
+        raise NoValueError(say("{text} is no number", text=Verbatim(repr(text)))) from None
+
+
+def value_of(name: str, raw: float, quantity: ProfileQuantity, said: str = "") -> float:
+    """The value of a quantity."""
+    unit = quantity.units.get(said) if quantity.unit_group else quantity.unit
+    if unit is None:
+        raise NoValueError(say("{name} comes in {unit}, which the profile does not know", name=Verbatim(name),
+                               unit=Verbatim(repr(said))))  # fmt: skip
+    found = conversion(unit, unit_of(name))(raw * quantity.factor)
+    if not isfinite(found):
+        raise NoValueError(say("{name} is {found}", name=Verbatim(name), found=number(found, "g")))
+    if quantity.range is not None and not quantity.range[0] <= found <= quantity.range[1]:
+        raise NoValueError(
+            say("{name} is {found}, outside {low} to {high}", name=Verbatim(name), found=number(found, "g"),
+                low=number(quantity.range[0], "g"), high=number(quantity.range[1], "g"))
+        )  # fmt: skip
+    return found
+
+
+@cache
+def conversion(given: str, wanted: str) -> Callable[[float], float]:
+    """From one unit into another.
+
+    ``given``: as pint spells it; empty where it is the wanted one; ``wanted``: as printed; empty for a quantity whose
+    name has none.
+    """
+    target = _PINT.get(wanted, wanted)
+    if given in ("", target):
+        return float
+    import pint
+
+    registry = pint_units()
+    try:
+        registry.Quantity(1.0, given).to(target)
+    except (pint.PintError, ValueError, TypeError, AttributeError, SyntaxError) as error:
+        fix = f"Give a unit that can be {wanted}" if wanted else "End the quantity's name with its unit: temp_c, x_mm"
+        raise CmmUqError(f"the unit {given!r} cannot be used: {error}", fix=fix) from None
+    return lambda value: float(registry.Quantity(value, given).to(target).magnitude)
+
 
 _SHOWN = 60
 """Bytes of a message that was not understood, as messages show them."""
 
-_PLAIN = Quantity()
+_PLAIN = ProfileQuantity()
 _NOTHING = Parse(pattern="(?!)")
 """Understands nothing."""
 
@@ -28,11 +177,8 @@ _NOTHING = Parse(pattern="(?!)")
 class Understood:
     """What a message says.
 
-    Parameters
-    ----------
-    values : by quantity; empty where it says none.
-    status : what is wrong; ``None``: nothing.
-    answers : whether it is an answer: it has values, or says that something is wrong with the instrument.
+    ``values``: by quantity; empty where it says none; ``status``: what is wrong; ``None``: nothing; ``answers``:
+    whether it is an answer: it has values, or says that something is wrong with the instrument.
     """
 
     values: Mapping[str, float] = field(default_factory=dict)
@@ -41,12 +187,7 @@ class Understood:
 
 
 class Parser:
-    """The messages of one instrument.
-
-    Parameters
-    ----------
-    profile : of the instrument.
-    """
+    """The messages of one instrument."""
 
     def __init__(self, profile: ProfileFile) -> None:
         self._profile, self._parse = profile, profile.parse or _NOTHING
@@ -56,14 +197,8 @@ class Parser:
         texts = [poll.pattern or usual for poll in polls] or [usual]
         self._patterns = [None if text is None else re.compile(text) for text in texts]
 
-    def read(self, message: Framed, answers: int = 0) -> Understood:
-        """What it says.
-
-        Parameters
-        ----------
-        message : as framed.
-        answers : which question was asked.
-        """
+    def read(self, message: FramedMessage, answers: int = 0) -> Understood:
+        """What it says."""
         text = message.body.decode("latin-1")
         if any(pattern.fullmatch(text) for pattern in self._ignored):
             return Understood()
@@ -91,12 +226,7 @@ class Parser:
         return Understood(values, semicolons(wrong) if wrong else None, answers=bool(values))
 
     def _numbers(self, body: bytes, text: str, answers: int) -> Iterator[tuple[str, str | float, str]]:
-        """Name, number as sent and unit as said of each quantity of a message.
-
-        Raises
-        ------
-        NoValueError : the message is another.
-        """
+        """Name, number as sent and unit as said of each quantity of a message."""
         if self._parse.struct is not None:
             yield from self._binary(body, self._parse.struct)
         elif self._parse.separator is not None:
@@ -143,17 +273,7 @@ def _seen(raw: bytes) -> Text:
 
 
 def check_profile(profile: ProfileFile, where: str) -> None:
-    """Refuse a profile that contradicts itself, or reads its own examples otherwise than they say.
-
-    Parameters
-    ----------
-    profile : as read.
-    where : its file.
-
-    Raises
-    ------
-    CmmUqError : with what was seen and what was expected.
-    """
+    """Refuse a profile that contradicts itself, or reads its own examples otherwise than they say."""
     if profile.protocol == "ipp":
         return
     if profile.parse is None:

@@ -1,4 +1,9 @@
-"""Ports: serial lines, plain TCP, RFC 2217 device servers and files, all read alike and lost alike."""
+"""Ports: serial lines, plain TCP, RFC 2217 device servers, VISA and files, all read alike and lost alike.
+
+Instruments that speak only GPIB or USB-TMC, by pyvisa, which is installed with ``cmm-uq[visa]``.
+
+Nothing is read before something was asked: many instruments take a reading without a question for an error.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +12,69 @@ import errno
 import os
 import re
 import socket
+import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
+from urllib.parse import parse_qs
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.port import TICK_S, Port, PortLostError
+from cmm_uq.base.files.content import check_file
 from cmm_uq.laboratory.live.instruments.profile import Connection
-from cmm_uq.laboratory.live.instruments.visa_port import VisaPort
+from cmm_uq.laboratory.live.instruments.source import TICK_S, Clock, Port, PortLostError
 
 if TYPE_CHECKING:
     import serial
+
+SCHEME = "visa://"
+"""Begins the name of a port that VISA knows: ``visa://GPIB0::17::INSTR``."""
+
+
+class VisaPort:
+    """An instrument by VISA."""
+
+    def __init__(self, port: str, library: str = "") -> None:
+        try:
+            import pyvisa
+        except ImportError:
+            raise CmmUqError("needs pyvisa, which is not installed", where=port,
+                             fix='Install it: pip install "cmm-uq[visa]"') from None  # fmt: skip
+        self._failures = (pyvisa.errors.VisaIOError, pyvisa.errors.InvalidSession, OSError, ValueError)
+        self._timed_out = pyvisa.constants.StatusCode.error_timeout
+        self._asked = False
+        try:
+            self._visa: Any = pyvisa.ResourceManager(library).open_resource(
+                port.removeprefix(SCHEME), timeout=TICK_S * 1e3
+            )
+        except self._failures as error:
+            raise CmmUqError(f"cannot be opened: {error}", where=port,
+                             fix="Check address and cable; pyvisa-info says which VISA is there") from None  # fmt: skip
+
+    def read(self) -> bytes:
+        if not self._asked:
+            time.sleep(TICK_S)
+            return b""
+        try:
+            received = bytes(self._visa.read_raw())
+        except self._failures as error:
+            if getattr(error, "error_code", None) == self._timed_out:
+                return b""
+            raise PortLostError(str(error)) from None
+        self._asked = False
+        return received
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._visa.write_raw(data)
+        except self._failures as error:
+            raise PortLostError(str(error)) from None
+        self._asked = self._asked or b"?" in data
+
+    def close(self) -> None:
+        with contextlib.suppress(*self._failures):
+            self._visa.close()
+
 
 FILE = "file:"
 NETWORK = ("tcp://", "socket://")
@@ -35,23 +91,12 @@ _CHUNK = 65536
 _ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
 
 
-Opened = Callable[[], Port]
+PortOpener = Callable[[], Port]
 """Opens a port, again and again."""
 
 
-def opener(port: str, connection: Connection, *, tcp_port: int | None = None) -> Opened:
-    """How a port is opened.
-
-    Parameters
-    ----------
-    port : as a job names it.
-    connection : settings of a serial line.
-    tcp_port : the usual one, for an address without.
-
-    Raises
-    ------
-    CmmUqError : the name is none of a port.
-    """
+def opener(port: str, connection: Connection, *, tcp_port: int | None = None) -> PortOpener:
+    """How a port is opened."""
     if port.startswith("visa://"):
         return lambda: VisaPort(port)
     if "://" not in port:
@@ -98,7 +143,6 @@ class SerialPort:
             raise _refused(port, error) from None
 
     def read(self) -> bytes:
-        """See :meth:`Port.read`."""
         try:
             first: bytes = self._serial.read(1)
             return first + (self._serial.read(waiting) if first and (waiting := self._serial.in_waiting) else b"")
@@ -106,14 +150,12 @@ class SerialPort:
             raise PortLostError(str(error)) from None
 
     def write(self, data: bytes) -> None:
-        """See :meth:`Port.write`."""
         try:
             self._serial.write(data)
         except self._failures as error:
             raise PortLostError(str(error)) from None
 
     def close(self) -> None:
-        """See :meth:`Port.close`."""
         with contextlib.suppress(*self._failures):
             self._serial.close()
 
@@ -133,7 +175,6 @@ class TcpPort:
                 self._socket.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
     def read(self) -> bytes:
-        """See :meth:`Port.read`."""
         try:
             self._socket.settimeout(TICK_S)
             received = self._socket.recv(_CHUNK)
@@ -146,7 +187,6 @@ class TcpPort:
         return received
 
     def write(self, data: bytes) -> None:
-        """See :meth:`Port.write`."""
         try:
             self._socket.settimeout(CONNECT_WITHIN_S)
             self._socket.sendall(data)
@@ -154,7 +194,6 @@ class TcpPort:
             raise PortLostError(error.strerror or str(error)) from None
 
     def close(self) -> None:
-        """See :meth:`Port.close`."""
         self._socket.close()
 
 
@@ -199,3 +238,49 @@ def serial_ports() -> list[tuple[str, str]]:
 def file_named(port: str, folder: Path) -> Path:
     """File of a port that replays one."""
     return folder / port.removeprefix(FILE).partition("?")[0]
+
+
+_CHUNK_of_replay = 4096
+
+
+class EndOfFileError(PortLostError):
+    """The file has been replayed."""
+
+
+class ReplayedFile:
+    """A file as a port; what is written to it goes nowhere.
+
+    ``port``: ``file:NAME``, with ``?every_s=S`` where each line is to take that time; ``folder``: in which the file
+    lies.
+    """
+
+    def __init__(self, port: str, folder: Path, clock: Clock) -> None:
+        path = file_named(port, folder)
+        check_file(path, "Name a file of received bytes: file:NAME")
+        self._every_s, self._clock = _pace(port), clock
+        self._file = path.open("rb")
+
+    def read(self) -> bytes:
+        received = self._file.readline(_CHUNK_of_replay) if self._every_s else self._file.read(_CHUNK_of_replay)
+        if not received:
+            raise EndOfFileError("the file is at its end")
+        if self._every_s:
+            self._clock.sleep(self._every_s)
+        return received
+
+    def write(self, data: bytes) -> None: ...
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _pace(port: str) -> float:
+    given = parse_qs(port.removeprefix(FILE).partition("?")[2])
+    try:
+        (text,) = given.pop("every_s", ["0"])
+        found = float(text)
+        if given or not 0 <= found < 1e6:
+            raise ValueError
+    except ValueError:
+        raise CmmUqError("says no pace", where=port, fix="Write it as file:NAME?every_s=0.1") from None
+    return found

@@ -8,8 +8,48 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from cmm_uq.base.errors import printable
 from cmm_uq.base.files.table import AnyFloat, Column, Table
-from cmm_uq.laboratory.live.instruments.control_codes import bytes_of
+
+NAMES = (
+    "NUL", "SOH", "STX", "ETX", "EOT", "ENQ", "ACK", "BEL", "BS", "HT", "LF", "VT", "FF", "CR", "SO", "SI", "DLE",
+    "DC1", "DC2", "DC3", "DC4", "NAK", "SYN", "ETB", "CAN", "EM", "SUB", "ESC", "FS", "GS", "RS", "US",
+)  # fmt: skip
+"""Of the characters 0 to 31 (ISO/IEC 646)."""
+
+_CODES = {name: bytes([code]) for code, name in enumerate(NAMES)} | {"DEL": b"\x7f"}
+_WRITTEN = re.compile(r"<(?:([A-Z]{2,3}\d?)|0x([0-9A-Fa-f]{2}))>")
+
+
+def bytes_of(text: str) -> bytes:
+    """The bytes that are meant; what stands in angle brackets and is no name is taken as it is written."""
+    found, place = b"", 0
+    for written in _WRITTEN.finditer(text):
+        code = bytes.fromhex(written[2]) if written[2] else _CODES.get(written[1], written[0].encode())
+        found += _plain(text[place : written.start()]) + code
+        place = written.end()
+    return found + _plain(text[place:])
+
+
+def shown(data: bytes) -> str:
+    """Bytes as :func:`bytes_of` reads them again, on one line that a terminal shows."""
+    return "".join(_shown(byte) for byte in data)
+
+
+def _shown(byte: int) -> str:
+    if byte < len(NAMES):
+        return f"<{NAMES[byte]}>"
+    if byte == 0x7F:
+        return "<DEL>"
+    return printable(chr(byte)) if byte < 0x80 else f"<0x{byte:02X}>"
+
+
+def _plain(text: str) -> bytes:
+    try:
+        return text.encode("latin-1")
+    except UnicodeEncodeError as error:
+        raise ValueError(f"{text[error.start]!r} is no single byte: write each byte as <0x41>") from None
+
 
 MOST_FIELDS = 200
 """Of a message."""
@@ -58,7 +98,7 @@ class Connection(Table):
     """Whether the line RTS is on."""
 
 
-class Frame(Table):
+class MessageFrame(Table):
     """``[frame]``: where a message begins and ends: a terminator; or a length; or a first byte with a last one or a length."""
 
     terminator: Bytes = ""
@@ -147,7 +187,7 @@ class Parse(Table):
             raise ValueError(f"struct has {count} fields, and fields names {len(self.fields)}")
 
 
-class Quantity(Table):
+class ProfileQuantity(Table):
     """``[quantities.NAME]``: what is to be known of one quantity beside its name."""
 
     unit: Unit = ""
@@ -193,7 +233,7 @@ class Example(Table):
     """Which question it answers, counted from 0."""
 
 
-class Facts(Table):
+class ProfileFacts(Table):
     """``[facts]``: whence all this is known."""
 
     sources: Annotated[list[str], Field(max_length=50)] = []
@@ -230,13 +270,13 @@ class ProfileFile(Table):
     """Messages as the tables below say, or a CMM's I++ DME server."""
     connection: Connection = Connection()
     """The serial line."""
-    frame: Frame = Frame(terminator="<CR><LF>")
+    frame: MessageFrame = MessageFrame(terminator="<CR><LF>")
     """Where a message begins and ends."""
     send: Send = Send()
     """What the instrument is sent."""
     parse: Parse | None = None
     """What a message says."""
-    quantities: Annotated[dict[Column, Quantity], Field(max_length=MOST_FIELDS)] = {}
+    quantities: Annotated[dict[Column, ProfileQuantity], Field(max_length=MOST_FIELDS)] = {}
     """What is to be known of a quantity beside its name."""
     ill: Annotated[list[Ill], Field(max_length=100)] = []
     """What the instrument says when something is wrong."""
@@ -246,7 +286,7 @@ class ProfileFile(Table):
     """What a CMM's I++ DME server is asked for."""
     example: Annotated[list[Example], Field(max_length=100)] = []
     """Messages with what they say."""
-    facts: Facts = Facts()
+    facts: ProfileFacts = ProfileFacts()
     """Whence all this is known."""
 
     def named(self) -> set[str]:

@@ -1,15 +1,36 @@
-"""What a live source is: an instrument that says who it is, what it reads, and when it was lost and came back."""
+"""What a live source is: its port, its readings by two clocks, and when it was lost and came back."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 from cmm_uq.base.messages import Text
-from cmm_uq.laboratory.live.instruments.reading import Reading
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One message of an instrument, as received and as understood.
+
+    ``source``: the name in the job, unique; ``number``: counts the messages of this source since it was opened, from
+    1; ``utc_ns``: wall clock when its last byte arrived, ns since 1970; ``monotonic_ns``: monotonic clock at the same
+    moment, ns; ``raw``: bytes as received, framing included; ``values``: by the quantity's name with its unit,
+    ``{"temp_c": 20.01}``; empty where the message was not understood; ``status``: what the instrument says is wrong
+    with it, or what is wrong with the message; ``None``: sound; ``point``: for a CMM what was measured (``PtMeas``),
+    else ``None``.
+    """
+
+    source: str
+    number: int
+    utc_ns: int
+    monotonic_ns: int
+    raw: bytes
+    values: Mapping[str, float]
+    status: Text | None = None
+    point: str | None = None
 
 
 @dataclass(frozen=True)
@@ -26,14 +47,7 @@ class Identity:
 
 @dataclass(frozen=True)
 class Gap:
-    """A source went silent or was lost.
-
-    Parameters
-    ----------
-    source : its name.
-    utc_ns, monotonic_ns : when that was noticed.
-    why : in words.
-    """
+    """A source went silent or was lost."""
 
     source: str
     utc_ns: int
@@ -43,14 +57,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class Returned:
-    """A source that was lost is there again.
-
-    Parameters
-    ----------
-    source : its name.
-    utc_ns, monotonic_ns : when that was noticed.
-    after_s : since the gap was noticed.
-    """
+    """A source that was lost is there again."""
 
     source: str
     utc_ns: int
@@ -61,7 +68,7 @@ class Returned:
 Event = Reading | Gap | Returned
 
 
-class Source(Protocol):
+class LiveSource(Protocol):
     """An instrument, live."""
 
     name: str
@@ -78,9 +85,7 @@ class Source(Protocol):
         """
         ...
 
-    def close(self) -> None:
-        """Give the port back."""
-        ...
+    def close(self) -> None: ...
 
 
 class Clock(Protocol):
@@ -94,25 +99,42 @@ class Clock(Protocol):
         """A clock that nobody sets, ns."""
         ...
 
-    def sleep(self, s: float) -> None:
-        """Wait."""
-        ...
+    def sleep(self, s: float) -> None: ...
 
 
 class SystemClock:
     """The system's clocks."""
 
     def utc_ns(self) -> int:
-        """See :meth:`Clock.utc_ns`."""
         return time.time_ns()
 
     def monotonic_ns(self) -> int:
-        """See :meth:`Clock.monotonic_ns`."""
         return time.monotonic_ns()
 
     def sleep(self, s: float) -> None:
-        """See :meth:`Clock.sleep`."""
         time.sleep(s)
 
 
 SYSTEM: Clock = SystemClock()
+
+
+TICK_S = 0.05
+"""Longest wait for bytes; whoever waits longer looks at the clock in between."""
+
+
+class PortLostError(Exception):
+    """The port is gone: unplugged, closed by the other side, or switched off."""
+
+
+class Port(Protocol):
+    """An open port."""
+
+    def read(self) -> bytes:
+        """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send."""
+        ...
+
+    def close(self) -> None: ...

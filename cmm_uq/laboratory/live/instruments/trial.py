@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.control_codes import shown
-from cmm_uq.laboratory.live.instruments.profile import ProfileFile
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Event, Returned
+from cmm_uq.laboratory.live.instruments.profile import ProfileFile, shown
+from cmm_uq.laboratory.live.instruments.source import Event, Reading, Returned
 
 _SAYS = ("the instrument says", "the machine says")
 """How words of the instrument begin."""
@@ -29,13 +27,7 @@ def beside(event: Event) -> tuple[str, str]:
 
 @dataclass
 class Trial:
-    """What came of an instrument, counted.
-
-    Parameters
-    ----------
-    profile : by which it was read.
-    port : at which it was.
-    """
+    """What came of an instrument, counted."""
 
     profile: ProfileFile
     port: str
@@ -50,7 +42,6 @@ class Trial:
     """The last that was wrong."""
 
     def take(self, event: Event) -> None:
-        """Count an event."""
         if not isinstance(event, Reading):
             return
         self.messages += 1
@@ -64,12 +55,7 @@ class Trial:
             self.received = event.raw
 
     def conclude(self) -> None:
-        """Refuse an instrument that gave no value, with what was seen, what was expected and what to check.
-
-        Raises
-        ------
-        CmmUqError : it gave none.
-        """
+        """Refuse an instrument that gave no value, with what was seen, what was expected and what to check."""
         if self.with_values or (self.profile.protocol == "ipp" and not self.wrong):
             return
         expected = next((one.received for one in self.profile.example if one.values), "")

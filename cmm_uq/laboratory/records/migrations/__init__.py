@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmm_uq.laboratory.records.opening import KNOWN, REVISION, check_revision, engine_of, state_of
-from cmm_uq.laboratory.records.refusals import told
+from cmm_uq.laboratory.records.place import told
 
 if TYPE_CHECKING:
     from alembic.config import Config
@@ -22,19 +22,7 @@ if TYPE_CHECKING:
 def migrate(place: str | Path, *, to: str = REVISION) -> tuple[str, str]:
     """Bring records to a revision.
 
-    Parameters
-    ----------
-    place : file or URL.
-    to : revision.
-
-    Returns
-    -------
-    revision before, and after.
-
-    Raises
-    ------
-    CmmUqError : they are of a newer version, or no records.
-    OutputError : they cannot be written to.
+    Gives revision before, and after.
     """
     engine = engine_of(place)
     try:

@@ -9,11 +9,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
+from cmm_uq.laboratory.live.instruments.instrument import instrument
 from cmm_uq.laboratory.live.instruments.library import profile_named
-from cmm_uq.laboratory.live.instruments.opening import instrument
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import SYSTEM, Event, Gap, Identity, Returned, Source
+from cmm_uq.laboratory.live.instruments.source import SYSTEM, Event, Gap, Identity, LiveSource, Reading, Returned
 
 PATIENCE_S = 30.0
 """Until a test gives up waiting, on a busy machine."""
@@ -22,7 +21,7 @@ PATIENCE_S = 30.0
 class Listener:
     """Takes every event of a source in a thread of its own, with the time at which it was given."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: LiveSource) -> None:
         self.source, self.events, self.times = source, [], []
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._listen, daemon=True)
@@ -57,7 +56,7 @@ class Listener:
 
 
 @contextmanager
-def listening(source: Source) -> Iterator[Listener]:
+def listening(source: LiveSource) -> Iterator[Listener]:
     listener = Listener(source)
     try:
         yield listener
@@ -72,7 +71,7 @@ def hasty(name: str, **send: object) -> ProfileFile:
     return profile.model_copy(update={"send": faster})
 
 
-def opened(profile: ProfileFile, port: str, name: str = "a", serial: str | None = None) -> Source:
+def opened(profile: ProfileFile, port: str, name: str = "a", serial: str | None = None) -> LiveSource:
     return instrument(Identity(name, serial=serial), profile, port, SYSTEM, Path())
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.laboratory.live.instruments.control_codes import bytes_of, shown
+from cmm_uq.laboratory.live.instruments.profile import bytes_of, shown
 
 
 def test_names_are_those_of_iso_646() -> None:

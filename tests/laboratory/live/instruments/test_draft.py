@@ -9,15 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.draft import Drafted, drafted, numbers_in
-from cmm_uq.laboratory.live.instruments.framing import Framer
-from cmm_uq.laboratory.live.instruments.library import profile_of
-from cmm_uq.laboratory.live.instruments.parsing import Parser
+from cmm_uq.laboratory.live.instruments.library import ProfileDraft, drafted, numbers_in, profile_of
+from cmm_uq.laboratory.live.instruments.parsing import Framer, Parser
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 
 
 def profile(line: str, quantities: dict[int, str], **keys: object) -> ProfileFile:
-    wanted = Drafted("a", "A", line, quantities, keys.pop("ranges", {}), **keys)  # type: ignore[arg-type]
+    wanted = ProfileDraft("a", "A", line, quantities, keys.pop("ranges", {}), **keys)  # type: ignore[arg-type]
     return profile_of(drafted(wanted), Path("a.toml"))
 
 
@@ -42,7 +40,7 @@ def test_it_holds_how_the_line_is_set_and_what_is_asked() -> None:
     ("name", "plain"), [("My gauge", "my-gauge"), ("a.b", "a.b"), ("Größe", "gr-e"), ("---", "instrument")]
 )
 def test_it_has_a_plain_name_whatever_its_file_is_called(name: str, plain: str) -> None:
-    made = profile_of(drafted(Drafted(name, "A", "1<CR>", {1: "x_mm"}, {})), Path("a.toml"))
+    made = profile_of(drafted(ProfileDraft(name, "A", "1<CR>", {1: "x_mm"}, {})), Path("a.toml"))
     assert made.name == plain
 
 

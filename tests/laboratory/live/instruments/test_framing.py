@@ -8,17 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.laboratory.live.instruments.framing import Framer
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
-from cmm_uq.laboratory.live.instruments.parsing import Parser
-from cmm_uq.laboratory.live.instruments.profile import Frame
+from cmm_uq.laboratory.live.instruments.parsing import Framer, Parser
+from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 
 FRAMES = [
-    Frame(terminator="<CR><LF>", longest=12),
-    Frame(terminator="<CR>"),
-    Frame(start="<STX>", stop="<ETX>", longest=9),
-    Frame(start="<0xAA>", length=5, longest=7),
-    Frame(length=3),
+    MessageFrame(terminator="<CR><LF>", longest=12),
+    MessageFrame(terminator="<CR>"),
+    MessageFrame(start="<STX>", stop="<ETX>", longest=9),
+    MessageFrame(start="<0xAA>", length=5, longest=7),
+    MessageFrame(length=3),
 ]
 BYTES = st.lists(st.sampled_from([b"\r", b"\n", b"\x02", b"\x03", b"\xaa", b"1", b"T=2", b"\r\n"]), max_size=40).map(
     b"".join
@@ -33,7 +32,7 @@ def pieces(data: bytes, cuts: list[int]) -> list[bytes]:
 
 @pytest.mark.parametrize("frame", FRAMES, ids=range(len(FRAMES)))
 @given(data=BYTES, cuts=CUTS)
-def test_messages_do_not_depend_on_how_the_bytes_came(frame: Frame, data: bytes, cuts: list[int]) -> None:
+def test_messages_do_not_depend_on_how_the_bytes_came(frame: MessageFrame, data: bytes, cuts: list[int]) -> None:
     at_once, in_parts = Framer(frame), Framer(frame)
     whole = at_once.feed(data)
     assert [one for part in pieces(data, cuts) for one in in_parts.feed(part)] == whole
@@ -42,7 +41,7 @@ def test_messages_do_not_depend_on_how_the_bytes_came(frame: Frame, data: bytes,
 
 @pytest.mark.parametrize("frame", FRAMES, ids=range(len(FRAMES)))
 @given(data=BYTES)
-def test_every_byte_is_in_one_message_in_its_place(frame: Frame, data: bytes) -> None:
+def test_every_byte_is_in_one_message_in_its_place(frame: MessageFrame, data: bytes) -> None:
     framer = Framer(frame)
     rests = [one.raw for one in framer.feed(data)] + [rest.raw for rest in [framer.rest()] if rest]
     assert b"".join(rests) == data

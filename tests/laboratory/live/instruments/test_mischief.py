@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.simulated.line import SimulatedLine, Way, simulated
-from cmm_uq.laboratory.live.instruments.simulated.speakers import SPEAKERS, Readout1502, Speaker, Thermocouples
-from cmm_uq.laboratory.live.instruments.source import Gap, Returned
+from cmm_uq.laboratory.live.instruments.simulated_line import SimulatedLine, Way, simulated
+from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
+from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS, Readout1502, Speaker, Thermocouples
 from tests.laboratory.live.instruments.listening import Listener, hasty, listening, opened
 
 WITHIN_S = 2.0

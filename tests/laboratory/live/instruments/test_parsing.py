@@ -8,16 +8,15 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.framing import Framed
 from cmm_uq.laboratory.live.instruments.library import profile_named, profile_of, ready
-from cmm_uq.laboratory.live.instruments.parsing import Parser, Understood
+from cmm_uq.laboratory.live.instruments.parsing import FramedMessage, Parser, Understood
 
 ONE = "[parse]\npattern = '(?P<x_mm>1)'\n"
 HEAD = 'name = "a"\ntitle = "A"\n'
 
 
 def read(profile: str, body: bytes, answers: int = 0) -> Understood:
-    return Parser(profile_of((HEAD + profile).encode(), Path("a.toml"))).read(Framed(body, body), answers)
+    return Parser(profile_of((HEAD + profile).encode(), Path("a.toml"))).read(FramedMessage(body, body), answers)
 
 
 @pytest.mark.parametrize(
@@ -111,7 +110,7 @@ def test_a_ready_profile_reads_its_examples_and_says_whence_it_is_known(name: st
     ("heidenhain-nd287", b"\x02-123456789\r\n", "not understood"),
 ])  # fmt: skip
 def test_what_an_instrument_says_when_ill_is_no_value(name: str, raw: bytes, told: str) -> None:
-    found = Parser(profile_named(name)).read(Framed(raw, raw.rstrip(b"\r\n")))
+    found = Parser(profile_named(name)).read(FramedMessage(raw, raw.rstrip(b"\r\n")))
     assert not found.values
     assert told in str(found.status)
 
@@ -119,4 +118,4 @@ def test_what_an_instrument_says_when_ill_is_no_value(name: str, raw: bytes, tol
 @pytest.mark.parametrize(("raw", "answers"), [(b"ERR3", True), (b"+0001.000", True), (b"hello", False), (b"", False)])
 def test_an_instrument_that_says_that_it_is_ill_has_answered(raw: bytes, answers: bool) -> None:
     """So its silence is no gap; noise is no answer."""
-    assert Parser(profile_named("sylvac-rs232")).read(Framed(raw, raw)).answers is answers
+    assert Parser(profile_named("sylvac-rs232")).read(FramedMessage(raw, raw)).answers is answers

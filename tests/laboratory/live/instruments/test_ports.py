@@ -16,8 +16,8 @@ from cmm_uq.laboratory.live.instruments import ports
 from cmm_uq.laboratory.live.instruments.library import profile_named
 from cmm_uq.laboratory.live.instruments.ports import opener, serial_ports
 from cmm_uq.laboratory.live.instruments.profile import Connection
-from cmm_uq.laboratory.live.instruments.simulated.line import simulated
-from cmm_uq.laboratory.live.instruments.simulated.speakers import Lines
+from cmm_uq.laboratory.live.instruments.simulated_line import simulated
+from cmm_uq.laboratory.live.instruments.speakers import Lines
 from tests.laboratory.live.instruments.listening import opened
 
 here = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals here")

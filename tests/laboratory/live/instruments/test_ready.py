@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.simulated.line import Way, simulated
-from cmm_uq.laboratory.live.instruments.simulated.speakers import SPEAKERS
+from cmm_uq.laboratory.live.instruments.simulated_line import Way, simulated
+from cmm_uq.laboratory.live.instruments.source import Reading
+from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 from tests.laboratory.live.instruments.listening import hasty, listening, opened
 
 WAYS: list[Way] = ["pty", "socket", "rfc2217"]

@@ -9,9 +9,8 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.acquire import DeclaredSource
-from cmm_uq.laboratory.live.instruments.opening import open_source
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Gap
+from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.source import Gap, Reading
 
 
 class FastClock:

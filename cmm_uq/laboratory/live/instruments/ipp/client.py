@@ -8,16 +8,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.live.instruments.ipp.line import BadLineError, Term, arguments_of, number_text, terms_of
-from cmm_uq.laboratory.live.instruments.ipp.transaction import (
+from cmm_uq.laboratory.live.instruments.ipp.protocol import (
     ANSWER_WITHIN_S,
+    BadLineError,
     FaultError,
-    Heard,
+    HeardLine,
     NoAnswerError,
+    Term,
     Transactions,
+    arguments_of,
+    number_text,
+    terms_of,
 )
-from cmm_uq.laboratory.live.instruments.port import Port
-from cmm_uq.laboratory.live.instruments.source import Clock
+from cmm_uq.laboratory.live.instruments.source import Clock, Port
 
 MOVED_WITHIN_S = 300.0
 """Time for what moves it."""
@@ -86,7 +89,7 @@ class Client(Transactions):
 
     # --- positions ------------------------------------------------------------
 
-    def get(self, *names: str) -> Heard:
+    def get(self, *names: str) -> HeardLine:
         """Ask for what the names say now, ``X``, ``Y``, ``Z`` where none is given."""
         (answer,) = self.call(f"Get({_empty(names or 'XYZ')})")
         return answer
@@ -147,7 +150,7 @@ class Client(Transactions):
 
     # --- what moves the machine ------------------------------------------------------------
 
-    def pt_meas(self, position: Position, normal: Position | None = None) -> Heard:
+    def pt_meas(self, position: Position, normal: Position | None = None) -> HeardLine:
         """Measure a point: the machine moves.
 
         Parameters
@@ -173,7 +176,7 @@ class Client(Transactions):
         """Change the tool: the machine may move; see :meth:`pt_meas`."""
         self._moving(f"ChangeTool({_quoted(name)})")
 
-    def _moving(self, command: str) -> list[Heard]:
+    def _moving(self, command: str) -> list[HeardLine]:
         if self._confirm is None:
             raise CmmUqError(
                 f"{command} moves the machine, which was not allowed", fix="Allow it and confirm each move"
@@ -182,7 +185,7 @@ class Client(Transactions):
             raise CmmUqError(f"{command} was not confirmed: the machine was not moved")
         return self.call(command, within_s=MOVED_WITHIN_S)
 
-    def _known(self, command: str) -> list[Heard] | None:
+    def _known(self, command: str) -> list[HeardLine] | None:
         """Answer to what older servers may not know; ``None`` where this one does not, and goes on."""
         try:
             return self.call(command)
@@ -203,17 +206,12 @@ def _quoted(name: str) -> str:
     return f'"{name}"'
 
 
-def _rest(heard: Heard) -> str:
+def _rest(heard: HeardLine) -> str:
     return heard.response.rest if heard.response else ""
 
 
-def _arguments(heard: Heard, name: str) -> tuple[float | str | Term, ...]:
-    """What a term of an answer holds, at least one thing.
-
-    Raises
-    ------
-    NoAnswerError : the answer is another.
-    """
+def _arguments(heard: HeardLine, name: str) -> tuple[float | str | Term, ...]:
+    """What a term of an answer holds, at least one thing."""
     try:
         found = terms_of(_rest(heard)).get(name, ())
     except BadLineError:

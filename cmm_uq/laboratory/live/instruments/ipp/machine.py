@@ -9,16 +9,24 @@ from dataclasses import replace
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.laboratory.live.instruments.control_codes import shown
 from cmm_uq.laboratory.live.instruments.conversation import SECOND
 from cmm_uq.laboratory.live.instruments.ipp.client import Client
-from cmm_uq.laboratory.live.instruments.ipp.line import DATA, ERROR, BadLineError, Term, arguments_of, by_name, fault_of
-from cmm_uq.laboratory.live.instruments.ipp.transaction import ANSWER_WITHIN_S, FaultError, Heard, NoAnswerError
-from cmm_uq.laboratory.live.instruments.port import PortLostError
-from cmm_uq.laboratory.live.instruments.ports import NETWORK, Opened, opener
-from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, Returned
+from cmm_uq.laboratory.live.instruments.ipp.protocol import (
+    ANSWER_WITHIN_S,
+    DATA,
+    ERROR,
+    BadLineError,
+    FaultError,
+    HeardLine,
+    NoAnswerError,
+    Term,
+    arguments_of,
+    by_name,
+    fault_of,
+)
+from cmm_uq.laboratory.live.instruments.ports import NETWORK, PortOpener, opener
+from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
+from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, PortLostError, Reading, Returned
 
 PORT = 1294
 """Of an I++ DME server (specification 1.4.3, section 6.1)."""
@@ -39,35 +47,18 @@ POINT = "PtMeas"
 _REPORTED = ("X", "Y", "Z")
 
 
-def open_machine(identity: Identity, profile: ProfileFile, port: str, clock: Clock) -> Machine:
-    """A CMM at a port.
-
-    Raises
-    ------
-    CmmUqError : it is none of a network, nobody listens there, or what does speaks no I++ DME.
-    """
+def open_machine(identity: Identity, profile: ProfileFile, port: str, clock: Clock) -> IppMachine:
+    """A CMM at a port."""
     if not port.startswith(NETWORK):
         raise CmmUqError("a CMM by I++ DME is reached over the network", where=port or identity.name,
                          fix=f'Give port = "tcp://host:{PORT}"')  # fmt: skip
-    return Machine(identity, profile.ipp, opener(port, Connection(), tcp_port=PORT), clock)
+    return IppMachine(identity, profile.ipp, opener(port, Connection(), tcp_port=PORT), clock)
 
 
-class Machine:
-    """A CMM.
+class IppMachine:
+    """``identity``: what the job says of it; ``asked``: what the server is asked for."""
 
-    Parameters
-    ----------
-    identity : what the job says of it.
-    asked : what the server is asked for.
-    opened : opens the connection.
-    clock : that stamps.
-
-    Raises
-    ------
-    CmmUqError : nobody listens, or what does speaks no I++ DME.
-    """
-
-    def __init__(self, identity: Identity, asked: Positions, opened: Opened, clock: Clock) -> None:
+    def __init__(self, identity: Identity, asked: Positions, opened: PortOpener, clock: Clock) -> None:
         self.name, self._identity, self._asked = identity.name, identity, asked
         self._opened, self._clock = opened, clock
         self._clear, self._user_needed = threading.Event(), False
@@ -84,7 +75,6 @@ class Machine:
         self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ANSWER_WITHIN_S)
 
     def identity(self) -> Identity:
-        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.identity`."""
         return self._identity
 
     def clear_errors(self) -> None:
@@ -92,7 +82,6 @@ class Machine:
         self._clear.set()
 
     def close(self) -> None:
-        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.close`; the session ends."""
         self._closed = True
         if self._connected:
             with contextlib.suppress(NoAnswerError, FaultError, PortLostError):
@@ -101,7 +90,6 @@ class Machine:
             self._connected = False
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
-        """See :meth:`cmm_uq.laboratory.live.instruments.source.Source.events`."""
         while not stop.is_set() and not self._closed:
             if not self._connected:
                 yield from self._reconnected()
@@ -149,7 +137,7 @@ class Machine:
             if error.fault.severity < USER_NEEDED and not self._user_needed:
                 self.client.clear_all_errors()
             stamp = self._clock.utc_ns(), self._clock.monotonic_ns()
-            yield self._reading(Heard(b"", None, *stamp), status=_ill(error))
+            yield self._reading(HeardLine(b"", None, *stamp), status=_ill(error))
             return
         yield from self._unasked()
         yield from self._told_by(heard)
@@ -158,8 +146,7 @@ class Machine:
         while self.client.unasked:
             yield from self._told_by(self.client.unasked.popleft())
 
-    def _told_by(self, heard: Heard) -> Iterator[Event]:
-        """What a line says."""
+    def _told_by(self, heard: HeardLine) -> Iterator[Event]:
         response = heard.response
         if response is None:
             seen = Verbatim(shown(heard.raw[:60]))
@@ -169,7 +156,7 @@ class Machine:
         elif response.sign == ERROR:
             yield self._error(heard, response.rest)
 
-    def _data(self, heard: Heard, rest: str) -> Reading:
+    def _data(self, heard: HeardLine, rest: str) -> Reading:
         """Data of a point, a position, or something else that is no place."""
         point = None
         try:
@@ -190,7 +177,7 @@ class Machine:
             return self._reading(heard, status=say("a place without X, Y and Z: {seen}", seen=Verbatim(rest)))
         return self._reading(heard, values, point=point)
 
-    def _error(self, heard: Heard, rest: str) -> Reading:
+    def _error(self, heard: HeardLine, rest: str) -> Reading:
         try:
             fault = fault_of(rest)
         except BadLineError as error:
@@ -201,7 +188,7 @@ class Machine:
         return self._reading(heard, status=say("the machine says {what}", what=Verbatim(str(fault))))
 
     def _reading(
-        self, heard: Heard, values: dict[str, float] | None = None, *, status: Text | None = None, point: str | None = None
+        self, heard: HeardLine, values: dict[str, float] | None = None, *, status: Text | None = None, point: str | None = None
     ) -> Reading:  # fmt: skip
         self._number += 1
         return Reading(

@@ -9,16 +9,14 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.live.instruments.ipp.client import Client
-from cmm_uq.laboratory.live.instruments.ipp.line import terms_of
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
-from cmm_uq.laboratory.live.instruments.ipp.transaction import FaultError, NoAnswerError
-from cmm_uq.laboratory.live.instruments.port import PortLostError
+from cmm_uq.laboratory.live.instruments.ipp.protocol import FaultError, NoAnswerError, terms_of
+from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
 from cmm_uq.laboratory.live.instruments.ports import TcpPort
-from cmm_uq.laboratory.live.instruments.source import SYSTEM
+from cmm_uq.laboratory.live.instruments.source import SYSTEM, PortLostError
 
 
 @contextmanager
-def session(machine: SimulatedMachine, *, drive: bool = True, begin: bool = True) -> Iterator[Client]:
+def session(machine: SimulatedIppServer, *, drive: bool = True, begin: bool = True) -> Iterator[Client]:
     port = TcpPort("127.0.0.1", machine.port, machine.url)
     client = Client(port, SYSTEM, confirm=(lambda command: True) if drive else None)
     try:
@@ -30,13 +28,13 @@ def session(machine: SimulatedMachine, *, drive: bool = True, begin: bool = True
 
 
 @pytest.fixture
-def machine() -> Iterator[SimulatedMachine]:
-    made = SimulatedMachine()
+def machine() -> Iterator[SimulatedIppServer]:
+    made = SimulatedIppServer()
     yield made
     made.close()
 
 
-def test_a_session_from_beginning_to_end(machine: SimulatedMachine) -> None:
+def test_a_session_from_beginning_to_end(machine: SimulatedIppServer) -> None:
     with session(machine) as client:
         assert (client.version(), client.machine_class(), client.in_error()) == ("1.4.3", "CartCMM", False)
         assert client.tools() == ["RefTool", "NoTool", "Probe1", "Probe2"]
@@ -48,7 +46,7 @@ def test_a_session_from_beginning_to_end(machine: SimulatedMachine) -> None:
             client.get()
 
 
-def test_a_point_is_measured_where_the_surface_is(machine: SimulatedMachine) -> None:
+def test_a_point_is_measured_where_the_surface_is(machine: SimulatedIppServer) -> None:
     """The surface lies 0.05 mm outside the nominal one along (3, 0, 4)/5: contact at nominal + 0.05·n."""
     machine.radial = 0.05
     with session(machine) as client:
@@ -65,7 +63,7 @@ def test_a_point_is_measured_where_the_surface_is(machine: SimulatedMachine) -> 
     lambda client: client.go_to((0, 0, 0)),
     lambda client: client.change_tool("Probe1"),
 ])  # fmt: skip
-def test_nothing_moves_unless_it_was_allowed_and_confirmed(move, machine: SimulatedMachine) -> None:
+def test_nothing_moves_unless_it_was_allowed_and_confirmed(move, machine: SimulatedIppServer) -> None:
     with session(machine, drive=False) as client:
         with pytest.raises(CmmUqError, match="moves the machine, which was not allowed"):
             move(client)
@@ -77,7 +75,7 @@ def test_nothing_moves_unless_it_was_allowed_and_confirmed(move, machine: Simula
     assert not [line for line in machine.lines if "PtMeas(" in line or "GoTo" in line or "ChangeTool" in line]
 
 
-def test_an_error_stops_the_server_until_it_is_cleared(machine: SimulatedMachine) -> None:
+def test_an_error_stops_the_server_until_it_is_cleared(machine: SimulatedIppServer) -> None:
     """Section 6.2.5, with 2500 and 0514 of 8.2."""
     with session(machine) as client:
         with pytest.raises(FaultError) as error:
@@ -91,7 +89,7 @@ def test_an_error_stops_the_server_until_it_is_cleared(machine: SimulatedMachine
         client.get()
 
 
-def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: SimulatedMachine) -> None:
+def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: SimulatedIppServer) -> None:
     with session(machine) as client:
         tag = client.on_move_report(0.1, 1.0, "X")
         client.go_to((7, 0, 0))
@@ -102,7 +100,7 @@ def test_reports_of_a_daemon_and_events_are_kept_beside_the_answers(machine: Sim
 
 
 def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
-    machine = SimulatedMachine(version=None, part_c=None)
+    machine = SimulatedIppServer(version=None, part_c=None)
     try:
         with session(machine) as client:
             assert client.version() is None
@@ -113,7 +111,7 @@ def test_an_older_server_is_asked_no_more_than_it_knows() -> None:
         machine.close()
 
 
-def test_an_emergency_stop_is_no_unknown_command(machine: SimulatedMachine) -> None:
+def test_an_emergency_stop_is_no_unknown_command(machine: SimulatedIppServer) -> None:
     with session(machine) as client:
         machine.state.error = True
         with pytest.raises(FaultError, match="Use ClearAllErrors to continue"):
@@ -121,7 +119,7 @@ def test_an_emergency_stop_is_no_unknown_command(machine: SimulatedMachine) -> N
         assert machine.state.error
 
 
-def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: SimulatedMachine) -> None:
+def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: SimulatedIppServer) -> None:
     machine.state.session = True
     with session(machine, begin=False) as client:
         with pytest.raises(FaultError, match="Protocol error"):
@@ -133,7 +131,7 @@ def test_a_session_of_another_is_not_taken_over_unless_it_was_ones_own(machine: 
     ({"hangs": True}, "was not answered within"), ({"no_ack": True}, "before it was acknowledged"),
     ({"exchanged": True}, "before it was acknowledged"), ({"wrong_tag": True}, "was not answered within"),
 ])  # fmt: skip
-def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str, machine: SimulatedMachine) -> None:
+def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str, machine: SimulatedIppServer) -> None:
     with session(machine) as client:
         for key, value in wrong.items():
             setattr(machine.mischief, key, value)
@@ -141,14 +139,14 @@ def test_a_server_that_breaks_the_protocol_is_refused_in_words(wrong, told: str,
             client.call("Get(X())", within_s=0.2)
 
 
-def test_half_a_line_of_data_is_no_position(machine: SimulatedMachine) -> None:
+def test_half_a_line_of_data_is_no_position(machine: SimulatedIppServer) -> None:
     with session(machine) as client:
         machine.mischief.halves = True
         with pytest.raises(NoAnswerError):
             client.machine_class()
 
 
-def test_a_connection_that_is_cut_is_lost(machine: SimulatedMachine) -> None:
+def test_a_connection_that_is_cut_is_lost(machine: SimulatedIppServer) -> None:
     with session(machine) as client:
         machine.close()
         with pytest.raises(PortLostError):
@@ -156,6 +154,6 @@ def test_a_connection_that_is_cut_is_lost(machine: SimulatedMachine) -> None:
         machine.start()
 
 
-def test_a_name_that_would_break_the_line_is_refused(machine: SimulatedMachine) -> None:
+def test_a_name_that_would_break_the_line_is_refused(machine: SimulatedIppServer) -> None:
     with session(machine) as client, pytest.raises(CmmUqError, match="can be no name of a tool"):
         client.change_tool('a") %')

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.laboratory.live.instruments.ipp.line import (
+from cmm_uq.laboratory.live.instruments.ipp.protocol import (
     ACK,
     DATA,
     DONE,

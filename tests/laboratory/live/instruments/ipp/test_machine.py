@@ -11,28 +11,26 @@ from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.acquire import DeclaredSource
-from cmm_uq.laboratory.live.instruments.ipp.line import BadLineError, response_of
-from cmm_uq.laboratory.live.instruments.ipp.machine import Machine
-from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedMachine
-from cmm_uq.laboratory.live.instruments.ipp.transaction import Heard
-from cmm_uq.laboratory.live.instruments.opening import open_source
-from cmm_uq.laboratory.live.instruments.reading import Reading
-from cmm_uq.laboratory.live.instruments.source import Gap, Returned
+from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.ipp.machine import IppMachine
+from cmm_uq.laboratory.live.instruments.ipp.protocol import BadLineError, HeardLine, response_of
+from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
+from cmm_uq.laboratory.live.instruments.source import Gap, Reading, Returned
 from tests.laboratory.live.instruments.listening import listening
 
 
 @pytest.fixture
-def machine() -> Iterator[SimulatedMachine]:
-    made = SimulatedMachine()
+def machine() -> Iterator[SimulatedIppServer]:
+    made = SimulatedIppServer()
     yield made
     made.close()
 
 
-def declared(machine: SimulatedMachine, profile: str = "ipp") -> DeclaredSource:
+def declared(machine: SimulatedIppServer, profile: str = "ipp") -> DeclaredSource:
     return DeclaredSource(name="cmm", profile=profile, port=machine.url)
 
 
-def test_picked_points_keys_and_errors_are_readings(machine: SimulatedMachine) -> None:
+def test_picked_points_keys_and_errors_are_readings(machine: SimulatedIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:
         assert heard.source.identity().firmware == "I++ DME 1.4.3"
         assert machine.state.user
@@ -48,7 +46,7 @@ def test_picked_points_keys_and_errors_are_readings(machine: SimulatedMachine) -
     assert not machine.state.session
 
 
-def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedMachine) -> None:
+def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedIppServer) -> None:
     machine.state.position = [4.0, 5.0, 6.0]
     with listening(open_source(declared(machine, "ipp-position"))) as heard:
         heard.until(lambda one: len(one.good()) >= 2)
@@ -67,7 +65,7 @@ def test_positions_are_asked_for_as_often_as_is_said(machine: SimulatedMachine) 
 
 
 @pytest.mark.parametrize("cut", ["closed", "hung"])
-def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, machine: SimulatedMachine) -> None:
+def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, machine: SimulatedIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:
         heard.until(lambda one: any("OnPtMeasReport" in line for line in machine.lines))
         if cut == "closed":
@@ -85,7 +83,7 @@ def test_a_machine_that_was_lost_is_heard_again_within_two_seconds(cut: str, mac
         heard.until(lambda one: one.good())
 
 
-def test_noise_between_lines_is_said_and_is_no_point(machine: SimulatedMachine) -> None:
+def test_noise_between_lines_is_said_and_is_no_point(machine: SimulatedIppServer) -> None:
     with listening(open_source(declared(machine))) as heard:
         machine.mischief.noise = b"\xff\x00\r\n"
         machine.pick(1, 2, 3)
@@ -96,7 +94,7 @@ def test_noise_between_lines_is_said_and_is_no_point(machine: SimulatedMachine) 
         assert all("no line of I++ DME" in str(event.status) and not event.values for event in bad)
 
 
-def test_what_is_no_server_is_refused(machine: SimulatedMachine) -> None:
+def test_what_is_no_server_is_refused(machine: SimulatedIppServer) -> None:
     machine.mischief.exchanged = True
     with pytest.raises(CmmUqError, match=r"no I\+\+ DME server answers: .* before it was acknowledged"):
         open_source(declared(machine))
@@ -114,9 +112,9 @@ LINES = st.one_of(
 )  # fmt: skip
 
 
-def test_whatever_a_server_sends_is_told_and_no_place_is_invented(machine: SimulatedMachine) -> None:
+def test_whatever_a_server_sends_is_told_and_no_place_is_invented(machine: SimulatedIppServer) -> None:
     source = open_source(declared(machine))
-    assert isinstance(source, Machine)
+    assert isinstance(source, IppMachine)
 
     @given(LINES)
     def told(line: bytes) -> None:
@@ -124,7 +122,7 @@ def test_whatever_a_server_sends_is_told_and_no_place_is_invented(machine: Simul
             response = response_of(line)
         except BadLineError:
             response = None
-        for event in source._told_by(Heard(line + b"\r\n", response, 0, 0)):
+        for event in source._told_by(HeardLine(line + b"\r\n", response, 0, 0)):
             assert isinstance(event, Reading)
             assert set(event.values) in (set(), {"x_mm", "y_mm", "z_mm"})
             assert not (event.values and event.status)

@@ -1,0 +1,314 @@
+"""A recording taken live: a job, its plan and its instruments made into a session that a screen runs."""
+
+from __future__ import annotations
+
+import json
+import queue
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from cmm_uq.analysis.planning.setting import ASSUMED_NOISE_UM
+from cmm_uq.analysis.screening.shape import Screening
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import kind_of
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.messages import Verbatim
+from cmm_uq.base.output import interruption
+from cmm_uq.base.plugins import naming_package
+from cmm_uq.base.points import Points
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.acquired import provenance_name
+from cmm_uq.jobs.derived_job import PROGRAM
+from cmm_uq.jobs.file_names import inside
+from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import MEASURED, SIMULATED
+from cmm_uq.jobs.recording import REQUIRED, read_recording
+from cmm_uq.jobs.recording_file import is_own
+from cmm_uq.laboratory.live.conducting import Conductor
+from cmm_uq.laboratory.live.folder import FOLDER, Journals, begin, read_story, sessions_in
+from cmm_uq.laboratory.live.instruments.instrument import open_source
+from cmm_uq.laboratory.live.instruments.ipp.machine import IppMachine
+from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource
+from cmm_uq.laboratory.live.journal import Moment, made_folder, written_whole
+from cmm_uq.laboratory.live.judging import Judge
+from cmm_uq.laboratory.live.lead import Lead, titles_of
+from cmm_uq.laboratory.live.recorder import Recorder, settle_earlier
+from cmm_uq.laboratory.live.running import DroppedFile, Item, Listening, Screen, WatchedFolder, run
+from cmm_uq.laboratory.live.simulated import SimulatedMachine, simulated
+from cmm_uq.laboratory.live.story import Story
+from cmm_uq.laboratory.live.table import LiveRecording
+from cmm_uq.machine.model.kind import Observe
+from cmm_uq.machine.physics.catalogue import effects
+
+
+class Taking:
+    """Takes files of a folder: keeps their bytes beside the journal, and reads their points as any import does."""
+
+    def __init__(self, job: Job, watched: WatchedFolder, conductor: Conductor, clock: Clock) -> None:
+        self._job, self._watched, self._conductor, self._clock = job, watched, conductor, clock
+
+    def __call__(self, file: DroppedFile) -> None:
+        """A file that stands still."""
+        try:
+            rows = _rows(file, self._job)
+        except CmmUqError as error:
+            self._conductor.tell(Verbatim(str(error)))
+            return
+        try:
+            kept = self._kept(file)
+        except OutputError as error:
+            self._conductor.tell(Verbatim(str(error)))
+            self._watched.again(file.path)
+            return
+        age = self._clock.utc_ns() - file.utc_ns
+        moment = Moment(file.utc_ns, self._clock.monotonic_ns() - age)
+        self._conductor.file(file.path.name, file.content, moment, rows, kept)
+
+    def _kept(self, file: DroppedFile) -> str:
+        folder = self._job.folder / FOLDER / "files"
+        made_folder(folder)
+        number = 1 + sum(1 for _ in folder.iterdir())
+        path = folder / f"{number:04d}-{file.path.name}"
+        written_whole(path, file.content)
+        return path.name
+
+
+def _rows(file: DroppedFile, job: Job) -> list[dict[str, float]]:
+    """Points of a file; measurement, point and repeat only where the file itself numbers them."""
+    where, machine = str(file.path), job.points.machine
+    keys = job.facts.recording
+    if not keys.asked and is_own(file.content):
+        points = read_recording(file.content, where, machine)
+        columns = {"measurement": points.measurement, "point": points.point, "repeat": points.repeat,
+                   **dict(zip(("x_mm", "y_mm", "z_mm"), points.xyz.T, strict=True)), **points.columns}  # fmt: skip
+    else:
+        found = _imported(file.content, where, keys)
+        columns = dict(found.columns)
+        if "measurement" not in found.recognised.columns:
+            columns = {
+                name: values for name, values in columns.items() if name not in ("measurement", "point", "repeat")
+            }
+    columns.pop("time_s", None)  # by another clock
+    names = list(columns)
+    return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _imported(content: bytes, where: str, keys: ImportKeys) -> Imported:
+    """As any import; where nothing says which points belong together, they come in the order of the plan."""
+    try:
+        return imported(content, where, keys)
+    except CmmUqError:
+        if keys.points_per_measurement is not None:
+            raise
+        return imported(content, where, keys.model_copy(update={"points_per_measurement": "all"}))
+
+
+@dataclass(frozen=True)
+class Acquisition:
+    """A session that is ready to be run.
+
+    ``items``: what they say; lines of the operator are put here; ``watched, dropped``: a folder that results are
+    dropped into, and what takes them.
+    """
+
+    conductor: Conductor
+    listening: Listening
+    items: queue.Queue[Item]
+    clock: Clock
+    journals: Journals
+    watched: WatchedFolder | None
+    dropped: Callable[[DroppedFile], None] | None
+    folder: Path
+
+    def run(self, screen: Screen) -> None:
+        """Run it until the operator ends it."""
+        with interruption.placing(self.folder):
+            pass  # from here on a signal says that what was accepted is written
+        try:
+            run(
+                self.conductor,
+                self.listening,
+                self.items,
+                screen,
+                self.clock,
+                watched=self.watched,
+                dropped=self.dropped,
+            )
+        finally:
+            self.journals.close()
+
+
+@naming_package()
+def begin_acquisition(
+    folder: Path, *, simulate: bool = False, seed: int = 0, skip_damaged: bool = False, clock: Clock = SYSTEM
+) -> Acquisition:
+    """Begin a session, the first of a job or a further one."""
+    job = read_job(folder, recorded=False)
+    _check_origin(job, simulate=simulate)
+    sessions = job.folder / FOLDER
+    story = read_story(sessions, skip_damaged=skip_damaged) if sessions_in(sessions) else Story()
+    plan, titles = _plan(job, story)
+    recording = Path(job.recording_path)
+    table = LiveRecording(recording, sessions, simulated=simulate)
+    lead = _lead(job, plan, titles)
+    judge = _judge(job)
+    _check_columns(job)
+    facts = job.facts.acquire
+    watched = None if facts.folder is None or simulate else WatchedFolder(job.folder / facts.folder, clock)
+    sources, machine = _sources(job, simulate=simulate, seed=seed, clock=clock)
+    try:
+        now = Moment(clock.utc_ns(), clock.monotonic_ns())
+        journals = begin(
+            sessions, _said(job, plan, titles, simulate, first=not story.sessions), now, skip_damaged=skip_damaged
+        )
+    except BaseException:
+        for source in sources:
+            source.close()
+        raise
+    settle_earlier(journals, facts.source, facts.max_gap_s, now)
+    recorder = Recorder(
+        journals, () if simulate and not facts.source else facts.source, max_gap_s=facts.max_gap_s, clock=clock
+    )
+    items: queue.Queue[Item] = queue.Queue()
+    conductor = Conductor(
+        recorder, lead, judge, table, facts, soak_k_per_h=facts.soak_k_per_h or job.facts.rated_conditions.change_k_per_h,
+        machine=None if machine is None else machine.measure,
+        clear=[source.clear_errors for source in sources if isinstance(source, IppMachine)],
+    )  # fmt: skip
+    conductor.tick()
+    dropped = None if watched is None else Taking(job, watched, conductor, clock)
+    return Acquisition(conductor, Listening(sources, items), items, clock, journals, watched, dropped, job.folder)
+
+
+def plan_file(job: Job) -> dict[str, bytes]:
+    """The plan that a job names in a file, by its name; empty where it names none."""
+    name = job.facts.acquire.plan
+    if name is None:
+        return {}
+    path = inside(job.folder, name, f"{job.folder / 'job.toml'}: [acquire] plan")
+    return {name: content_of(path, TABLE_BYTES, "cmm-uq plan writes plan.csv; name it in [acquire] plan")}
+
+
+def _check_origin(job: Job, *, simulate: bool) -> None:
+    where = f"{job.folder / 'job.toml'} [job] origin"
+    if not job.facts.artefact.with_recording:
+        kind = job.facts.artefact.kind
+        raise CmmUqError(
+            f"a job of kind {kind!r} has no recording of points", where=where, fix="Nothing is taken for it"
+        )
+    if simulate and job.origin != SIMULATED:
+        raise CmmUqError(f"a simulated recording would pass for {job.origin}", where=where,
+                         fix="Give --out FOLDER: a copy of the job is made there, and marked")  # fmt: skip
+    if not simulate and job.origin != MEASURED:
+        raise CmmUqError(f"the recording of this job is {job.origin}, not measured", where=where,
+                         fix="Give --simulate, or take the instruments to a job of its own")  # fmt: skip
+
+
+def _check_columns(job: Job) -> None:
+    """That the recording which comes of it could be read: no column given twice, or in another unit than its name says."""
+    where = f"{job.folder / 'job.toml'}: [[acquire.source]] values"
+    columns = [column for source in job.facts.acquire.source for column in source.values.values()]
+    twice = next((column for column in columns if columns.count(column) > 1), None)
+    if twice is not None:
+        raise CmmUqError(f"two quantities go into the column {twice}", where=where, fix="Give each a column of its own")
+    further = [column for column in columns if column not in REQUIRED]
+    trial = ",".join([*REQUIRED, *further]) + "\n" + ",".join("1" for _ in (*REQUIRED, *further)) + "\n"
+    try:
+        read_recording(trial.encode(), where, job.points.machine)
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=where, fix=error.fix) from None
+
+
+def _plan(job: Job, story: Story) -> tuple[str, list[str]]:
+    """The plan as CSV, and the titles of its measurements: as the first session had it, as a file says, or as planned now."""
+    if story.sessions:
+        said = story.sessions[0].said
+        return said["plan"], said["titles"]
+    if job.facts.acquire.plan is not None:
+        ((name, content),) = plan_file(job).items()
+        read_recording(content, str(job.folder / name), job.points.machine)
+        return content.decode("utf-8-sig"), []
+    from cmm_uq.app.commands.plans.plan import recording_to_be
+    from cmm_uq.app.commands.plans.planning import make_plan
+
+    try:
+        plan = make_plan(job, power=False)
+    except CmmUqError as error:
+        fix = f"{error.fix or 'Mend [plan]'}; or name a plan of your own in [acquire] plan"
+        raise CmmUqError(error.problem, where=error.where, fix=fix) from None
+    return recording_to_be(plan).decode(), [str.__str__(placing.title) for placing in plan.to_measure]
+
+
+def _lead(job: Job, plan: str, titles: Sequence[str]) -> Lead:
+    points: Points = read_recording(plan.encode(), "the plan", job.points.machine)
+    numbers = list(dict.fromkeys(points.measurement.tolist()))
+    unmeasured = {"time_s", *job.facts.plan.columns, *(name for name in points.columns if name.startswith("temp_"))}
+    return Lead(points, titles_of(numbers, [Verbatim(title) for title in titles]), frozenset(unmeasured))
+
+
+def _judge(job: Job) -> Judge:
+    kind, stated = kind_of(job), job.facts.recording.u_coordinate_um
+    observe: Observe | None = None
+    if kind.observe is not None:
+        observe = kind.observing("judged")
+    return Judge(
+        job.facts.artefact, kind.offers("screen", Screening), observe, job.points.machine,
+        tuple(effects(job.facts.model.effects, where="job.toml [model] effects")),
+        None if stated is None else stated * MICROMETRE, job.recording_path,
+    )  # fmt: skip
+
+
+def _sources(job: Job, *, simulate: bool, seed: int, clock: Clock) -> tuple[list[LiveSource], SimulatedMachine | None]:
+    declared = job.facts.acquire.source
+    if simulate:
+        stated = job.facts.recording.u_coordinate_um
+        found, machine = simulated(declared, clock=clock, seed=seed, noise_mm=(stated or ASSUMED_NOISE_UM) * MICROMETRE)
+        return list(found), machine
+    with ExitStack() as opened:
+        sources = []
+        for source in declared:
+            sources.append(open_source(source, clock=clock, folder=job.folder))
+            opened.callback(sources[-1].close)
+        opened.pop_all()
+    return sources, None
+
+
+def _said(job: Job, plan: str, titles: Sequence[str], simulate: bool, *, first: bool) -> dict[str, Any]:
+    """What a session begins with; the plan stands in the first."""
+    return {
+        "program": PROGRAM, "job": job.facts.job.id, "recording": job.facts.recording.file, "simulated": simulate,
+        "sources": json.loads(json.dumps([source.model_dump() for source in job.facts.acquire.source])),
+        "max_gap_s": job.facts.acquire.max_gap_s,
+        **({"plan": plan, "titles": list(titles)} if first else {}),
+    }  # fmt: skip
+
+
+def write_trial(folder: Path, out: Path) -> Path:
+    """A copy of a job in which recordings are simulated, to be tried without instruments."""
+    job = read_job(folder, recorded=False)
+    if (out / "job.toml").exists():
+        if read_job(out, recorded=False).origin != SIMULATED:
+            raise CmmUqError(
+                "is a job whose recording is measured", where=str(out), fix="Name another folder with --out"
+            )
+        return out
+    document: Any = tomlkit.parse(job.inputs["job.toml"].decode("utf-8-sig"))
+    document["job"]["id"] = f"{job.facts.job.id}-trial"
+    document["job"]["origin"] = SIMULATED
+    left_out = {"job.toml", job.facts.recording.file, provenance_name(job.facts.recording.file)}
+    made_folder(out)
+    for name, content in {**job.inputs, **plan_file(job)}.items():
+        if name not in left_out:
+            made_folder((out / name).parent)
+            written_whole(out / name, content)
+    written_whole(out / "job.toml", tomlkit.dumps(document).encode())
+    return out

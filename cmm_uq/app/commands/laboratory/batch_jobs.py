@@ -1,0 +1,175 @@
+"""Which jobs a batch has, which of them are done already, and what reports say as one table."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cmm_uq import __version__
+from cmm_uq.app.commands.files import RESULTS, called
+from cmm_uq.app.commands.report import REPORT
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.language import ENGLISH
+from cmm_uq.base.output import Manifest, read_manifest, sha256_of
+from cmm_uq.base.output.replacing import journal_for
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.verdicts import Verdicts
+from cmm_uq.laboratory.records.content import values
+from cmm_uq.laboratory.schedule.jobs import job_folders
+from cmm_uq.laboratory.schedule.parquet import Row, write_parquet
+
+
+@dataclass(frozen=True, slots=True)
+class BatchJob:
+    """A job of a batch.
+
+    ``id``: of the job; empty where job.toml cannot be read, which its report will say.
+    """
+
+    folder: str
+    id: str
+
+
+def jobs_in(folders: Iterable[Path], out: Path) -> tuple[list[BatchJob], int]:
+    """Every job in folders and below them, and how many more are still to be measured."""
+    given = list(folders)
+    found: dict[str, BatchJob] = {}
+    planned: set[str] = set()
+    for root in given:
+        for one in job_folders(root.parent if root.name == "job.toml" else root, leave_out=out):
+            key = str(one.folder.resolve())
+            if one.planned:
+                planned.add(key)
+            else:
+                found.setdefault(key, BatchJob(str(one.folder), one.id))
+    if not found:
+        more = f"; {len(planned)} still to be measured" if planned else ""
+        raise CmmUqError(f"no job was found{more}", where=", ".join(map(str, given)),
+                         fix="A job is a folder with a job.toml and the recording that it names")  # fmt: skip
+    listed = list(found.values())
+    _refuse_two_alike(listed)
+    return listed, len(planned)
+
+
+def _refuse_two_alike(listed: Iterable[BatchJob]) -> None:
+    """Also such as differ in case alone: for some systems these are one folder."""
+    first: dict[str, BatchJob] = {}
+    for one in listed:
+        if one.id and (other := first.setdefault(one.id.casefold(), one)) is not one:
+            raise CmmUqError(f"has the id {one.id!r}, as {other.folder} has {other.id!r}", where=one.folder,
+                             fix="Give each job an id of its own: its report goes to a folder of that name")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class BatchOutput:
+    """What is to be written of each job.
+
+    ``out``: a folder a job is made in it; ``results_only``: whether figures alone are wanted; ``force``: keep what
+    stands in the way as ``NAME.previous`` instead of refusing.
+    """
+
+    out: Path
+    seed: int = 0
+    results_only: bool = False
+    force: bool = False
+
+    def folder(self, job: Job) -> Path:
+        return self.out / job.facts.job.id
+
+    def names(self, job: Job) -> list[str]:
+        """Of the files that are certain to be written."""
+        return [RESULTS] if self.results_only else [*REPORT.names(job), RESULTS]
+
+    def check(self, job: Job) -> None:
+        """Make sure, before a job is computed, that it can be written."""
+        folder = self.folder(job)
+        there = read_manifest(folder)
+        if self.results_only and there is not None and there.owner == REPORT.owner(job):
+            documents = [name for name in REPORT.names(job) if name in there.files]
+            if documents:
+                raise CmmUqError("would be lost where figures alone are written again", where=str(folder / documents[0]),
+                                 fix="Leave --results-only out, or choose another --out")  # fmt: skip
+        names = dict.fromkeys(self.names(job), "")
+        journal_for(folder, REPORT.owner(job), names, inputs=job.paths, force=self.force)
+
+    def done(self, job: Job) -> dict[str, Any] | None:
+        """Contents of results.json where the job's report is there, whole, from the same inputs by the same version."""
+        folder = self.folder(job)
+        there = read_manifest(folder)
+        if there is None or there.owner != REPORT.owner(job) or not there.files.keys() >= set(self.names(job)):
+            return None
+        if not _whole(folder, there):
+            return None
+        data = results_of(folder)
+        same = (
+            data is not None
+            and data.get("software", {}).get("version") == __version__
+            and data.get("job", {}).get("inputs_sha256") == sha256(job.inputs)
+            and data.get("job", {}).get("language", ENGLISH) == job.facts.job.language
+            and data.get("sampling", {}).get("seed", self.seed) == self.seed
+        )
+        return data if same else None
+
+
+def _whole(folder: Path, manifest: Manifest) -> bool:
+    return all(sha256_of(folder / name) == digest for name, digest in manifest.files.items())
+
+
+def results_of(folder: Path) -> dict[str, Any] | None:
+    """Contents of a report's results.json; ``None`` where there is none that can be read."""
+    try:
+        data = json.loads((folder / RESULTS).read_bytes())
+    except (OSError, ValueError):
+        return None
+    return data if isinstance(data, dict) else None
+
+
+def conforming(results: Mapping[str, Any]) -> bool:
+    """Whether every statement of conformity is a pass, and the recording agrees with the model that the job names."""
+    return Verdicts.of_results(results).conforming and verdict(results) in ("consistent", "")
+
+
+def verdict(results: Mapping[str, Any]) -> str:
+    """Of the diagnosis; empty where there is none."""
+    return str((results.get("diagnosis") or {}).get("verdict") or "")
+
+
+COLUMNS = (
+    ("job", "string", "Id of the job."),
+    ("origin", "word", "Where the recording comes from: measured, simulated or compensated."),
+    ("machine", "word", "Name of the machine."),
+    ("serial", "word", "Its serial number; empty where none is stated."),
+    ("day", "date32", "Date of the measurement."),
+    ("name", "word", "Of the value: EFFECT.PARAMETER, artefact.SIZE, accuracy.FIGURE, or performance:CHARACTERISTIC."),
+    ("quantity", "word", "How it is called in the field."),
+    ("unit", "word", "Of value, u, lower, upper, u_artefact and limit; 1 where it has none."),
+    ("value", "float64", "Estimate; of performance the least favourable value."),
+    ("u", "float64", "Standard uncertainty (k = 1)."),
+    ("lower", "float64", "Lower end of the 95 % interval; of performance value − 2u."),
+    ("upper", "float64", "Its upper end; of performance value + 2u."),
+    ("u_artefact", "float64", "Part of u that comes from what is certified of the artefact; 0 where it is unknown."),
+    ("limit", "float64", "The value conforms while its amount is no larger; null where no limit is set."),
+    ("decision", "word", "The gravest of the job's statements of conformity; none where it states none."),
+    ("diagnosis", "word", "Verdict of the job's diagnosis; empty where there is none."),
+    ("version", "word", "Of cmm-uq, which made it."),
+)
+"""Name, type and meaning of each column."""
+
+
+def write_table(path: Path, results: Iterable[Mapping[str, Any]], *, force: bool) -> None:
+    """What reports say as a Parquet file, in their order."""
+    write_parquet(path, COLUMNS, (row for one in results for row in rows(one)), force=force)
+
+
+def rows(results: Mapping[str, Any]) -> Iterator[Row]:
+    """Every value of a report, as records keep it."""
+    job = results["job"]
+    head = (job["id"], job["origin"], job["machine"], job.get("serial", ""), dt.date.fromisoformat(job["date"]))
+    tail = (Verdicts.of_results(results).overall, verdict(results), results["software"]["version"])
+    for value in values(results, called):
+        yield (*head, *value, *tail)

@@ -1,0 +1,206 @@
+"""What is due for calibration: from the records to a sorted list, and to written files where a folder is asked for."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq import __version__
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, in_order, machine_due
+from cmm_uq.laboratory.due.observed import CompletedInterval, Pool, calibrations, ended_intervals, part_used
+from cmm_uq.laboratory.due.rule import Rule
+from cmm_uq.laboratory.records import open_records
+from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedMachine
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.due.drift import DriftPrior as Prior
+    from cmm_uq.laboratory.due.fleet_model import FleetPrior
+    from cmm_uq.laboratory.records.store import Records
+
+
+@dataclass(frozen=True, eq=False)
+class FleetFile:
+    """Priors of the machines of a fleet; of none where nothing was read."""
+
+    fleets: Mapping[str, FleetPrior] = field(default_factory=dict)
+
+    def of(self, machine: RecordedMachine) -> dict[str, Prior]:
+        """Of a machine, by value; its model and place may be new to the fleet."""
+        return {name: _prior(fleet, machine.model, machine.place) for name, fleet in self.fleets.items()}
+
+
+@lru_cache(maxsize=1000)
+def _prior(fleet: FleetPrior, model: str, place: str) -> Prior:
+    return fleet.prior(model, place)
+
+
+def read_fleet(file: Path | None) -> FleetFile:
+    """Read a fleet's file.
+
+    ``file``: ``None`` for no fleet.
+    """
+    if file is None:
+        return FleetFile()
+    from cmm_uq.laboratory.due.fleet_model import FleetPrior
+
+    fix = "Make it: cmm-uq fleet --out DIR, and name DIR/fleet.json"
+    try:
+        data = json.loads(content_of(file, TABLE_BYTES, fix))
+        values = [(str(value["name"]), value["prior"]) for value in data["values"]]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise CmmUqError("is no fleet.json", where=str(file), fix=fix) from None
+    return FleetFile({name: FleetPrior.from_data(prior, str(file)) for name, prior in values})
+
+
+SCHEMA = "cmm-uq/due/1"
+
+WITHIN = dt.timedelta(days=90)
+"""How far ahead something is due and no longer later, where nothing is said."""
+
+FILES = ("due.html", "due.json")
+
+
+@dataclass(frozen=True)
+class WhatIsDue:
+    """Machines and artefacts, by the day on which they are due.
+
+    ``on``: the day asked about; ``within``: how far ahead is due; ``items``: all that was asked about.
+    """
+
+    on: dt.date
+    within: dt.timedelta
+    items: tuple[DueItem, ...]
+
+    def of(self, *states: str) -> list[DueItem]:
+        """Those in some of the states."""
+        return [one for one in self.items if one.state(self.on, self.within) in states]
+
+    def data(self) -> dict[str, Any]:
+        items = [
+            {
+                "item": one.item, "serial": one.serial, "name": one.name, "model": one.model, "place": one.place,
+                "state": one.state(self.on, self.within), "due": _iso(one.due), "last": _iso(one.last),
+                "why": str.__str__(one.why), "remarks": [str.__str__(text) for text in one.remarks],
+                "artefact": one.artefact or None, "blocked": str.__str__(one.blocked) if one.blocked else None,
+            }
+            for one in self.items
+        ]  # fmt: skip
+        return {
+            "schema": SCHEMA, "software": {"name": "cmm-uq", "version": __version__}, "on": self.on.isoformat(),
+            "within_days": self.within.days, "items": items,
+        }  # fmt: skip
+
+
+def what_is_due(
+    where: str | Path | None = None,
+    machines: Collection[str] = (),
+    *,
+    on: dt.date | None = None,
+    within: dt.timedelta | None = None,
+    fleet: Path | None = None,
+) -> WhatIsDue:
+    """What is due for calibration when, and why.
+
+    ``where``: the records; see :func:`cmm_uq.laboratory.records.open_records`; ``machines``: serials or names; all
+    machines and all artefacts where none is named; ``on``: the day asked about; today where nothing is said;
+    ``within``: only what is due that soon, or cannot be dated; everything where nothing is said; ``fleet``:
+    ``fleet.json`` of the fleet that the drift model is to take as prior; its default one where nothing is said.
+    """
+    day = on or dt.datetime.now().astimezone().date()
+    learnt = read_fleet(fleet)
+    with open_records(where, read_only=True) as records:
+        found = due_in(records, machines, day, learnt)
+    kept = found if within is None else [one for one in found if one.due is None or one.due - day <= within]
+    return WhatIsDue(day, WITHIN if within is None else within, tuple(kept))
+
+
+def due_in(records: Records, machines: Collection[str], on: dt.date, fleet: FleetFile | None = None) -> list[DueItem]:
+    artefacts = {one.serial: one for one in records.artefacts()}
+    asked = {one.serial: one for one in map(records.machine, machines)}.values() if machines else records.machines()
+    if not asked and not artefacts:
+        raise CmmUqError("no machine is recorded yet", where="records", fix="Record one: cmm-uq report JOB")
+    reading = _Reading(records, on, fleet or FleetFile(), whole=bool(machines))
+    found = [machine_due(reading.known(one), artefacts, on, reading.pool(one)) for one in asked]
+    used = {one.artefact for one in found} if machines else set(artefacts)
+    return in_order([*found, *(artefact_due(artefacts[serial]) for serial in used if serial in artefacts)])
+
+
+class _Reading:
+    """Certificates of machines: all newest ones in one query, whole histories only where something needs them.
+
+    ``records, on``: where from, and up to which day; ``whole``: whether histories are read whole, of the few machines
+    that are asked for.
+    """
+
+    def __init__(self, records: Records, on: dt.date, fleet: FleetFile, *, whole: bool) -> None:
+        self.records = records
+        self._fleet = fleet
+        self._late = records.dated_after(on)
+        self._on = on
+        self._newest: dict[str, RecordedCertificate] = {}
+        self._checked: dict[str, RecordedCertificate] = {}
+        self._without: set[int] = set()
+        self._pasts: dict[str, list[RecordedCertificate]] = {}
+        self._pools: dict[tuple[str, str], list[CompletedInterval]] = {}
+        if not whole:
+            self._newest = {one.machine: one for one in records.latest(on, values=False)}
+            self._checked = {one.machine: one for one in records.checks() if one.day <= on}
+            undecided = [one.entry for one in self._newest.values() if one.decision == "none"]
+            self._without = set(undecided) - records.limited(undecided)
+
+    def known(self, machine: RecordedMachine) -> CalibrationRecord:
+        """What its rule needs of a machine: its newest certificate where that will do."""
+        rule, late = Rule.of(machine.calibrate), self._late.get(machine.serial)
+        newest, checked = self._newest.get(machine.serial), self._checked.get(machine.serial)
+        later = checked is not None and (newest is None or (checked.day, checked.entry) > (newest.day, newest.entry))
+        if newest is not None and not later and rule.method == "fixed":
+            return CalibrationRecord(machine, rule, [newest], newest.entry not in self._without, late)
+        past = self._past(machine.serial)
+        limited = any(part_used(one) is not None or one.decision != "none" for one in calibrations(past)[-1:])
+        priors = self._fleet.of(machine) if rule.method == "drift" else {}
+        return CalibrationRecord(machine, rule, past, limited, late, priors)
+
+    def pool(self, machine: RecordedMachine) -> Pool:
+        """Intervals of all machines of its model; its own where its model is not known."""
+
+        def pooled() -> Sequence[CompletedInterval]:
+            key = (machine.manufacturer, machine.model)
+            if not machine.model:
+                return ended_intervals(self._past(machine.serial))
+            if key not in self._pools:
+                alike = [one for one in self.records.machines() if (one.manufacturer, one.model) == key]
+                self._pools[key] = [interval for one in alike for interval in ended_intervals(self._past(one.serial))]
+            return self._pools[key]
+
+        return pooled
+
+    def _past(self, serial: str) -> list[RecordedCertificate]:
+        """Standing certificates and checks of a machine up to the day."""
+        if serial not in self._pasts:
+            known = self.records.certificates(serial, states=STANDING)
+            self._pasts[serial] = [one for one in known if one.day <= self._on]
+        return self._pasts[serial]
+
+
+def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:
+    """Write ``due.html`` and ``due.json``, all or none."""
+    from cmm_uq.base.output import Owner, staged
+    from cmm_uq.certificate.due_page import due_document
+    from cmm_uq.certificate.html import render_html
+    from cmm_uq.certificate.results_file import as_json
+
+    with staged(folder, Owner("due", "records"), force=force, expected=FILES) as place:
+        page = render_html(due_document(found.items, found.on, found.within)).encode()
+        return place.write({"due.html": page, "due.json": as_json(found.data())})
+
+
+def _iso(day: dt.date | None) -> str | None:
+    return None if day is None else day.isoformat()

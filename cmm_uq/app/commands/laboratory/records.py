@@ -1,0 +1,198 @@
+"""The records themselves: reports that were written before, kept in them; old files removed; inputs read back."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime as dt
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.app.commands.files import content_of
+from cmm_uq.app.commands.reading import job_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.content import content_of as whole_file
+from cmm_uq.base.files.limits import TABLE_BYTES
+from cmm_uq.base.output import MANIFEST, finish_interrupted, read_manifest, sha256_of
+from cmm_uq.jobs.job import Job
+from cmm_uq.laboratory.records.facts import RecordedCertificate
+
+if TYPE_CHECKING:
+    from cmm_uq.laboratory.records.store import Records
+
+RESULTS = "results.json"
+COMMANDS = ("report", "diagnose")
+
+
+@dataclass(frozen=True)
+class ImportedReports:
+    """What an import did.
+
+    ``added``: folders whose reports were recorded; ``known``: folders whose reports were recorded before;
+    ``refused``: folders that were not recorded, and why; ``bare``: folders of which only results.json was left to go
+    by.
+    """
+
+    added: tuple[Path, ...]
+    known: tuple[Path, ...]
+    refused: tuple[tuple[Path, CmmUqError], ...]
+    bare: tuple[Path, ...]
+
+
+def import_reports(records: Records, folders: Iterable[Path]) -> ImportedReports:
+    """Record reports and diagnoses that were written before, oldest first, all in one transaction."""
+    found = reports_in(folders)
+    contents: dict[str, tuple[Path, dict[str, Any]]] = {}
+    known, refused, bare = [], [], []
+    for path in found:
+        try:
+            digest = sha256_of(path / RESULTS) or ""
+            if digest in contents or records.has_results(digest) is not None:
+                known.append(path)
+                continue
+            job = job_inside(path)
+            contents[digest] = path, _content(records, path, job)
+            if job is None:
+                bare.append(path)
+        except CmmUqError as error:
+            refused.append((path, error))
+    ordered = sorted(contents.values(), key=lambda one: (one[1]["day"], one[1]["job"], one[1]["command"]))
+    if ordered:
+        records.append_all(("imported", content, None) for _, content in ordered)
+    return ImportedReports(tuple(path for path, _ in ordered), tuple(known), tuple(refused), tuple(bare))
+
+
+def reports_in(folders: Iterable[Path]) -> list[Path]:
+    """Folders with a report or a diagnosis, each once."""
+    asked = tuple(folders)
+    found = {path.resolve(): path for folder in asked for path in report_folders(folder)}
+    if not found:
+        raise CmmUqError("holds no report", where=", ".join(map(str, asked)),
+                         fix="Name folders that cmm-uq report or cmm-uq diagnose wrote")  # fmt: skip
+    return list(found.values())
+
+
+def report_folders(folder: Path) -> Iterator[Path]:
+    """Folders with a set of files that a report or a diagnosis wrote, sorted."""
+    if not folder.is_dir():
+        raise CmmUqError("no such folder", where=str(folder), fix="Name folders that hold reports")
+    for manifest in sorted((folder / MANIFEST, *folder.glob(f"*/**/{MANIFEST}"))):
+        if manifest.parent.name.startswith("."):
+            continue
+        finish_interrupted(manifest.parent)
+        written = read_manifest(manifest.parent)
+        if written is not None and written.owner.command in COMMANDS and RESULTS in written.files:
+            yield manifest.parent
+
+
+def job_inside(folder: Path) -> Job | None:
+    """The job of a report, from the inputs that its PDF carries; ``None`` where they are not there or not read any more."""
+    with contextlib.suppress(CmmUqError):
+        return job_of(inputs_of(folder))
+    return None
+
+
+def inputs_of(folder: Path) -> dict[str, bytes]:
+    """Inputs of the job of a report by their names, as its PDF carries them, each with the hash that results.json says."""
+    from pypdf import PdfReader
+    from pypdf.errors import PyPdfError
+
+    wanted = _results(folder)["job"].get("inputs_sha256") or {}
+    pdf = next(iter(sorted(folder.glob("*.pdf"))), None)
+    if pdf is None:
+        raise CmmUqError("holds no PDF with the inputs of its job", where=str(folder))
+    try:
+        attached = {name: parts[-1] for name, parts in PdfReader(pdf).attachments.items()}
+    except (PyPdfError, OSError, ValueError, KeyError, RecursionError) as error:
+        raise CmmUqError(f"cannot be read: {error}", where=str(pdf)) from error
+    for name, digest in wanted.items():
+        if name not in attached or sha256(attached[name]).hexdigest() != digest:
+            raise CmmUqError(f"does not carry the input {name} that its results were made from", where=str(pdf))
+    return {name: attached[name] for name in wanted}
+
+
+def _content(records: Records, folder: Path, job: Job | None) -> dict[str, Any]:
+    """Content of the entry of a folder whose files are as they were written."""
+    manifest = read_manifest(folder)
+    if manifest is None:
+        raise CmmUqError("its manifest.json is gone", where=str(folder))
+    for name, digest in manifest.files.items():
+        if sha256_of(folder / name) != digest:
+            raise CmmUqError("was altered or removed after it was written", where=str(folder / name),
+                             fix="Only reports as they were written are recorded")  # fmt: skip
+    results = whole_file(folder / RESULTS, TABLE_BYTES, "Name a folder with a report")
+    return content_of(records, results, job, manifest.owner.command, folder, manifest.files)
+
+
+def _results(folder: Path) -> Mapping[str, Any]:
+    try:
+        data = json.loads(whole_file(folder / RESULTS, TABLE_BYTES, "Name a folder with a report"))
+        data["job"].get("id")
+    except (ValueError, RecursionError, KeyError, TypeError, AttributeError) as error:
+        raise CmmUqError("is no results.json", where=str(folder / RESULTS)) from error
+    found: Mapping[str, Any] = data
+    return found
+
+
+@dataclass(frozen=True)
+class Retained:
+    """What a retention removes.
+
+    ``certificates``: that are older, and in whose folders nothing newer is.
+    """
+
+    certificates: tuple[RecordedCertificate, ...]
+    files: tuple[Path, ...]
+
+
+def retention(records: Records, keep_years: int, today: dt.date) -> Retained:
+    """Certificates and diagnoses that are older, with the files of them that are as they were written.
+
+    ``keep_years``: how many years files are kept after the day of the measurement; ``today``: the day from which
+    years are counted.
+    """
+    try:
+        before = today.replace(year=today.year - keep_years)
+    except ValueError:
+        before = today.replace(year=today.year - keep_years, day=28)
+    all_of_them = records.certificates(origin=None, command=None, values=False)
+    newest = {one.folder: one for one in sorted(all_of_them, key=lambda one: one.entry) if one.folder}
+    old = [one for one in newest.values() if one.day < before]
+    found, files = [], []
+    for one in sorted(old, key=lambda each: each.entry):
+        inside = list(_own_files(Path(one.folder), one.results_sha256))
+        if inside:
+            found.append(one)
+            files += inside
+    return Retained(tuple(found), tuple(files))
+
+
+def remove_retained(records: Records, retained: Retained, keep_years: int) -> None:
+    """Say in the records what is removed, then remove it; what a kill leaves of it is removed by the next retention."""
+    if not retained.certificates:
+        return
+    records.append("retained", {
+        "certificates": [one.entry for one in retained.certificates], "keep_years": keep_years,
+        "files": [str(path) for path in retained.files],
+    })  # fmt: skip
+    for path in retained.files:
+        with contextlib.suppress(FileNotFoundError):
+            path.unlink()
+    for folder in {path.parent for path in retained.files}:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+
+
+def _own_files(folder: Path, results: str) -> Iterator[Path]:
+    """The set's files, results.json and the manifest last, so that what is left of a kill is known as a set still."""
+    manifest = read_manifest(folder)
+    if manifest is None or sha256_of(folder / RESULTS) != results:
+        return
+    for name, digest in sorted(manifest.files.items()):
+        if name != RESULTS and sha256_of(folder / name) == digest:
+            yield folder / name
+    yield folder / RESULTS
+    yield folder / MANIFEST

@@ -1,0 +1,234 @@
+"""A simulated instrument at a real pseudo-terminal, TCP socket or RFC 2217 server, well-behaved or not."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from cmm_uq.laboratory.live.instruments.speakers import Speaker
+
+Way = Literal["pty", "socket", "rfc2217"]
+WAYS: tuple[Way, ...] = ("pty", "socket", "rfc2217")
+
+_TICK_S = 0.01
+
+
+@dataclass
+class Mischief:
+    """What the instrument does wrong; all may be changed while it runs.
+
+    ``halves``: leaves out the second half of each message; ``noise``: sends these bytes before each message;
+    ``garbled``: sends other bytes than it means, as at a wrong baud rate.
+    """
+
+    hangs: bool = False
+    halves: bool = False
+    noise: bytes = b""
+    garbled: bool = False
+    a_byte_at_a_time: bool = False
+
+    def spoiled(self, data: bytes) -> bytes:
+        """What goes onto the line."""
+        if self.hangs or not data:
+            return b""
+        if self.halves:
+            data = data[: len(data) // 2]
+        if self.garbled:
+            data = bytes(0x80 | (byte * 37 + 11) & 0x7F for byte in data)
+        return self.noise + data
+
+
+class _Wire(Protocol):
+    """One connection of the instrument's side."""
+
+    def receive(self) -> bytes:
+        """What came, after a short while at most; raises ``OSError`` where the other side is gone."""
+        ...
+
+    def send(self, data: bytes) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class SimulatedLine:
+    """An instrument that speaks from a thread of its own until it is closed.
+
+    ``way``: at what it is connected; ``folder``: where the name of a pseudo-terminal is put, which stays the same
+    when it is unplugged and plugged in again; ``tcp_port``: of a socket; 0 takes a free one.
+    """
+
+    def __init__(self, speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0) -> None:
+        self.speaker, self.mischief, self._way = speaker, Mischief(), way
+        self._name = (folder or Path()) / "tty"
+        self._stop, self._speaking = threading.Event(), threading.Lock()
+        self._wire: _Wire | None = None
+        self._listening: socket.socket | None = None
+        self._tcp_port = tcp_port
+        self._thread = threading.Thread(target=self._run)
+        self.sent = 0
+        """Messages that the instrument sent whole."""
+        self.plug_in()
+
+    @property
+    def port(self) -> str:
+        """As a job names it."""
+        if self._way == "pty":
+            return str(self._name)
+        return f"{self._way}://127.0.0.1:{self._tcp_port}"
+
+    def plug_in(self) -> None:
+        self._stop = threading.Event()
+        if self._way == "pty":
+            self._wire = _Pty(Path(self.port))
+        else:
+            self._listening = socket.create_server(("127.0.0.1", self._tcp_port))
+            self._tcp_port = self._listening.getsockname()[1]
+        self._thread = threading.Thread(target=self._run, args=(self._stop,), daemon=True)
+        self._thread.start()
+
+    def unplug(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        for end in (self._wire, self._listening):
+            if end is not None:
+                end.close()
+        self._wire = self._listening = None
+
+    def restart(self) -> None:
+        """Switch it off and on: it has forgotten what it was told, and says its banner."""
+        with self._speaking, contextlib.suppress(OSError):
+            said = self.speaker.restarted()
+            if self._wire is not None:
+                self._wire.send(said)
+
+    def close(self) -> None:
+        self.unplug()
+
+    def _run(self, stop: threading.Event) -> None:
+        following = time.monotonic()
+        while not stop.is_set():
+            wire = self._wire = self._wire or self._accepted()
+            if wire is None:
+                continue
+            try:
+                received = wire.receive()
+                with self._speaking:
+                    self._say(wire, b"" if self.mischief.hangs else self.speaker.hear(received))
+                    if self.speaker.every_s and time.monotonic() >= following:
+                        following += self.speaker.every_s
+                        self._say(wire, self.speaker.says())
+            except OSError:
+                if self._way == "pty":  # nobody has it open yet
+                    time.sleep(_TICK_S)
+                else:
+                    wire.close()
+                    self._wire = None
+
+    def _say(self, wire: _Wire, data: bytes) -> None:
+        spoiled = self.mischief.spoiled(data)
+        single = self.mischief.a_byte_at_a_time
+        for part in [spoiled[i : i + 1] for i in range(len(spoiled))] if single else [spoiled]:
+            wire.send(part)
+        self.sent += bool(data) and spoiled == data
+
+    def _accepted(self) -> _Wire | None:
+        """The next connection, where one comes soon."""
+        if self._listening is None or not select.select([self._listening], [], [], 5 * _TICK_S)[0]:
+            return None
+        connection, _ = self._listening.accept()
+        return _DeviceServer(connection) if self._way == "rfc2217" else _Tcp(connection)
+
+
+class _Pty:
+    """The master's side of a pseudo-terminal; ``name`` is a link to the other."""
+
+    def __init__(self, name: Path) -> None:
+        import pty
+        import tty
+
+        self._master, slave = pty.openpty()
+        tty.setraw(slave)
+        os.set_blocking(self._master, False)  # it looks readable while nobody has the other side open, and then is not
+        self._name = name
+        name.unlink(missing_ok=True)
+        name.symlink_to(os.ttyname(slave))
+        os.close(slave)
+
+    def receive(self) -> bytes:
+        if not select.select([self._master], [], [], _TICK_S)[0]:
+            return b""
+        return os.read(self._master, 4096)
+
+    def send(self, data: bytes) -> None:
+        if data:
+            os.write(self._master, data)
+
+    def close(self) -> None:
+        self._name.unlink(missing_ok=True)
+        os.close(self._master)
+
+
+class _Tcp:
+    """A connection that was accepted."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def receive(self) -> bytes:
+        if not select.select([self._connection], [], [], _TICK_S)[0]:
+            return b""
+        received = self._connection.recv(4096)
+        if not received:
+            raise ConnectionResetError
+        return received
+
+    def send(self, data: bytes) -> None:
+        self._connection.sendall(data)
+
+    def close(self) -> None:
+        self._connection.close()
+
+
+class _DeviceServer:
+    def __init__(self, connection: socket.socket) -> None:
+        import serial
+        from serial import rfc2217
+
+        self._inside = _Tcp(connection)
+        self.line: Any = serial.serial_for_url("loop://", timeout=0)
+        self._manager = rfc2217.PortManager(self.line, self)
+
+    def write(self, data: bytes) -> None:
+        """Answers of the protocol itself; the server calls it."""
+        self._inside.send(data)
+
+    def receive(self) -> bytes:
+        return b"".join(self._manager.filter(self._inside.receive()))
+
+    def send(self, data: bytes) -> None:
+        self._inside.send(b"".join(self._manager.escape(data)))
+
+    def close(self) -> None:
+        self._inside.close()
+        self.line.close()
+
+
+@contextlib.contextmanager
+def simulated(
+    speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0
+) -> Iterator[SimulatedLine]:
+    """A simulated instrument that is gone afterwards; see :class:`SimulatedLine`."""
+    line = SimulatedLine(speaker, way, folder, tcp_port)
+    try:
+        yield line
+    finally:
+        line.close()

@@ -1,0 +1,158 @@
+"""The operator's screen as texts: what is typed, what there is to be seen, and the set-up drawn with characters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.numbers import number_problem
+from cmm_uq.base.files.table import LONGEST_MM
+from cmm_uq.base.messages import Text, commas, say, signed
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.laboratory.live.lead import Lead, PlannedPoint
+
+WORDS = {
+    "undo": "takes the last point back: undo REASON",
+    "repeat": "measures the last set-up once more",
+    "skip": "leaves the set-up out: skip REASON",
+    "go": "goes on with a measurement: go 5",
+    "note": "writes something down: note TEXT",
+    "clear": "lets a machine go on after an error that you have looked at",
+    "pause": "stops taking points: pause REASON",
+    "resume": "goes on taking points",
+    "help": "says all this",
+    "quit": "ends; the same command goes on later",
+}
+"""What each does."""
+
+WITH_TEXT = ("undo", "skip", "note")
+"""Those that say nothing without a text."""
+
+
+@dataclass(frozen=True)
+class OperatorInput:
+    """A line, understood.
+
+    ``word``: of :data:`WORDS`, ``take``, or ``point``; ``numbers``: three coordinates, or one distance, mm.
+    """
+
+    word: str
+    text: str = ""
+    numbers: tuple[float, ...] = ()
+
+
+def understood(line: str) -> OperatorInput:
+    parts = line.replace(";", " ").split()
+    if not parts:
+        return OperatorInput("take")
+    if parts[0][0] in "+-.0123456789":
+        return OperatorInput("point", line.strip(), _numbers(parts))
+    word = parts[0].lower()
+    found = [name for name in WORDS if name == word] or [name for name in WORDS if name.startswith(word)]
+    if len(found) != 1:
+        raise CmmUqError(f"{parts[0]!r} is no word of this screen", fix=suggestion(word, WORDS))
+    text = line.strip()[len(parts[0]) :].strip()
+    if found[0] in WITH_TEXT and not text:
+        raise CmmUqError(f"{found[0]} without a text", fix=f"It {WORDS[found[0]]}")
+    return OperatorInput(found[0], text)
+
+
+def _numbers(parts: list[str]) -> tuple[float, ...]:
+    if len(parts) not in (1, 3):
+        raise CmmUqError(
+            f"{len(parts)} numbers", fix="Type three coordinates x y z, or one distance from the first point, in mm"
+        )
+    for part in parts:
+        if problem := number_problem(part):
+            raise CmmUqError(problem[0], fix=problem[1])
+        if abs(float(part)) > LONGEST_MM:
+            raise CmmUqError(f"{part} mm is more than anything that is measured", fix="Type mm")
+    return tuple(map(float, parts))
+
+
+@dataclass(frozen=True)
+class SessionView:
+    """What there is to be seen.
+
+    ``next``: what comes next, with its coordinates; ``picture``: of the set-up in the machine; ``shown``: live
+    figures of the newest point and set-up; ``again``: why a repeat is asked for; ``instruments``: each with how many
+    readings came, and what ails it.
+    """
+
+    head: Text
+    next: Text
+    picture: tuple[str, ...]
+    shown: tuple[Text, ...]
+    again: Text
+    temperatures: tuple[Text, ...]
+    instruments: tuple[Text, ...]
+    said: tuple[Text, ...]
+
+
+def coming(step: PlannedPoint | None, lead: Lead) -> Text:
+    """What comes next, with its coordinates."""
+    if step is None:
+        return say("all of the plan is measured")
+    at = commas(signed(value, ".1f") for value in step.xyz)
+    m, p, r = step.place
+    where = say("measurement {m}", m=m)
+    if (title := lead.titles.get(m)) is not None:
+        where = say("{where}, {title}", where=where, title=title)
+    return say("{where}, point {p}, repeat {r}, near {at} mm", where=where, p=p, r=r, at=at)
+
+
+WIDTH, HEIGHT = 30, 9
+"""Characters of each of the two views, without its frame."""
+
+_VIEWS = ((0, 1, "from above: x right, y up"), (0, 2, "from the front: x right, z up"))
+_MOST = 36
+"""Points that are drawn with their number; 1 to 9, then letters."""
+_MARKS = "123456789abcdefghijklmnopqrstuvwxyz*"
+
+
+def picture(machine: Machine, steps: Sequence[PlannedPoint], ahead: PlannedPoint | None) -> tuple[str, ...]:
+    """Lines of both views side by side; the point that comes next is an ``X``, the others their numbers.
+
+    ``machine``: whose travel is the frame; where it is not known, the points are.
+    """
+    if not steps:
+        return ()
+    readings = np.array([step.xyz for step in steps]) + machine.origin_mm
+    drawn = [_view(machine, readings, steps, ahead, view) for view in _VIEWS]
+    return tuple(f"{left}  {right}" for left, right in zip(*drawn, strict=True))
+
+
+def _view(
+    machine: Machine,
+    readings: Floats,
+    steps: Sequence[PlannedPoint],
+    ahead: PlannedPoint | None,
+    view: tuple[int, int, str],
+) -> list[str]:
+    across, up, title = view
+    cells = [[" "] * WIDTH for _ in range(HEIGHT)]
+    low, high = _frame(machine, readings)
+    part = (readings - low) / np.where(high > low, high - low, 1.0)
+    columns = np.clip(np.round(part[:, across] * (WIDTH - 1)), 0, WIDTH - 1).astype(int)
+    rows = np.clip(np.round((1 - part[:, up]) * (HEIGHT - 1)), 0, HEIGHT - 1).astype(int)
+    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
+    for t in np.linspace(0, 1, 4 * WIDTH):
+        at = part[0] + t * (part[far] - part[0])
+        row, column = round((1 - float(at[up])) * (HEIGHT - 1)), round(float(at[across]) * (WIDTH - 1))
+        if 0 <= row < HEIGHT and 0 <= column < WIDTH:
+            cells[row][column] = "·"
+    for step, row, column in zip(steps, rows, columns, strict=True):
+        cells[row][column] = _MARKS[min(step.place[1] - 1, _MOST - 1)] if step.place[1] > 0 else "*"
+    for step, row, column in zip(steps, rows, columns, strict=True):
+        if ahead is not None and step.place == ahead.place:
+            cells[row][column] = "X"
+    return [title.ljust(WIDTH + 2), f"┌{'─' * WIDTH}┐", *(f"│{''.join(row)}│" for row in cells), f"└{'─' * WIDTH}┘"]
+
+
+def _frame(machine: Machine, readings: Floats) -> tuple[Floats, Floats]:
+    low, high = machine.travel_mm.T
+    known = ~(np.isnan(low) | np.isnan(high))
+    return np.where(known, low, readings.min(axis=0) - 1.0), np.where(known, high, readings.max(axis=0) + 1.0)

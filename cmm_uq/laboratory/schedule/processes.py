@@ -1,0 +1,320 @@
+"""Numbered tasks answered by processes of this machine, as many at once as asked for.
+
+A process that answers tasks one after the other, and whoever asks it: begun anew when it dies, stopped when it hangs.
+
+A process imports once and computes on one thread, whatever the machine has, so that an answer depends neither on how many
+processes there are nor on whose they are. It is asked through its standard input and answers on its standard output.
+
+Numbered tasks answered by processes of this machine, as many at once as asked for.
+
+Tasks are taken as they are needed and answers given as they come, so that memory does not grow with their number: whoever
+does not take answers is not sent more.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, BinaryIO, cast
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.plugins import told_with_package
+
+ONE_THREAD = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+
+BEGINNING_S = 300.0
+"""How long a process may take to import and to begin: seconds, minutes where a disk is shared by many."""
+
+
+@dataclass(frozen=True)
+class WorkerTask:
+    """What processes are begun for.
+
+    ``program``: module that a process runs; see :func:`serve`; ``setting``: what every process is told first;
+    ``seconds``: that one task may take; without one, as long as it takes; ``tries``: processes that a task may end
+    before it is given up.
+    """
+
+    program: str
+    setting: Any
+    seconds: float | None = None
+    tries: int = 3
+
+
+@dataclass(frozen=True)
+class TaskAnswer:
+    """What came of a task.
+
+    ``ended``: how each process ended that ended over it, such as "signal 9".
+    """
+
+    number: int
+    value: Any = None
+    failure: CmmUqError | None = None
+    ended: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A value that is opened by the process that it is for, and by nobody on its way."""
+
+    content: bytes
+
+    @classmethod
+    def of(cls, value: Any) -> Packed:
+        return cls(pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL))
+
+
+class _EndedError(Exception):
+    """A process ended instead of answering."""
+
+
+class WorkerProcess:
+    """One process at a time, and what is asked of it."""
+
+    def __init__(self, work: WorkerTask) -> None:
+        self.work = work
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._over = False
+
+    def ask(self, number: int, task: Any) -> TaskAnswer:
+        """Have a task answered, by another process where one ends over it."""
+        ended: list[str] = []
+        while len(ended) < self.work.tries:
+            process = self._begun()
+            try:
+                value = self._said(process, (number, task), self.work.seconds)
+            except TimeoutError:
+                self._dismiss()
+                failure = CmmUqError(f"took longer than {self.work.seconds:g} s and was stopped",
+                                     fix="Give a longer --time-limit where that is no wonder")  # fmt: skip
+                return TaskAnswer(number, failure=failure, ended=tuple(ended))
+            except _EndedError:
+                ended.append(self._dismiss())
+                continue
+            if isinstance(value, CmmUqError):
+                return TaskAnswer(number, failure=value, ended=tuple(ended))
+            return TaskAnswer(number, value, ended=tuple(ended))
+        how = ", ".join(dict.fromkeys(ended))
+        failure = CmmUqError(f"{len(ended)} processes ended before its work was done ({how})",
+                             fix="Give fewer --workers where memory is short")  # fmt: skip
+        return TaskAnswer(number, failure=failure, ended=tuple(ended))
+
+    def end(self) -> None:
+        """Stop the process, whatever it does; nothing is asked any more."""
+        self._over = True
+        self._dismiss(0.0)
+
+    def _begun(self) -> subprocess.Popen[bytes]:
+        with self._lock:
+            if self._process is not None:
+                return self._process
+            if self._over:
+                raise CmmUqError("was stopped")
+            self._process = process = _process(self.work.program)
+        try:
+            refused = self._said(process, self.work.setting, BEGINNING_S)
+        except (TimeoutError, _EndedError):
+            how = self._dismiss()
+            raise CmmUqError(f"a process that works could not begin ({how})", where=self.work.program,
+                             fix="Give fewer --workers where memory is short") from None  # fmt: skip
+        if isinstance(refused, CmmUqError):
+            self._dismiss()
+            raise refused
+        return process
+
+    def _said(self, process: subprocess.Popen[bytes], value: Any, seconds: float | None) -> Any:
+        """What the process says to something."""
+        late = threading.Event()
+
+        def stop() -> None:
+            late.set()
+            process.kill()
+
+        watch = None if seconds is None else threading.Timer(seconds, stop)
+        if watch is not None:
+            watch.daemon = True
+            watch.start()
+        try:
+            put(cast("BinaryIO", process.stdin), value)
+            return pickle.load(cast("BinaryIO", process.stdout))  # noqa: S301 - of a process of one's own
+        except Exception as error:
+            if late.is_set():
+                raise TimeoutError from error
+            raise _EndedError from error
+        finally:
+            if watch is not None:
+                watch.cancel()
+
+    def _dismiss(self, patience_s: float = 0.2) -> str:
+        """Have no process any more; how it ended, where it ended by itself within this time."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is None:
+            return "stopped"
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(patience_s)
+        process.kill()
+        code = process.wait()
+        for pipe in (process.stdin, process.stdout):
+            with contextlib.suppress(OSError, ValueError):  # what was not read any more
+                if pipe is not None:
+                    pipe.close()
+        return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def _process(program: str) -> subprocess.Popen[bytes]:
+    """With this one's packages, none from the folder where it happens to be called, on one thread."""
+    place = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109
+    environment = {**os.environ, **dict.fromkeys(ONE_THREAD, "1"), "PYTHONPATH": place}
+    return subprocess.Popen([sys.executable, "-P", "-m", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,  # noqa: S603
+                            stderr=subprocess.DEVNULL, env=environment)  # fmt: skip
+
+
+def put(stream: BinaryIO, value: Any) -> None:
+    pickle.dump(value, stream, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.flush()
+
+
+def serve(begin: Callable[[Any], Callable[[int, Any], Any]]) -> None:
+    """Be such a process: read the setting, say that it is understood, then answer tasks until nobody asks any more.
+
+    ``begin``: makes, of the setting, what answers a task by number and content. A :class:`CmmUqError` of it ends the
+    run; one of an answer, or a fault, is the answer.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides
+    asked, told = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # whatever a library prints is no answer
+    with contextlib.suppress(BrokenPipeError):
+        values = _given(asked)
+        setting = next(values)
+        try:
+            answer = begin(_opened(setting))
+        except CmmUqError as error:
+            put(told, error)
+            return
+        put(told, None)
+        for number, task in values:
+            put(told, _answer(answer, number, task))
+
+
+def _answer(answer: Callable[[int, Any], Any], number: int, task: Any) -> Any:
+    try:
+        return answer(number, _opened(task))
+    except CmmUqError as error:
+        return error
+    except MemoryError:
+        return CmmUqError("the memory does not suffice for this input", fix="Give fewer --workers")
+    except Exception as error:
+        return told_with_package(error) or CmmUqError(
+            f"a fault of the program: {type(error).__name__}: {error}", fix="Please report it with the input"
+        )
+
+
+def _opened(value: Any) -> Any:
+    return pickle.loads(value.content) if isinstance(value, Packed) else value  # noqa: S301 - the same
+
+
+def _given(stream: BinaryIO) -> Iterator[Any]:
+    """What is asked; when whoever asks is gone, interrupted or killed, this process ends at once, whatever it is at."""
+    asked: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def read() -> None:
+        code = 1
+        try:
+            while True:
+                asked.put(pickle.load(stream))  # noqa: S301 - of the process that began this one
+        except EOFError:
+            code = 0
+        finally:
+            os._exit(code)
+
+    threading.Thread(target=read, daemon=True).start()
+    while True:
+        yield asked.get()
+
+
+MOST_WORKERS = 256
+
+_AHEAD = 2
+"""Tasks for each process that are ready before it asks."""
+
+_Waiting = queue.SimpleQueue[tuple[int, Any] | None]
+_Answers = queue.SimpleQueue[TaskAnswer | BaseException]
+
+
+def check_workers(workers: int) -> None:
+    """Refuse a number of processes that is none."""
+    if not 1 <= workers <= MOST_WORKERS:
+        raise CmmUqError(f"{workers} workers", where="--workers", fix=f"Give from 1 to {MOST_WORKERS} processes")
+
+
+def processes() -> int:
+    """How many processes this one may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not every system says
+        return os.cpu_count() or 1
+
+
+def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) -> Generator[TaskAnswer, None, None]:
+    """Have every task answered, in the order in which they are done.
+
+    ``tasks``: each with its number; taken in the caller's thread; ``workers``: processes at once; none is begun
+    without a task.
+    """
+    todo = iter(tasks)
+    waiting: _Waiting = queue.SimpleQueue()
+    done: _Answers = queue.SimpleQueue()
+    talks: list[WorkerProcess] = []
+    threads: list[threading.Thread] = []
+    asked = 0
+    try:
+        for task in islice(todo, _AHEAD * workers):
+            waiting.put(task)
+            asked += 1
+            if len(talks) < workers:
+                talks.append(WorkerProcess(work))
+                threads.append(threading.Thread(target=_converse, args=(talks[-1], waiting, done), daemon=True))
+                threads[-1].start()
+        while asked:
+            answer = done.get()
+            if isinstance(answer, BaseException):
+                raise answer
+            asked -= 1
+            for task in islice(todo, 1):
+                waiting.put(task)
+                asked += 1
+            yield answer
+    finally:
+        for _ in threads:
+            waiting.put(None)
+        for talk in talks:
+            talk.end()
+        for thread in threads:
+            thread.join()
+
+
+def _converse(talk: WorkerProcess, waiting: _Waiting, done: _Answers) -> None:
+    """Give one process its tasks, one after the other."""
+    try:
+        while (task := waiting.get()) is not None:
+            done.put(talk.ask(*task))
+    except BaseException as error:
+        done.put(error)
