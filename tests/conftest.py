@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from cmm_uq.app.cli import _NEW_OBJECTS
+from cmm_uq.app.cli import NEW_OBJECTS
 from cmm_uq.base.points import Machine, Points
 from tests.recordings import TRAVEL, bars
 
@@ -71,7 +71,7 @@ def pytest_collection_finish() -> None:
     """Look for what refers to itself as seldom as the command does, and not at all through what the tests themselves are."""
     gc.freeze()
     gc.enable()
-    gc.set_threshold(_NEW_OBJECTS)
+    gc.set_threshold(NEW_OBJECTS)
 
 
 @pytest.fixture

@@ -15,9 +15,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from cmm_uq.app.cli import _NEW_OBJECTS as NEW_OBJECTS
-from cmm_uq.app.serve.exchange import Request, read_address
-from cmm_uq.app.serve.site import Site
+from cmm_uq.app.cli import NEW_OBJECTS
+from cmm_uq.app.serve import Site
+from cmm_uq.app.serve.exchange import Asked, read_address
 from tests.laboratory.records.histories import made
 
 TIMES = 7

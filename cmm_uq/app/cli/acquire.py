@@ -7,9 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.deferred import defer_scipy
-from cmm_uq.app.cli.options import Quiet, examples
+from cmm_uq.app.cli.options import Quiet, examples, job_folders
 from cmm_uq.base.errors import CmmUqError
 
 EXAMPLES = examples("acquire JOB", "acquire examples/plan-ballbar --simulate --out trial", "acquire JOB --plain")
@@ -47,7 +45,6 @@ def command(
 
     Type help for the words; the same command goes on where the last session ended.
     """
-    defer_scipy()
     from cmm_uq.app.cli.operating import operated
     from cmm_uq.app.commands.laboratory.acquire import begin_acquisition, write_trial
 

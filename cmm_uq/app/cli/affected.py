@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli import NOT_CONFORMING
 from cmm_uq.app.cli.options import Json, Quiet, Records, Verbose, examples
-from cmm_uq.app.cli.printing import put_data, say
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
@@ -48,7 +46,7 @@ def command(
     """
     if only_list and write is not None:
         raise CmmUqError("nothing is written of what is only listed", where="--list", fix="Leave out --list or --write")
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq import __version__
         from cmm_uq.app.commands.certificates.affected import affected
         from cmm_uq.app.commands.files import silent

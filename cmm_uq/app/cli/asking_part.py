@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
-from cmm_uq.app.cli.printing import say
+from cmm_uq.app.cli.terminal import say
 from cmm_uq.base.errors import CmmUqError
 
 if TYPE_CHECKING:

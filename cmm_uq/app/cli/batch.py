@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli import BAD_INPUT, NOT_CONFORMING
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, out
-from cmm_uq.app.cli.printing import layout, put_data, show
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.options import Force, Json, Quiet, Records, Seed, Strict, Verbose, examples, job_folders, out
+from cmm_uq.app.cli.summary import screen_layout
+from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, progress, put_data, show
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.batch import Batch
@@ -76,16 +74,15 @@ def command(
     records: Records = None,
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.laboratory.batch import BatchOptions as Asked
-        from cmm_uq.app.commands.laboratory.batch import write_batch
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.batch import Asked, write_batch
 
         asked = Asked(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
         batch = write_batch(folders, out, asked, parquet=parquet, stage=stage, records=records)
     if json:
         put_data(batch.as_data())
     elif not quiet:
-        show(layout(verbose=verbose).screen(_summary(batch, verbose=verbose)))
+        show(screen_layout(verbose=verbose).screen(_summary(batch, verbose=verbose)))
     if batch.failed:
         raise typer.Exit(BAD_INPUT)
     if strict and batch.not_conforming:

@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli import NOT_CONFORMING
-from cmm_uq.app.cli.completion import toml_files
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Settled, Verbose, examples, out
-from cmm_uq.app.cli.printing import put_json, show_summary
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Settled, Verbose, examples, out, toml_files
+from cmm_uq.app.cli.summary import show_summary
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_json
 from cmm_uq.base.languages.language import ENGLISH
 
 if TYPE_CHECKING:
@@ -40,7 +38,7 @@ def command(
     language: Language = None,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.budget import write_budget
         from cmm_uq.app.commands.files import silent
 

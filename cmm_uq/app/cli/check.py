@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli import BAD_INPUT
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.deferred import defer_scipy
-from cmm_uq.app.cli.options import Json, Quiet, examples
-from cmm_uq.app.cli.printing import layout, put, put_data, show
+from cmm_uq.app.cli.options import Json, Quiet, examples, job_folders
+from cmm_uq.app.cli.summary import screen_layout
+from cmm_uq.app.cli.terminal import BAD_INPUT, put, put_data, show
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
@@ -35,7 +33,6 @@ def command(
 
     What ISO/IEC 17025:2017, 7.8 asks for and a job does not state makes its certificate a draft, and is told with its key.
     """
-    defer_scipy()
     from cmm_uq.app.commands.jobs.check import check_job
 
     found = [check_job(job) for job in jobs]
@@ -43,7 +40,7 @@ def command(
         put_data({"schema": SCHEMA, "jobs": [one.as_data() for one in found]})
     elif not quiet:
         for one in found:
-            show(layout(verbose=True).screen(_summary(one)))
+            show(screen_layout(verbose=True).screen(_summary(one)))
             if clauses:
                 _show_clauses(one)
     if not all(one.sound for one in found):

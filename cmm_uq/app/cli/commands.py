@@ -10,7 +10,6 @@ from typing import Annotated, Any
 import typer
 
 from cmm_uq.app.cli import (
-    BAD_INPUT,
     acquire,
     affected,
     batch,
@@ -43,7 +42,7 @@ from cmm_uq.app.cli import (
     verify,
 )
 from cmm_uq.app.cli.options import examples
-from cmm_uq.app.cli.printing import say
+from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
 
 app = typer.Typer(

@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.derived import conclude_derived
-from cmm_uq.app.cli.options import Force, Json, Quiet, Verbose, examples
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.options import Force, Json, Quiet, Verbose, examples, job_folders
+from cmm_uq.app.cli.summary import conclude_derived
+from cmm_uq.app.cli.terminal import progress as shown
 from cmm_uq.base.errors import CmmUqError
 
 EXAMPLES = examples(

@@ -9,8 +9,8 @@ import typer
 
 from cmm_uq.app.cli.importing import show_imported
 from cmm_uq.app.cli.options import Force, Job, Json, Language, Quiet, Records, Seed, Strict, Verbose, examples, out
-from cmm_uq.app.cli.printing import conclude
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.summary import conclude
+from cmm_uq.app.cli.terminal import progress
 
 EXAMPLES = examples(
     "diagnose examples/iota-1102-20C", "diagnose JOB --against predicted.csv", "diagnose JOB --strict --quiet"
@@ -41,7 +41,7 @@ def command(
     records: Records = None,
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.report import write_diagnosis
 
         told = None if quiet or json else show_imported

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli import NOT_CONFORMING
-from cmm_uq.app.cli.options import Force, Json, Quiet, examples
-from cmm_uq.app.cli.printing import layout, put_data, show
-from cmm_uq.app.cli.recording_options import Fleet, On, Records, day_of, time_of
+from cmm_uq.app.cli.options import Fleet, Force, Json, On, Quiet, ReadRecords, day_of, examples, time_of
+from cmm_uq.app.cli.summary import screen_layout
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, show
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.due import WhatIsDue
@@ -23,7 +22,7 @@ def command(
         list[str] | None,
         typer.Argument(help="Serial numbers or names; all machines and artefacts without.", metavar="[MACHINE]..."),
     ] = None,
-    records: Records = None,
+    records: ReadRecords = None,
     on: On = None,
     fleet: Fleet = None,
     within: Annotated[
@@ -54,13 +53,12 @@ def command(
 
 
 def _show(found: WhatIsDue, files: dict[str, Path]) -> None:
-    from cmm_uq.app.cli.files_told import folder_of
-    from cmm_uq.app.cli.layout import COLOURS, HEADING
+    from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of
     from cmm_uq.certificate.due_page import counts, due_row
 
     told, standing = counts(found.items, found.on, found.within)
     show([((f"{found.on.isoformat()}: ", HEADING), (told, COLOURS[standing]))])
     # every reason whole: a list that says why is what is asked for
-    show(layout(verbose=True).table([due_row(one, found.on, found.within) for one in found.items]))
+    show(screen_layout(verbose=True).table([due_row(one, found.on, found.within) for one in found.items]))
     if files:
         show([(("Written to ", HEADING), (folder_of(files), ""))])

@@ -7,17 +7,15 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli import NOT_CONFORMING
-from cmm_uq.app.cli.options import Force, Json, Quiet, Seed, Verbose, examples
-from cmm_uq.app.cli.printing import put_data, show_summary
-from cmm_uq.app.cli.progress import shown
-from cmm_uq.app.cli.recording_options import Records
+from cmm_uq.app.cli.options import Force, Json, Quiet, ReadRecords, Seed, Verbose, examples
+from cmm_uq.app.cli.summary import show_summary
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data
 
 EXAMPLES = examples("fleet", "fleet --name scale_x.ppm --out DIR", "fleet --records lab.db --json")
 
 
 def command(
-    records: Records = None,
+    records: ReadRecords = None,
     name: Annotated[
         list[str] | None,
         typer.Option(
@@ -36,7 +34,7 @@ def command(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.files import silent
         from cmm_uq.app.commands.laboratory.fleet import fleet, write_fleet
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Force, Json, Quiet, Verbose, examples
-from cmm_uq.app.cli.printing import layout, put_data, show
-from cmm_uq.app.cli.recording_options import Fleet, On, Records, day_of
+from cmm_uq.app.cli.options import Fleet, Force, Json, On, Quiet, ReadRecords, Verbose, day_of, examples
+from cmm_uq.app.cli.summary import screen_layout
+from cmm_uq.app.cli.terminal import put_data, show
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.due.history import MachineHistory
@@ -19,7 +19,7 @@ EXAMPLES = examples("history 1102", "history 1102 --out DIR", "history 'CMM of h
 
 def command(
     machine: Annotated[str, typer.Argument(help="Serial number of the machine, or its name.", metavar="MACHINE")],
-    records: Records = None,
+    records: ReadRecords = None,
     on: On = None,
     fleet: Fleet = None,
     out: Annotated[
@@ -47,8 +47,7 @@ def command(
 
 
 def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> None:
-    from cmm_uq.app.cli.files_told import folder_of
-    from cmm_uq.app.cli.layout import COLOURS, HEADING
+    from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of
     from cmm_uq.certificate.history_words import summary_row, terminal_note
 
     machine = found.machine
@@ -56,7 +55,7 @@ def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> No
     count = len(found.certificates)
     recordings = "one recording" if count == 1 else f"{count} recordings"
     show([((f"{machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))])
-    show(layout(verbose=verbose).table([summary_row(found, one) for one in found.values]))
+    show(screen_layout(verbose=verbose).table([summary_row(found, one) for one in found.values]))
     if found.values:
         show([((terminal_note(found), ""),)])
     show([((text, COLOURS["open"]),) for text in found.remarks])

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli import printing
-from cmm_uq.app.cli.deferred import defer_scipy
+from cmm_uq.app.cli import terminal
 from cmm_uq.app.cli.options import Quiet, examples
-from cmm_uq.app.cli.printing import put, say
+from cmm_uq.app.cli.summary import screen_layout
+from cmm_uq.app.cli.terminal import put, say
 from cmm_uq.base.errors import CmmUqError
 
 if TYPE_CHECKING:
@@ -61,7 +61,6 @@ def command(
     json: Annotated[bool, typer.Option("--json", help="Print what is recognised as JSON.")] = False,
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
-    defer_scipy()
     from cmm_uq.app.commands.jobs.exchange import read_export, write_recording
 
     found = read_export(file, keys_of(column, key))
@@ -112,7 +111,7 @@ def _value(text: str) -> str | int:
 
 def show(recognised: Recognised) -> None:
     """What was recognised, as a table."""
-    printing.show([(("Recognised", "bold"),), *printing.layout(verbose=True).table(recognised.rows), ()])
+    terminal.show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
 
 
 def show_imported(job: Job) -> None:

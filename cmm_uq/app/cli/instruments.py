@@ -9,10 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.completion import profiles
-from cmm_uq.app.cli.deferred import defer_scipy
-from cmm_uq.app.cli.options import Json, examples
-from cmm_uq.app.cli.printing import put_data, say
+from cmm_uq.app.cli.options import Json, examples, profiles
+from cmm_uq.app.cli.terminal import put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 app = typer.Typer(
@@ -211,7 +209,6 @@ def simulate(
 
 
 def _attempt(profile: str, port: str, job: Path | None) -> Any:
-    defer_scipy()
     from cmm_uq.app.commands.laboratory.instruments import Attempt
 
     return Attempt(profile, port, job)

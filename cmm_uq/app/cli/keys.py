@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Json, Quiet, examples
-from cmm_uq.app.cli.printing import helped, put_data, say
-from cmm_uq.app.cli.signing_options import hidden
+from cmm_uq.app.cli.options import Json, Quiet, ask_secret, examples
+from cmm_uq.app.cli.terminal import helped, put_data, say
 from cmm_uq.base.errors import printable
 
 app = typer.Typer(
@@ -40,7 +39,7 @@ def new(
     from cmm_uq.app.commands.certificates.keys import new_test_key
     from cmm_uq.certificate.sign import TEST_NOTE
 
-    made = new_test_key(file, name, lambda question: hidden(question, twice=True))
+    made = new_test_key(file, name, lambda question: ask_secret(question, twice=True))
     if json:
         put_data({"key": str(made.key), "certificate": str(made.certificate), "test_key": True})
     elif not quiet:

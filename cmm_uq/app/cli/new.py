@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.completion import kinds
-from cmm_uq.app.cli.deferred import defer_scipy
-from cmm_uq.app.cli.derived import put_manifest
 from cmm_uq.app.cli.importing import Columns, Keys, keys_of, show
-from cmm_uq.app.cli.options import Json, Quiet, examples
-from cmm_uq.app.cli.printing import can_answer, put_data, say
+from cmm_uq.app.cli.options import Json, Quiet, examples, kinds
+from cmm_uq.app.cli.summary import put_manifest
+from cmm_uq.app.cli.terminal import can_answer, put_data, say
 from cmm_uq.base.errors import CmmUqError
 
 if TYPE_CHECKING:
@@ -72,7 +70,6 @@ def command(
     On a terminal it asks for machine, artefact and limits, of a part for the machine's certificate, features, datums and
     tolerances, unless one of the options gives something.
     """
-    defer_scipy()
     from cmm_uq.app.commands.jobs.folder import BUDGET
     from cmm_uq.app.commands.jobs.new import check_empty, known, titles, write_new
     from cmm_uq.app.commands.new_part import PART

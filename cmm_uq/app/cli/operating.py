@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.cli.printing import on_terminal, say, say_now
+from cmm_uq.app.cli.terminal import on_terminal, say, say_now
 from cmm_uq.base.output.interruption import speaking
 
 if TYPE_CHECKING:

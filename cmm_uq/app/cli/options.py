@@ -1,14 +1,107 @@
-"""Options that several subcommands have, each said once."""
+"""Options that several subcommands have, each said once, and what a shell completes."""
 
 from __future__ import annotations
 
+import datetime as dt
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
+from cmm_uq.app.cli.terminal import on_terminal, say
+from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.languages.language import Code
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.signing import Signing
+
+JOB_FILE = "job.toml"
+
+DEEP = 3
+"""Folders below the one that is typed."""
+
+MOST = 5000
+"""Entries that are looked at: completion must be quick in any folder."""
+
+
+def job_folders(incomplete: str) -> list[str]:
+    """Folders with a ``job.toml`` that begin as typed; the shell completes any path where there are none."""
+    return sorted({folder for folder, name in _files(incomplete) if name == JOB_FILE and folder.startswith(incomplete)})
+
+
+def toml_files(incomplete: str) -> list[str]:
+    """Files in TOML that begin as typed and are no job."""
+    found = (os.path.join(folder, name) for folder, name in _files(incomplete) if name.endswith(".toml"))  # noqa: PTH118
+    return sorted(path for path in found if path.startswith(incomplete) and not path.endswith(JOB_FILE))
+
+
+def kinds(incomplete: str) -> list[str]:
+    """What a new job can be, those of other packages too."""
+    from cmm_uq.app.commands.jobs.folder import BUDGET, PLAN
+    from cmm_uq.app.commands.jobs.new import known
+    from cmm_uq.app.commands.new_part import PART
+
+    return [name for name in (*known(), PLAN, PART, BUDGET) if name.startswith(incomplete)]
+
+
+def profiles(incomplete: str) -> list[str]:
+    """Ready profiles of instruments, and files in TOML."""
+    from cmm_uq.laboratory.live.instruments.library import ready
+
+    return [*(name for name in ready() if name.startswith(incomplete)), *toml_files(incomplete)]
+
+
+def _files(incomplete: str) -> Iterator[tuple[str, str]]:
+    """Folder and name of the files below the folder that is typed, each folder as it would be typed."""
+    start = os.path.dirname(incomplete)  # noqa: PTH120 - a Path would drop the "./" that was typed
+    todo, seen = [(start, 0)], 0
+    while todo and seen < MOST:
+        folder, depth = todo.pop(0)
+        try:
+            entries = sorted(os.scandir(folder or "."), key=lambda entry: entry.name)
+        except OSError:
+            continue
+        for entry in entries:
+            seen += 1
+            if entry.name.startswith("."):
+                continue
+            if entry.is_file():
+                yield folder, entry.name
+            elif depth < DEEP and entry.is_dir():
+                todo.append((os.path.join(folder, entry.name), depth + 1))  # noqa: PTH118
+
+
+def option(text: str, metavar: str | None = None, default: str | bool = True, *names: str, **more: Any) -> Any:
+    """An option: its help, what stands for its value, what is told of its default, and names beside that of the parameter."""
+    return typer.Option(*names, help=text, metavar=metavar, show_default=default, **more)
+
+
+def argument(text: str, metavar: str, default: str | bool = True, **more: Any) -> Any:
+    return typer.Argument(help=text, metavar=metavar, show_default=default, **more)
+
+
+def flag(name: str, text: str, *names: str) -> Any:
+    """An option without a value."""
+    return typer.Option(name, *names, help=text)
+
+
+def out(default: str) -> Any:
+    """Of ``--out``, where a folder is chosen without it."""
+    return option("Folder to write to.", "DIR", default)
+
+
+def job_folder(text: str) -> Any:
+    return argument(text, "JOB", autocompletion=job_folders)
+
+
+def of_environment(text: str, metavar: str, name: str, variable: str, otherwise: str = "") -> Any:
+    """An option that a variable of the environment gives where nobody else does."""
+    default = f"{variable}, else {otherwise}" if otherwise else variable
+    return option(text, metavar, default, name, envvar=variable, show_envvar=False)
 
 
 def examples(*lines: str) -> str:
@@ -16,54 +109,113 @@ def examples(*lines: str) -> str:
     return "\n".join(["\b", "Examples:", *(f"  cmm-uq {line}" for line in lines)])
 
 
-def out(default: str) -> typer.models.OptionInfo:
-    """Of ``--out``, where a folder is chosen without it."""
-    found: typer.models.OptionInfo = typer.Option(help="Folder to write to.", metavar="DIR", show_default=default)
+Job = Annotated[Path, job_folder("Job folder: job.toml and the recording that it names.")]
+Language = Annotated[
+    Code | None, option("Language of the documents; files for programs stay English.", None, "the job's, else en")
+]
+Seed = Annotated[int, option("Seed of everything random; the same seed gives the same bytes.", "N", min=0)]
+Quiet = Annotated[bool, flag("--quiet", "Print nothing but errors.", "-q")]
+Verbose = Annotated[bool, flag("--verbose", "Print everything, whole; without a terminal also the stages.", "-v")]
+Json = Annotated[bool, flag("--json", "Print one JSON object instead of the summary; an error is one too.")]
+Force = Annotated[bool, flag("--force", "Keep what stands in the way as NAME.previous instead of refusing.")]
+Settled = Annotated[bool, flag("--strict", "Exit code 4 unless Monte Carlo is stable to the digits asked for.")]
+Strict = Annotated[bool, flag("--strict", "Exit code 4 unless everything conforms and agrees with the model.")]
+Records = Annotated[
+    str | None,
+    option(
+        "Records that it is kept in: a file, a postgresql:// URL, or none.", "WHERE", "records.db beside the reports",
+        "--records", envvar="CMM_UQ_RECORDS", show_envvar=False,
+    ),
+]  # fmt: skip
+ReadRecords = Annotated[
+    str | None,
+    option(
+        "The records: a file, or the URL of a PostgreSQL database.", "WHERE", "CMM_UQ_RECORDS, or reports/records.db",
+        "--records",
+    ),
+]  # fmt: skip
+On = Annotated[str | None, option("The day asked about; later recordings do not count.", "DATE", "today", "--on")]
+Fleet = Annotated[
+    Path | None,
+    option(
+        "fleet.json of the fleet that the drift model takes as prior.", "FILE", "a prior without a fleet", "--fleet"
+    ),
+]
+_KEY = "a PKCS#12 file, or pkcs11:token=LABEL;object=LABEL?module-path=FILE"
+Sign = Annotated[
+    str | None, of_environment(f"Sign with this key: {_KEY}.", "KEY", "--sign", "CMM_UQ_SIGN_KEY", "nobody signs")
+]
+Key = Annotated[str, of_environment(f"The key: {_KEY}.", "KEY", "--key", "CMM_UQ_SIGN_KEY")]
+TimeServer = Annotated[
+    str | None,
+    of_environment(
+        "Time stamp server (RFC 3161) for the PDF.", "URL", "--time-server", "CMM_UQ_SIGN_TIME_SERVER", "none"
+    ),
+]
+Level = Annotated[
+    str | None,
+    option(
+        "Of the PDF's signature: B-B, B-T, B-LT or B-LTA.", "LEVEL", "B-T with a time stamp server, else B-B", "--level",
+        envvar="CMM_UQ_SIGN_LEVEL", show_envvar=False,
+    ),
+]  # fmt: skip
+Trusted = Annotated[
+    list[Path] | None,
+    option(
+        "Certificates that one trusts: PEM file or folder; again for more.", "PATH", "nobody", "--trust",
+        envvar="CMM_UQ_TRUST", show_envvar=False,
+    ),
+]  # fmt: skip
+
+_DAYS = {"d": 1, "w": 7, "m": 30, "y": 365}
+_LONGEST = 36_500
+
+
+def day_of(text: str | None) -> dt.date | None:
+    """The day of ``--on``."""
+    if text is None:
+        return None
+    try:
+        return dt.date.fromisoformat(text)
+    except ValueError:
+        raise CmmUqError(f"{text!r} is no date", where="--on", fix="Write it as 2026-11-22") from None
+
+
+def time_of(text: str | None) -> dt.timedelta | None:
+    """The time of ``--within``: a number of days, or one with d, w, m (30 days) or y (365 days) behind it."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d{1,5})\s*([dwmy]?)", text.strip(), re.ASCII)
+    days = int(found[1]) * _DAYS[found[2] or "d"] if found else _LONGEST + 1
+    if days > _LONGEST:
+        raise CmmUqError(f"{text!r} is no time", where="--within", fix="Write it as 90d, 12w, 3m or 1y")
+    return dt.timedelta(days=days)
+
+
+def open_key(key: str, server: str | None, level: str | None, trust: list[Path] | None) -> Signing:
+    """The key, opened."""
+    from cmm_uq.app.commands.signing import Wanted, signing
+
+    return signing(Wanted(key, level, server, tuple(trust or ())), ask_secret)
+
+
+def ask_secret(question: str, *, twice: bool = False) -> str:
+    """A secret from the keyboard, that is not shown."""
+    from cmm_uq.app.commands.signing import PASSPHRASE_FILE
+
+    if not on_terminal(sys.stdin):
+        raise CmmUqError(f"{question.rstrip(': ')}: nobody is there to be asked", where="standard input",
+                         fix=f"Write it into a file, chmod 600, and name that in {PASSPHRASE_FILE}")  # fmt: skip
+    found: str = typer.prompt(question.rstrip(": "), hide_input=True, confirmation_prompt=twice, err=True)
     return found
 
 
-Job = Annotated[
-    Path,
-    typer.Argument(
-        help="Job folder: job.toml and the recording that it names.", metavar="JOB", autocompletion=job_folders
-    ),
-]
-Language = Annotated[
-    Code | None,
-    typer.Option(help="Language of the documents; files for programs stay English.", show_default="the job's, else en"),
-]
-Seed = Annotated[
-    int, typer.Option(help="Seed of everything random; the same seed gives the same bytes.", metavar="N", min=0)
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
-Verbose = Annotated[
-    bool,
-    typer.Option("--verbose", "-v", help="Print everything, whole; without a terminal also the stages."),
-]
-Json = Annotated[
-    bool,
-    typer.Option("--json", help="Print one JSON object instead of the summary; an error is one too."),
-]
-Records = Annotated[
-    str | None,
-    typer.Option(
-        "--records",
-        help="Records that it is kept in: a file, a postgresql:// URL, or none.",
-        metavar="WHERE",
-        envvar="CMM_UQ_RECORDS",
-        show_default="records.db beside the reports",
-        show_envvar=False,
-    ),
-]
-Force = Annotated[
-    bool,
-    typer.Option("--force", help="Keep what stands in the way as NAME.previous instead of refusing."),
-]
-Settled = Annotated[
-    bool,
-    typer.Option("--strict", help="Exit code 4 unless Monte Carlo is stable to the digits asked for."),
-]
-Strict = Annotated[
-    bool,
-    typer.Option("--strict", help="Exit code 4 unless everything conforms and agrees with the model."),
-]
+def show_signatures(signing: Signing, files: Iterable[Path]) -> None:
+    """Who signed which files, and whether the key is a test's."""
+    from cmm_uq.certificate.sign import TEST_NOTE
+
+    names = ", ".join(path.name for path in files)
+    level = "" if signing.stamping is None else f", PAdES {signing.stamping.level}"
+    say(printable(f"Signed by {signing.signer.name} on {signing.at:%Y-%m-%d %H:%M UTC}{level}: {names}"))
+    if signing.signer.test_key:
+        say(f"TEST KEY: {TEST_NOTE}")

@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Seed, Verbose, examples, out
-from cmm_uq.app.cli.printing import conclude
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Seed, Verbose, examples, job_folders, out
+from cmm_uq.app.cli.summary import conclude
+from cmm_uq.app.cli.terminal import progress
 
 EXAMPLES = examples(
     "part examples/part-plate-simulated", "part JOB --digits 2 --rerun", "part JOB --json --strict > results.json"
@@ -68,7 +67,7 @@ def command(
     language: Language = None,
 ) -> None:
     """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.files import silent
         from cmm_uq.app.commands.part_written import Asked, write_part
 

@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Strict, Verbose, examples, out
-from cmm_uq.app.cli.printing import conclude
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Strict, Verbose, examples, job_folders, out
+from cmm_uq.app.cli.summary import conclude
+from cmm_uq.app.cli.terminal import progress
 
 EXAMPLES = examples("plan examples/plan-ballbar", "plan JOB --no-power", "plan JOB --verbose")
 
@@ -36,7 +35,7 @@ def command(
     language: Language = None,
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.plans.plan import write_plan
 
         written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage, language=language)

@@ -8,10 +8,9 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Verbose, examples, out
-from cmm_uq.app.cli.printing import conclude, say
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Verbose, examples, job_folders, out
+from cmm_uq.app.cli.summary import conclude
+from cmm_uq.app.cli.terminal import progress, say
 
 EXAMPLES = examples(
     "prove examples/iota-1102-20C", "prove JOB --cases 400 --workers 8", "prove examples/plan-ballbar --strict"
@@ -53,7 +52,7 @@ def command(
     language: Language = None,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.prove import write_proof
         from cmm_uq.app.commands.proving import Asked
         from cmm_uq.laboratory.schedule.processes import processes

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cmm_uq.app.cli.options import Quiet, examples
-from cmm_uq.app.cli.printing import say
+from cmm_uq.app.cli.terminal import say
 from cmm_uq.base.errors import printable
 
 EXAMPLES = examples("qif reports/iota-1102-20C", "qif reports/iota-1102-20C/results.json --out iota.qif")

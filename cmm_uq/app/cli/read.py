@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cmm_uq.app.cli.options import Json, Quiet, examples
-from cmm_uq.app.cli.printing import put, put_data
+from cmm_uq.app.cli.terminal import put, put_data
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:

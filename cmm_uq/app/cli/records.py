@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli import NOT_CONFORMING
 from cmm_uq.app.cli.options import Json, Quiet, Records, examples
-from cmm_uq.app.cli.printing import helped, put_data, say
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, helped, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 app = typer.Typer(

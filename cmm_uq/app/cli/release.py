@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cmm_uq.app.cli.options import Json, Quiet, Records, examples
-from cmm_uq.app.cli.printing import can_answer, put_data, say
+from cmm_uq.app.cli.terminal import can_answer, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 EXAMPLES = examples(

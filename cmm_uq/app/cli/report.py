@@ -7,12 +7,28 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders
 from cmm_uq.app.cli.importing import show_imported
-from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Records, Seed, Strict, Verbose, examples, out
-from cmm_uq.app.cli.printing import conclude
-from cmm_uq.app.cli.progress import shown
-from cmm_uq.app.cli.signing_options import Level, Sign, TimeServer, Trusted, asked_signing, said_of
+from cmm_uq.app.cli.options import (
+    Force,
+    Json,
+    Language,
+    Level,
+    Quiet,
+    Records,
+    Seed,
+    Sign,
+    Strict,
+    TimeServer,
+    Trusted,
+    Verbose,
+    examples,
+    job_folders,
+    open_key,
+    out,
+    show_signatures,
+)
+from cmm_uq.app.cli.summary import conclude
+from cmm_uq.app.cli.terminal import progress
 from cmm_uq.base.errors import CmmUqError
 
 EXAMPLES = examples(
@@ -79,8 +95,8 @@ def command(
 
         asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
         raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
-    signing = None if sign is None else asked_signing(sign, time_server, level, trust)
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    signing = None if sign is None else open_key(sign, time_server, level, trust)
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.report import write_report
 
         told = None if quiet or json else show_imported
@@ -92,7 +108,7 @@ def command(
         conclude(report, json=json, quiet=quiet, strict=strict, verbose=verbose)
     finally:
         if signing is not None and not (quiet or json):
-            said_of(signing, [path for path in report.files.values() if path.suffix in (".pdf", ".xml")])
+            show_signatures(signing, [path for path in report.files.values() if path.suffix in (".pdf", ".xml")])
 
 
 def _check(jobs: list[Path], others: dict[str, object], *, scheduled: bool) -> None:

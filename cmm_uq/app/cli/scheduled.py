@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.cli.printing import put_json
+from cmm_uq.app.cli.terminal import put_json
 from cmm_uq.base.errors import OutputError
 
 if TYPE_CHECKING:

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.deferred import defer_scipy
 from cmm_uq.app.cli.options import examples
-from cmm_uq.app.cli.printing import put_json
+from cmm_uq.app.cli.terminal import put_json
 
 EXAMPLES = examples("schema job > job.schema.json", "schema budget", "schema truth")
 
@@ -19,7 +18,6 @@ def command(
     ] = "job",
 ) -> None:
     """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
-    defer_scipy()
     from cmm_uq.app.commands.jobs.schemas import as_text, schema_named
 
     put_json(as_text(schema_named(name)))

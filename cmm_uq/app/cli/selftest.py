@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli import NOT_CONFORMING
 from cmm_uq.app.cli.options import Json, Verbose, examples
-from cmm_uq.app.cli.printing import layout, put_data, show
+from cmm_uq.app.cli.summary import screen_layout
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, show
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,7 +37,7 @@ def command(
         figures = [{**asdict(one), "got": float(one.got), "passed": bool(one.passed)} for one in outcomes]
         put_data({"schema": SCHEMA, "program": f"cmm-uq {__version__}", "passed": passed, "figures": figures})
     else:
-        show(layout(verbose=verbose).screen(_summary(outcomes, quiet=quiet, verbose=verbose)))
+        show(screen_layout(verbose=verbose).screen(_summary(outcomes, quiet=quiet, verbose=verbose)))
     if passed < len(outcomes):
         raise typer.Exit(NOT_CONFORMING)
 

@@ -7,16 +7,15 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Quiet, examples
-from cmm_uq.app.cli.printing import say_now
-from cmm_uq.app.cli.recording_options import Records
+from cmm_uq.app.cli.options import Quiet, ReadRecords, examples
+from cmm_uq.app.cli.terminal import say_now
 from cmm_uq.base.output.interruption import keeping
 
 EXAMPLES = examples("serve", "serve --records lab.db --open", "serve --records postgresql://lab@db/records --port 9000")
 
 
 def command(
-    records: Records = None,
+    records: ReadRecords = None,
     port: Annotated[
         int, typer.Option(help="Port to listen on; 0 takes a free one.", metavar="N", min=0, max=65535)
     ] = 8765,

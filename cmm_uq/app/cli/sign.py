@@ -7,9 +7,19 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Json, Quiet, Records, examples
-from cmm_uq.app.cli.printing import put_data, say
-from cmm_uq.app.cli.signing_options import Key, Level, TimeServer, Trusted, asked_signing, said_of
+from cmm_uq.app.cli.options import (
+    Json,
+    Key,
+    Level,
+    Quiet,
+    Records,
+    TimeServer,
+    Trusted,
+    examples,
+    open_key,
+    show_signatures,
+)
+from cmm_uq.app.cli.terminal import put_data, say
 from cmm_uq.base.errors import printable
 
 EXAMPLES = examples(
@@ -36,7 +46,7 @@ def command(
 
     The set in their folder is written anew, all or none, and records that know the certificate are told.
     """
-    signing = asked_signing(key, time_server, level, trust)
+    signing = open_key(key, time_server, level, trust)
     from cmm_uq.app.commands.sign import sign_files
 
     done = sign_files(files, signing, out=out, records=records)
@@ -49,4 +59,4 @@ def command(
     elif not quiet:
         if done.records:
             say(printable(f"Recorded in {done.records}."))
-        said_of(signing, done.files)
+        show_signatures(signing, done.files)

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.completion import job_folders, toml_files
-from cmm_uq.app.cli.derived import conclude_derived
-from cmm_uq.app.cli.options import Force, Json, Quiet, Verbose, examples
+from cmm_uq.app.cli.options import Force, Json, Quiet, Verbose, examples, job_folders, toml_files
+from cmm_uq.app.cli.summary import conclude_derived
 
 EXAMPLES = examples("simulate JOB --truth truth.toml --out DIR", "simulate JOB --truth truth.toml --out DIR --seed 7")
 

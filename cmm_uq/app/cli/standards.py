@@ -7,9 +7,8 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.deferred import defer_scipy
 from cmm_uq.app.cli.options import examples
-from cmm_uq.app.cli.printing import say
+from cmm_uq.app.cli.terminal import say
 from cmm_uq.base.errors import CmmUqError, printable
 
 EXAMPLES = examples(
@@ -28,7 +27,6 @@ def command(
     With --form a form is written that a laboratory fills in beside its own copy and names in [[conformity]] clauses.
     Nothing is overwritten.
     """
-    defer_scipy()
     from cmm_uq.app.commands.certificates.standards import clauses_of, listed_standards, write_form
 
     if name is None:

@@ -7,11 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cmm_uq.app.cli import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.cli.deferred import defer_scipy
 from cmm_uq.app.cli.options import Json, Quiet, Verbose, examples
-from cmm_uq.app.cli.printing import put_data, say
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED, progress, put_data, say
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
@@ -59,8 +56,7 @@ def command(
     Exit code 0 where it is verified, 1 where something is wrong, 3 where nothing is but not all could be checked, 2 where a
     file cannot be read.
     """
-    defer_scipy()
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.verify import verify
 
         found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))

@@ -26,7 +26,7 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
         redirect_stdout(out), redirect_stderr(err), chdir(cwd or Path.cwd()),
         mock.patch.object(sys, "argv", line), warnings.catch_warnings(action="ignore"),
     ):  # fmt: skip
-        code = cli._ended()
+        code = cli.run_command()
     told = [stream.buffer.getvalue().decode() for stream in (out, err)]
     return subprocess.CompletedProcess(line, code, *told)
 

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from cmm_uq.app.cli.progress import shown
+from cmm_uq.app.cli.terminal import progress
 from tests.app.cli.terminal import on_terminal
 
 ANSWER = "cmm-uq: No such option: --seeed. Did you mean --seed? cmm-uq report --help lists its options"
@@ -29,7 +29,7 @@ def test_an_error_is_folded_between_words_and_red_only_where_colour_is_wanted(
 
 
 def stages(capsys: pytest.CaptureFixture[str], *, quiet: bool, verbose: bool) -> list[str]:
-    with shown(quiet=quiet, verbose=verbose) as stage:
+    with progress(quiet=quiet, verbose=verbose) as stage:
         for part in (0.0, 0.5, 1.0) if stage else ():
             stage(f"Sampling: {part:.0%} of the draws needed", part)
         if stage:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.cli.completion import job_folders, toml_files
+from cmm_uq.app.cli.options import job_folders, toml_files
 from tests.app.cli.terminal import until
 from tests.conftest import ROOT
 

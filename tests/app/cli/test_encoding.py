@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 import json
 import sys
@@ -11,7 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.app.cli import encoding
+from cmm_uq.app.cli import terminal as encoding
+from cmm_uq.app.commands.plans.plan import plan_summary
+from cmm_uq.base.messages import say
+from cmm_uq.base.units import Unit
+from cmm_uq.certificate.in_short import Summary
 from tests.conftest import ROOT
 
 
@@ -44,19 +49,7 @@ def test_json_is_the_same_data_in_every_encoding(text: str) -> None:
 
 def test_everything_that_the_program_prints_beyond_ascii_has_a_nearest() -> None:
     """Of the modules that write what a terminal shows; a unit or a sign that is added there must be added here too."""
-    folders = (
-        "cli",
-        "documents/summary.py",
-        "documents/in_short.py",
-        "commands/plan_summary.py",
-        "units.py",
-        "messages.py",
-    )
-    sources = [path for name in folders for path in _modules(ROOT / "cmm_uq" / name)]
-    assert len(sources) > 15
+    writers = map(inspect.getfile, (plan_summary, Summary, Unit, say))
+    sources = [*(ROOT / "cmm_uq" / "app" / "cli").rglob("*.py"), *map(Path, writers)]
     used = {c for path in sources for c in path.read_text(encoding="utf-8") if not c.isascii()}
     assert sorted(used - encoding.NEAREST.keys()) == []
-
-
-def _modules(path: Path) -> list[Path]:
-    return sorted(path.glob("*.py")) if path.is_dir() else [path]

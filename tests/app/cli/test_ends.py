@@ -114,9 +114,9 @@ def test_a_fault_of_the_program_is_one_line_too(budget: Path, tmp_path: Path) ->
 def test_a_fault_after_the_files_are_written_says_that_they_are(budget: Path, tmp_path: Path) -> None:
     """Here the summary breaks, as a library on a terminal may."""
     program = (
-        "import sys\nfrom cmm_uq.app.cli import main, printing\n"
+        "import sys\nfrom cmm_uq.app.cli import main, terminal\n"
         "def broken(text=''):\n    raise RuntimeError('broken')\n"
-        "printing.say = broken\nsys.argv = ['cmm-uq', *sys.argv[1:]]\nmain()\n"
+        "terminal.say = broken\nsys.argv = ['cmm-uq', *sys.argv[1:]]\nmain()\n"
     )
     done = subprocess.run([sys.executable, "-c", program, "budget", str(budget), "--out", str(tmp_path / "out")],
                           capture_output=True, text=True, check=False)  # fmt: skip

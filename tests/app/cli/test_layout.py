@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from cmm_uq.app.cli.folding import folded
-from cmm_uq.app.cli.layout import COLOURS, Layout, Line
+from cmm_uq.app.cli.summary import COLOURS, Layout
+from cmm_uq.app.cli.terminal import Line, folded
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.certificate.in_short import Summary, Verdict
 from tests.artefacts.simulated import outcome

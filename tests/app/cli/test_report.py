@@ -155,7 +155,7 @@ def test_help_and_errors_import_nothing_heavy() -> None:
         "import sys; sys.argv = ['cmm-uq', 'report', '--help']\n"
         "from cmm_uq.app.cli.commands import run; run()\n"
         "heavy = {'numpy', 'scipy', 'pandas', 'matplotlib', 'emcee', 'arviz', 'jinja2', 'typst', 'rich.console'}\n"
-        "import cmm_uq.app.cli.ending, cmm_uq.app.cli.folding\n"  # what tells an error on a terminal
+        "import cmm_uq.app.cli.terminal\n"  # what tells an error on a terminal
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

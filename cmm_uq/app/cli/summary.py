@@ -1,4 +1,4 @@
-"""A summary laid out in lines, for a terminal of any width or as plain text: the result first, files last.
+"""The end of a command in lines, for a terminal of any width or as plain text: the result first, files last.
 
 On a terminal texts are folded at spaces, and shortened unless everything is asked for. Elsewhere, where ``width`` is
 ``None``, every fact is one line, however long.
@@ -6,21 +6,65 @@ On a terminal texts are folded at spaces, and shortened unless everything is ask
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import json as json_text
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Protocol
 
+import typer
 from rich.cells import cell_len
 
-from cmm_uq.app.cli.folding import folded
+from cmm_uq.app.cli.terminal import (
+    NOT_CONFORMING,
+    Line,
+    columns,
+    folded,
+    on_terminal,
+    put_data,
+    put_json,
+    say,
+    show,
+)
 from cmm_uq.base.errors import printable
+from cmm_uq.base.output import MANIFEST
+from cmm_uq.jobs.origin import COMPENSATED, SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Standing
     from cmm_uq.certificate.in_short import Summary, Verdict
 
-Line = tuple[tuple[str, str], ...]
-"""Parts of a line, each with its style in the words of rich; none for the usual one."""
+FILES = {
+    "certificate.html": "the certificate",
+    "certificate.pdf": "the certificate",
+    "certificate.xml": "the digital certificate (DCC), for other programs",
+    "diagnosis.html": "the diagnosis, with its plots",
+    "diagnosis.pdf": "the diagnosis, with its plots",
+    "plan.html": "the plan, with a picture of each placing",
+    "plan.csv": "the placings, to be filled in as the recording",
+    "next_plan.csv": "the set-ups to measure next, to be filled in",
+    "validation.html": "the validation of the diagnosis",
+    "validation.pdf": "the validation of the diagnosis",
+    "truth.json": "what was true of each case, sealed beforehand",
+    "cases.jsonl": "what was said of each case",
+    "part.html": "the part, with its uncertainty",
+    "part.pdf": "the part, with its uncertainty",
+    "budget.html": "the budget",
+    "budget.pdf": "the budget",
+    "results.json": "every figure, for other programs",
+    "posterior.npz": "draws of the posterior, for other programs",
+    "provenance.json": "from what, by what and on what it was made",
+    "correction_table.csv": "correction table, for compensate",
+    "job.toml": "the job",
+    "truth.toml": "what it was drawn from",
+    "compensation.json": "how the coordinates came about",
+    "fleet.html": "what the machines have in common",
+    "fleet.json": "every figure, for other programs",
+    "fleet.csv": "every machine and value, for a spreadsheet",
+    MANIFEST: "name, size and hash of each file",
+}
+"""What each file is that a command writes."""
 
 COLOURS: dict[Standing, str] = {"good": "bold green", "open": "bold yellow", "bad": "bold red", "unknown": "bold"}
 HEADING, FAINT = "bold", "dim"
@@ -152,3 +196,90 @@ class Layout:
 def _widths(cells: Sequence[Sequence[str]]) -> list[int]:
     """Of the columns."""
     return [max(map(cell_len, column)) for column in zip(*cells, strict=True)]
+
+
+def screen_layout(*, verbose: bool) -> Layout:
+    """For standard output."""
+    return Layout(columns() if on_terminal(sys.stdout) else None, verbose)
+
+
+def file_rows(files: Mapping[str, Path], *, whole: bool) -> list[tuple[str, str]]:
+    """Rows of what was written and what it is; files that are the same thing on one row, unless each has a row of its own."""
+    if whole:
+        return [(str(path), _what(name)) for name, path in files.items()]
+    rows: dict[str, list[str]] = {}
+    for name in (name for name in files if name != MANIFEST):  # which lists the others
+        rows.setdefault(_what(name), []).append(name)
+    return [(", ".join(names), what) for what, names in rows.items()]
+
+
+def _what(name: str) -> str:
+    path = PurePosixPath(name)
+    plain = path.stem.removesuffix(f"-{SIMULATED}").removesuffix(f"-{COMPENSATED}")
+    what = FILES.get(plain + path.suffix, "input of the job")
+    return what.replace("certificate", "evaluation, not a certificate") if plain != path.stem else what
+
+
+def folder_of(files: Mapping[str, Path]) -> str:
+    return next((str(path.parent) for name, path in files.items() if "/" not in name), "")
+
+
+def show_summary(
+    summary: Summary, files: Mapping[str, Path], *, verbose: bool, name: str = "", banner: str = ""
+) -> None:
+    """A summary and the files that were written, on standard output."""
+    rows, folder = file_rows(files, whole=verbose), folder_of(files)
+    show(screen_layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
+
+
+class Result(Protocol):
+    """What a command wrote and found: a job's or a part's."""
+
+    @property
+    def results(self) -> bytes: ...
+    @property
+    def files(self) -> Mapping[str, Path]: ...
+    @property
+    def summary(self) -> Summary: ...
+    @property
+    def conforming(self) -> bool: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def origin(self) -> str: ...
+    @property
+    def recorded(self) -> str: ...
+
+
+def conclude(result: Result, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
+    """How a command ends that wrote an outcome: results.json or a summary; exit code 4 if strict, when not all is well."""
+    if json:
+        put_json(result.results.decode())
+    elif not quiet:
+        from cmm_uq.certificate.origin import BANNERS
+
+        banner = BANNERS.get(result.origin, "")
+        show_summary(result.summary, result.files, verbose=verbose, name=result.name, banner=banner)
+        if result.recorded:
+            say(result.recorded)
+    if strict and not result.conforming:
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def conclude_derived(
+    files: Mapping[str, Path], what: str, *, json: bool, quiet: bool, verbose: bool, is_job: bool = True
+) -> None:
+    """How a command ends that wrote a recording made from another one: its manifest, or where it is and what to do next."""
+    if json:
+        put_manifest(files)
+    elif not quiet:
+        from cmm_uq.base.messages import Verbatim, say
+        from cmm_uq.certificate.in_short import Summary
+
+        further = (say("Next: cmm-uq report {folder}", folder=Verbatim(folder_of(files))),) if is_job else ()
+        show_summary(Summary(Verbatim(what), remarks=further), files, verbose=verbose)
+
+
+def put_manifest(files: Mapping[str, Path]) -> None:
+    """The manifest of what was written, and the folder, as JSON."""
+    put_data({**json_text.loads(files[MANIFEST].read_bytes()), "folder": folder_of(files)})
