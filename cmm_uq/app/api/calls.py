@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.app.api.outcomes import Diagnosis, Plan, Proof, Report
-from cmm_uq.app.commands.jobs.check import Checked, check_job, check_read
+from cmm_uq.app.commands.jobs.check import JobCheck, check_job, check_read
 from cmm_uq.app.commands.jobs.folder import KEPT, PLAN
 from cmm_uq.app.commands.jobs.new import new_job, new_plan
 from cmm_uq.app.commands.reading import compared_with, in_language, job_of, read_job
@@ -377,7 +377,7 @@ def new(kind: str, *, id: str = "job", **tables: Mapping[str, Any]) -> Job:  # n
     return job_of({name: content for name, content in files.items() if name not in KEPT}, recorded=kind != PLAN)
 
 
-def check(job: Job | str | Path) -> Checked:
+def check(job: Job | str | Path) -> JobCheck:
     """All that is wrong with a job, without computing.
 
     Parameters

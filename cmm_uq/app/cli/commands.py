@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from copy import copy
 from typing import Annotated, Any
 
@@ -11,34 +12,21 @@ import typer
 
 from cmm_uq.app.cli import (
     acquire,
-    affected,
     batch,
-    budget,
-    check,
-    compensate,
+    certificates,
     diagnose,
     due,
+    evaluations,
     fleet,
     history,
-    importing,
     instruments,
-    keys,
-    new,
+    jobs,
     part,
-    plan,
     prove,
-    qif,
-    read,
     records,
-    release,
-    report,
     schedule,
-    schema,
-    selftest,
     serve,
     sign,
-    simulate,
-    standards,
     verify,
 )
 from cmm_uq.app.cli.options import examples
@@ -55,43 +43,105 @@ app = typer.Typer(
     rich_markup_mode=None,  # brackets of TOML stay as they are, and help is there at once
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module, short in {
-    new: "A job folder that runs at once, to be filled with your own figures.",
-    importing: "What is recognised of a laboratory's export.",
-    check: "All that is wrong with jobs, without computing.",
-    report: "The certificate of a recording: estimates, figures, decisions.",
-    part: "The uncertainty of what is measured on a part, and whether it conforms.",
-    batch: "The reports of many jobs, by processes or a cluster.",
-    diagnose: "What a recording shows that its model leaves out.",
-    plan: "What to measure, and what it will tell.",
-    prove: "The diagnosis tried on sealed cases with a job's set-ups.",
-    history: "Every value of a machine over time, from the records.",
-    due: "What is due for calibration, when and why, from the records.",
-    acquire: "A recording taken live, led by the plan.",
-    simulate: "A recording drawn from known errors, as a job of its own.",
-    compensate: "A recording corrected by its machine's error maps.",
-    fleet: "The drift that is usual for all machines of the records, and who differs.",
-    budget: "The uncertainty of any measurement model in a file.",
-    verify: "A certificate's files against each other, its figures, and its inputs computed again.",
-    release: "A certificate released, withdrawn or replaced.",
-    qif: "The results of a report as QIF 3.0.",
-    read: "A digital calibration certificate (DCC), printed.",
-    sign: "A certificate signed electronically: PDF and XML.",
-    affected: "Which certificates a correction of the package touches.",
-    serve: "The records to look at, in a browser.",
-    standards: "The standards that are decided, clause by clause, and forms to check them by.",
-    schema: "JSON Schema of a file, for editors that complete and explain.",
-    selftest: "Published reference figures, computed here and compared.",
-}.items():
-    name = "import" if module is importing else module.__name__.rpartition(".")[2]
-    app.command(name, short_help=short, epilog=module.EXAMPLES)(module.command)
 
-app.add_typer(instruments.app, name="instruments", short_help="Instruments: ready profiles, tried at a port, new ones.")
-app.add_typer(
-    schedule.app, name="schedule", short_help="Scheduled runs: what they go by, whom they tell, what starts them."
-)
-app.add_typer(keys.app, name="keys", short_help="Keys for electronic signatures: a new one for trying.")
-app.add_typer(records.app, name="records", short_help="The history: verified, imported, backed up, brought up to date.")
+COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
+    "new": (
+        jobs.new, "A job folder that runs at once, to be filled with your own figures.",
+        examples("new", "new step_gauge my-gauge", "new ballbar --machine 'CMM 3' --set artefact.length_mm=500"),
+    ),
+    "import": (
+        jobs.import_export, "What is recognised of a laboratory's export.",
+        examples("import export.xlsx", "import export.csv --key unit=inch --out recording.csv",
+                 "new ballbar my-job --from export.xlsx --machine 'CMM 3' --set job.date=2026-05-31"),
+    ),
+    "check": (
+        jobs.check, "All that is wrong with jobs, without computing.",
+        examples("check JOB", "check jobs/a jobs/b", "check JOB --clauses", "check JOB --json"),
+    ),
+    "report": (
+        evaluations.report, "The certificate of a recording: estimates, figures, decisions.",
+        examples("report examples/iota-1102-20C", "report JOB --out DIR --seed 3",
+                 "report JOB --json --strict > results.json", "report JOB --sign laboratory.p12",
+                 "report --scheduled jobs --dry-run"),
+    ),
+    "part": (part.command, "The uncertainty of what is measured on a part, and whether it conforms.", part.EXAMPLES),
+    "batch": (batch.command, "The reports of many jobs, by processes or a cluster.", batch.EXAMPLES),
+    "diagnose": (diagnose.command, "What a recording shows that its model leaves out.", diagnose.EXAMPLES),
+    "plan": (
+        evaluations.plan, "What to measure, and what it will tell.",
+        examples("plan examples/plan-ballbar", "plan JOB --no-power", "plan JOB --verbose"),
+    ),
+    "prove": (prove.command, "The diagnosis tried on sealed cases with a job's set-ups.", prove.EXAMPLES),
+    "history": (history.command, "Every value of a machine over time, from the records.", history.EXAMPLES),
+    "due": (due.command, "What is due for calibration, when and why, from the records.", due.EXAMPLES),
+    "acquire": (acquire.command, "A recording taken live, led by the plan.", acquire.EXAMPLES),
+    "simulate": (
+        jobs.simulate, "A recording drawn from known errors, as a job of its own.",
+        examples("simulate JOB --truth truth.toml --out DIR", "simulate JOB --truth truth.toml --out DIR --seed 7"),
+    ),
+    "compensate": (
+        jobs.compensate, "A recording corrected by its machine's error maps.",
+        examples("compensate JOB --out DIR", "compensate JOB --out DIR --map-text 20",
+                 "compensate JOB --cloud scan.csv --out DIR"),
+    ),
+    "fleet": (
+        fleet.command, "The drift that is usual for all machines of the records, and who differs.", fleet.EXAMPLES,
+    ),
+    "budget": (
+        evaluations.budget, "The uncertainty of any measurement model in a file.",
+        examples("budget model.toml", "budget model.toml --seed 2 --out DIR", "budget model.toml --json --strict"),
+    ),
+    "verify": (
+        verify.command, "A certificate's files against each other, its figures, and its inputs computed again.",
+        verify.EXAMPLES,
+    ),
+    "release": (
+        certificates.release, "A certificate released, withdrawn or replaced.",
+        examples("release K-2026-104 --by 'A. Huber' --reason 'checked against the recording'",
+                 "release K-2026-105 --by 'A. Huber' --despite 'customer informed, to be adjusted'",
+                 "release K-2026-104 --withdraw --by 'A. Huber' --reason 'wrong artefact'",
+                 "release K-2026-104 --replaced-by K-2026-118 --by 'A. Huber' --reason 'corrected'"),
+    ),
+    "qif": (
+        certificates.qif, "The results of a report as QIF 3.0.",
+        examples("qif reports/iota-1102-20C", "qif reports/iota-1102-20C/results.json --out iota.qif"),
+    ),
+    "read": (
+        certificates.read, "A digital calibration certificate (DCC), printed.",
+        examples("read certificate.xml", "read ball-plate.xml --json", "read certificate.xml --schema schemas"),
+    ),
+    "sign": (sign.command, "A certificate signed electronically: PDF and XML.", sign.EXAMPLES),
+    "affected": (
+        certificates.affected, "Which certificates a correction of the package touches.",
+        examples("affected --version 0.4.0", "affected --version 0.4.0 --list --json",
+                 "affected --version 0.4.0 --write replacements"),
+    ),
+    "serve": (serve.command, "The records to look at, in a browser.", serve.EXAMPLES),
+    "standards": (
+        certificates.standards, "The standards that are decided, clause by clause, and forms to check them by.",
+        examples("standards", 'standards "ISO 10360-2:2009"',
+                 'standards "ISO 10360-2:2009" --form iso-10360-2-clauses.toml'),
+    ),
+    "schema": (
+        certificates.schema, "JSON Schema of a file, for editors that complete and explain.",
+        examples("schema job > job.schema.json", "schema budget", "schema truth"),
+    ),
+    "selftest": (
+        evaluations.selftest, "Published reference figures, computed here and compared.",
+        examples("selftest", "selftest --verbose > selftest.txt", "selftest --json"),
+    ),
+}  # fmt: skip
+"""By name: the function, what the list of commands says of it, and calls as they are typed."""
+
+for name, (function, short, epilog) in COMMANDS.items():
+    app.command(name, short_help=short, epilog=epilog)(function)
+for name, group, short in (
+    ("instruments", instruments.app, "Instruments: ready profiles, tried at a port, new ones."),
+    ("schedule", schedule.app, "Scheduled runs: what they go by, whom they tell, what starts them."),
+    ("keys", certificates.keys, "Keys for electronic signatures: a new one for trying."),
+    ("records", records.app, "The history: verified, imported, backed up, brought up to date."),
+):
+    app.add_typer(group, name=name, short_help=short)
 
 OVERVIEW = """cmm-uq {version}: uncertainty of coordinate measuring machines (CMMs),
 and the calibration certificates that state it.
@@ -119,12 +169,7 @@ def _alone(
 
 
 def run() -> int:
-    """Run the subcommand that the command line names; its exit code.
-
-    Raises
-    ------
-    CmmUqError : bad input, among them unknown options; its subclass OutputError where nothing can be written.
-    """
+    """Run the subcommand that the command line names; its exit code. Unknown options are a CmmUqError too."""
     try:
         os.getcwd()  # noqa: PTH109 - Path.cwd() asks the same
     except OSError:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.importing import show_imported
+from cmm_uq.app.cli.jobs import show_imported
 from cmm_uq.app.cli.options import Force, Job, Json, Language, Quiet, Records, Seed, Strict, Verbose, examples, out
 from cmm_uq.app.cli.summary import conclude
 from cmm_uq.app.cli.terminal import progress

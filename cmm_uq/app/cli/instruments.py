@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
+import time
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.options import Json, examples, profiles
-from cmm_uq.app.cli.terminal import put_data, say
+from cmm_uq.app.cli.asking import instrument_answers
+from cmm_uq.app.cli.options import Json, argument, examples, option, profiles
+from cmm_uq.app.cli.terminal import put_data, say, say_now
 from cmm_uq.base.errors import CmmUqError, printable
 
 app = typer.Typer(
@@ -23,25 +25,21 @@ app = typer.Typer(
 SHOWN = 44
 """Characters of a message beside what was understood of it."""
 
-What = Annotated[
+Profile = Annotated[
     str,
-    typer.Argument(
-        help="Ready profile, a TOML file, or with --job the name of a source in it.",
-        metavar="PROFILE",
-        autocompletion=profiles,
+    argument(
+        "Ready profile, a TOML file, or with --job the name of a source in it.", "PROFILE", autocompletion=profiles
     ),
 ]
 Port = Annotated[
     str,
-    typer.Argument(
-        help="/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME.",
-        metavar="PORT",
-        show_default="that of the job",
+    argument(
+        "/dev/ttyUSB0, COM3, socket://host:port, rfc2217://host:port, tcp://host:port or file:NAME.", "PORT",
+        "that of the job",
     ),
-]
-Job = Annotated[
-    Path | None, typer.Option("--job", help="Job folder whose source is meant.", metavar="JOB", show_default="none")
-]
+]  # fmt: skip
+Job = Annotated[Path | None, option("Job folder whose source is meant.", "JOB", "none", "--job")]
+Seconds = Annotated[float | None, option("How long.", "S", "until it is interrupted", min=0.1)]
 
 
 @app.callback()
@@ -53,41 +51,41 @@ def _alone(context: typer.Context) -> None:
 @app.command("list", epilog=examples("instruments list", "instruments list --json"))
 def list_all(json: Json = False) -> None:
     """List the ready profiles and the serial ports of this computer."""
-    from cmm_uq.app.commands.laboratory.instruments import listed
+    from cmm_uq.app.commands.laboratory.instruments import ready_profiles
+    from cmm_uq.laboratory.live.instruments.ports import serial_ports
 
-    found = listed()
+    rows, ports = ready_profiles(), serial_ports()
     if json:
         keys = ("name", "title", "tried")
-        put_data(
-            {"profiles": [dict(zip(keys, row, strict=True)) for row in found.profiles], "ports": dict(found.ports)}
-        )
+        put_data({"profiles": [dict(zip(keys, row, strict=True)) for row in rows], "ports": dict(ports)})
         return
-    wide = max(len(name) for name, _, _ in found.profiles)
-    for name, title, _ in found.profiles:
+    wide = max(len(name) for name, _, _ in rows)
+    for name, title, _ in rows:
         say(f"{name:{wide}}  {title}")
     say()
-    for port, told in found.ports:
-        say(f"{port}  {told}".rstrip())
-    if not found.ports:
+    for port, description in ports:
+        say(f"{port}  {description}".rstrip())
+    if not ports:
         say("No serial port is here.")
 
 
 @app.command(
-    "test",
-    epilog=examples("instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job"),
-)  # fmt: skip
+    "test", epilog=examples("instruments test fluke-1502a /dev/ttyUSB0", "instruments test table_top --job my-job")
+)
 def try_out(
-    profile: What,
+    profile: Profile,
     port: Port = "",
     job: Job = None,
-    seconds: Annotated[float, typer.Option(help="How long.", metavar="S", min=0.1, max=86400)] = 5.0,
+    seconds: Annotated[float, option("How long.", "S", min=0.1, max=86400)] = 5.0,
     json: Json = False,
 ) -> None:
     """Try an instrument for a few seconds: who it is, and each message beside what was understood of it.
 
     Exit code 2 when nothing was, with what was seen, what was expected and what to check.
     """
-    attempt = _attempt(profile, port, job)
+    from cmm_uq.app.commands.laboratory.instruments import Attempt
+
+    attempt = Attempt(profile, port, job)
     for event in attempt.events(seconds):
         if not json:
             _show(event)
@@ -106,18 +104,12 @@ def try_out(
 
 
 @app.command("watch", epilog=examples("instruments watch line-logger socket://logger:4001"))
-def watch(
-    profile: What,
-    port: Port = "",
-    job: Job = None,
-    seconds: Annotated[
-        float | None, typer.Option(help="How long.", metavar="S", min=0.1, show_default="until it is interrupted")
-    ] = None,
-) -> None:
+def watch(profile: Profile, port: Port = "", job: Job = None, seconds: Seconds = None) -> None:
     """Show each message beside what is understood of it, gaps and returns too, until it is interrupted."""
+    from cmm_uq.app.commands.laboratory.instruments import Attempt
     from cmm_uq.base.output.interruption import speaking
 
-    attempt = _attempt(profile, port, job)
+    attempt = Attempt(profile, port, job)
     with speaking(attempt.source.close):
         for event in attempt.events(seconds):
             _show(event)
@@ -137,53 +129,38 @@ class Parity(StrEnum):
     ),
 )
 def new(
-    file: Annotated[Path, typer.Argument(help="New file: NAME.toml.", metavar="FILE")],
+    file: Annotated[Path, argument("New file: NAME.toml.", "FILE")],
     line: Annotated[
-        str,
-        typer.Option(
-            help="An example line with its end: T=20.13 C<CR><LF>.",
-            metavar="TEXT",
-            show_default="asked for on a terminal",
-        ),
+        str, option("An example line with its end: T=20.13 C<CR><LF>.", "TEXT", "asked for on a terminal")
     ] = "",
     quantity: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Name of a quantity with its unit at its end, and which number of the line it is: temp_c=1.",
-            metavar="NAME=N",
-            show_default="asked for on a terminal",
-        ),
+        option("Name of a quantity with its unit at its end, and which number of the line it is: temp_c=1.", "NAME=N",
+               "asked for on a terminal"),
     ] = None,
     limits: Annotated[
-        list[str] | None,
-        typer.Option("--range", help="Plausible values: temp_c=0:40.", metavar="NAME=LOW:HIGH", show_default="none"),
+        list[str] | None, option("Plausible values: temp_c=0:40.", "NAME=LOW:HIGH", "none", "--range")
     ] = None,
-    ask: Annotated[
-        str, typer.Option(help="What is sent to get a line: T?<CR>.", metavar="TEXT", show_default="nothing is sent")
-    ] = "",
-    every: Annotated[float, typer.Option(help="Seconds from one question to the next.", metavar="S", min=0.01)] = 1.0,
-    title: Annotated[
-        str, typer.Option(help="What the instrument is.", metavar="TEXT", show_default="the file's name")
-    ] = "",
-    baud: Annotated[int, typer.Option(help="Bits per second.", metavar="N", min=50)] = 9600,
-    bits: Annotated[int, typer.Option(help="Data bits.", metavar="N", min=5, max=8)] = 8,
-    parity: Annotated[Parity, typer.Option(help="Parity.", show_default="none")] = Parity.NONE,
-    stop: Annotated[int, typer.Option(help="Stop bits.", metavar="N", min=1, max=2)] = 1,
-) -> None:
+    ask: Annotated[str, option("What is sent to get a line: T?<CR>.", "TEXT", "nothing is sent")] = "",
+    every: Annotated[float, option("Seconds from one question to the next.", "S", min=0.01)] = 1.0,
+    title: Annotated[str, option("What the instrument is.", "TEXT", "the file's name")] = "",
+    baud: Annotated[int, option("Bits per second.", "N", min=50)] = 9600,
+    bits: Annotated[int, option("Data bits.", "N", min=5, max=8)] = 8,
+    parity: Annotated[Parity, option("Parity.", None, "none")] = Parity.NONE,
+    stop: Annotated[int, option("Stop bits.", "N", min=1, max=2)] = 1,
+) -> None:  # fmt: skip
     """Write a profile from an example line; on a terminal it asks for what no option says."""
     from cmm_uq.app.commands.laboratory.instruments import write_profile
     from cmm_uq.laboratory.live.instruments.library import ProfileDraft as Drafted
     from cmm_uq.laboratory.live.instruments.library import range_of
 
-    settings = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
+    settings: dict[str, str | int] = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
     places = {_whole(text, name): name for name, text in _pairs(quantity, "--quantity", "temp_c=1")}
     ranges = {name: range_of(text, name) for name, text in _pairs(limits, "--range", "temp_c=0:40")}
     if not line:
         if sys.stdin is None or not sys.stdin.isatty():
             raise CmmUqError("no example line is given", where="--line", fix="Give one: --line 'T=20.13 C<CR><LF>'")
-        from cmm_uq.app.cli.asking_instrument import asked
-
-        line, places, ranges, ask, title, settings = asked(title or file.stem)
+        line, places, ranges, ask, title, settings = instrument_answers(title or file.stem)
     write_profile(file, Drafted(file.stem, title or file.stem, line, places, ranges, ask, every, settings))
     say(str(file))
     say(f"Try it: cmm-uq instruments test {file} PORT")
@@ -191,45 +168,26 @@ def new(
 
 @app.command("simulate", epilog=examples("instruments simulate fluke-1502a", "instruments simulate ipp"))
 def simulate(
-    profile: Annotated[str, typer.Argument(help="Ready profile.", metavar="PROFILE", autocompletion=profiles)],
-    way: Annotated[
-        str, typer.Option(help="pty (a port of this computer), socket or rfc2217.", metavar="WAY", show_default="pty")
-    ] = "",
-    seconds: Annotated[
-        float | None, typer.Option(help="How long.", metavar="S", min=0.1, show_default="until it is interrupted")
-    ] = None,
+    profile: Annotated[str, argument("Ready profile.", "PROFILE", autocompletion=profiles)],
+    way: Annotated[str, option("pty (a port of this computer), socket or rfc2217.", "WAY", "pty")] = "",
+    seconds: Seconds = None,
 ) -> None:
     """Be an instrument without hardware, at a port that is printed, until it is interrupted."""
-    from cmm_uq.app.commands.laboratory.instruments import simulating
+    from cmm_uq.app.commands.laboratory.instruments import simulated_instrument
 
-    with simulating(profile, way) as port:
-        say(port)
-        sys.stdout.flush()
-        _wait(seconds)
-
-
-def _attempt(profile: str, port: str, job: Path | None) -> Any:
-    from cmm_uq.app.commands.laboratory.instruments import Attempt
-
-    return Attempt(profile, port, job)
+    with simulated_instrument(profile, way) as port:
+        say_now(port)
+        time.sleep(seconds or 0.0)
+        while seconds is None:
+            time.sleep(0.1)
 
 
 def _show(event: Any) -> None:
     from cmm_uq.laboratory.live.instruments.trial import beside
 
-    raw, told = beside(event)
+    raw, meaning = beside(event)
     shown = raw if len(raw) <= SHOWN else f"{raw[: SHOWN - 1]}…"
-    say(f"{shown:{SHOWN}}  {printable(told)}".rstrip())
-    sys.stdout.flush()
-
-
-def _wait(seconds: float | None) -> None:
-    import time
-
-    if seconds is not None:
-        time.sleep(seconds)
-    while seconds is None:
-        time.sleep(0.1)
+    say_now(f"{shown:{SHOWN}}  {printable(meaning)}".rstrip())
 
 
 def _pairs(given: list[str] | None, option: str, like: str) -> list[tuple[str, str]]:

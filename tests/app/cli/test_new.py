@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.app.cli import asking
-from cmm_uq.app.cli.new import value_of
+from cmm_uq.app.cli.asking import value_of
 from tests.app.cli.process import run
 
 
@@ -64,7 +64,7 @@ def test_the_answers_are_what_differs_from_the_defaults(monkeypatch: pytest.Monk
         return said.get(question, default)
 
     monkeypatch.setattr(asking.typer, "prompt", prompt)
-    assert asking.answers("sphere") == {
+    assert asking.job_answers("sphere") == {
         "machine": {"name": "Bridge 7", "travel_mm": {"x": [0, 500], "y": [0, 500], "z": [-400, 0]}},
         "artefact": {"length_mm": 30.001, "certificate": {"number": "K 12"}},
         "conformity": {"limit_um": 2.5},

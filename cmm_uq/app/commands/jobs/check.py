@@ -84,7 +84,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Checked:
+class JobCheck:
     """What there is to say of a job before it is computed.
 
     Parameters
@@ -125,7 +125,7 @@ class Checked:
 
 
 @naming_package()
-def check_job(folder: Path) -> Checked:
+def check_job(folder: Path) -> JobCheck:
     """Check a job.
 
     Parameters
@@ -144,7 +144,7 @@ def check_job(folder: Path) -> Checked:
     else:
         warnings = _of_a_job(job, path, wrong)
     problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
-    return Checked(str(folder), problems, _once(warnings), _clauses(job))
+    return JobCheck(str(folder), problems, _once(warnings), _clauses(job))
 
 
 def _of_a_part(path: Path) -> bool:
@@ -154,7 +154,7 @@ def _of_a_part(path: Path) -> bool:
         return False
 
 
-def _check_part(folder: Path, path: Path) -> Checked:
+def _check_part(folder: Path, path: Path) -> JobCheck:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
     from cmm_uq.app.commands.part_machine import refuse_machine
     from cmm_uq.app.commands.part_methods import lacking
@@ -177,16 +177,16 @@ def _check_part(folder: Path, path: Path) -> Checked:
         if (origin := job.facts.job.origin) != MEASURED:
             said = f"the figures are {origin}, and all that is made of them says so"
             warnings.append(Problem(said, str(path), key="[job] origin", fix="Put in your own, and take origin away"))
-    return Checked(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings), command=PART)
+    return JobCheck(str(folder), _once(Problem.of(error) for error in wrong.problems), tuple(warnings), command=PART)
 
 
 @naming_package()
-def check_read(job: Job) -> Checked:
+def check_read(job: Job) -> JobCheck:
     """Check a job that was read."""
     wrong, path = Gathered(), job.folder / "job.toml"
     warnings = _of_a_job(job, path, wrong)
     problems = _once(Problem.of(_placed(error, path)) for error in wrong.problems)
-    return Checked(job.facts.job.id, problems, _once(warnings), _clauses(job))
+    return JobCheck(job.facts.job.id, problems, _once(warnings), _clauses(job))
 
 
 def _clauses(job: Job | None) -> tuple[Clause, ...]:

@@ -8,37 +8,22 @@ import re
 import tempfile
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output.new_file import write_new
 from cmm_uq.jobs.acquire import DeclaredSource
-from cmm_uq.laboratory.live.instruments.instrument import open_source
-from cmm_uq.laboratory.live.instruments.library import ENDING, ProfileDraft, drafted, profile_named, profile_of, ready
-from cmm_uq.laboratory.live.instruments.ports import serial_ports
-from cmm_uq.laboratory.live.instruments.source import Event, LiveSource
+from cmm_uq.laboratory.live.instruments.draft import Drafted, drafted
+from cmm_uq.laboratory.live.instruments.library import ENDING, profile_named, profile_of, ready
+from cmm_uq.laboratory.live.instruments.opening import open_source
+from cmm_uq.laboratory.live.instruments.source import Event, Source
 from cmm_uq.laboratory.live.instruments.trial import Trial
 
 
-@dataclass(frozen=True)
-class Listed:
-    """What ``cmm-uq instruments list`` shows.
-
-    Parameters
-    ----------
-    profiles : name, title and what each was tried on.
-    ports : name and description.
-    """
-
-    profiles: tuple[tuple[str, str, str], ...]
-    ports: tuple[tuple[str, str], ...]
-
-
-def listed() -> Listed:
-    """Ready profiles, and the serial ports of this computer."""
-    profiles = [profile_named(name) for name in ready()]
-    return Listed(tuple((one.name, one.title, one.facts.tried) for one in profiles), tuple(serial_ports()))
+def ready_profiles() -> list[tuple[str, str, str]]:
+    """Name, title and what it was tried on, of each."""
+    profiles = map(profile_named, ready())
+    return [(profile.name, profile.title, profile.facts.tried) for profile in profiles]
 
 
 def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Path]:
@@ -117,7 +102,7 @@ def write_profile(out: Path, wanted: ProfileDraft) -> None:
 
 
 @contextlib.contextmanager
-def simulating(profile: str, way: str) -> Iterator[str]:
+def simulated_instrument(profile: str, way: str) -> Iterator[str]:
     """A simulated instrument, at the port that is given, until it is left.
 
     Parameters

@@ -1,0 +1,302 @@
+"""``cmm-uq release``, ``affected``, ``read``, ``qif``, ``keys``, ``standards`` and ``schema``: about certificates and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cmm_uq.app.cli.options import (
+    Json,
+    Quiet,
+    Records,
+    Verbose,
+    argument,
+    ask_secret,
+    examples,
+    flag,
+    option,
+)
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, can_answer, helped, progress, put, put_data, put_json, say
+from cmm_uq.base.errors import CmmUqError, printable
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange, Figures
+    from cmm_uq.jobs.dcc.shown import Grid, Shown
+
+
+def release(
+    certificate: Annotated[str, argument("Number, id of the job, or number of its entry.", "CERTIFICATE")],
+    by: Annotated[str, option("Who does it.", "NAME")],
+    reason: Annotated[str, option("Why; it stays in the records.", "TEXT")] = "",
+    despite: Annotated[
+        str, option("Why it is released although a statement of it is no pass; it stays in the records.", "TEXT")
+    ] = "",
+    withdraw: Annotated[bool, flag("--withdraw", "Withdraw it instead.")] = False,
+    replaced_by: Annotated[
+        str | None, option("Released certificate that takes its place.", "CERTIFICATE", "none")
+    ] = None,
+    records: Records = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Release a certificate: until then it is a draft. By two persons where [laboratory] four_eyes = true.
+
+    Refused for an artefact that was out of date on the day of the measurement, for what was simulated or compensated, and for
+    what says DRAFT on its pages, since ISO/IEC 17025:2017, 7.8 asks for something that it does not state. One that states
+    fail, undecided or incomplete needs a word why: --despite, or the answer to a question on a terminal.
+    """
+    if withdraw and replaced_by is not None:
+        raise CmmUqError("a certificate is withdrawn or replaced, not both", where="--withdraw", fix="Leave out one")
+    from cmm_uq.app.commands.certificates import release as releases
+    from cmm_uq.laboratory.records import open_records
+
+    with open_records(records) as history:
+        if withdraw or replaced_by is not None:
+            done = releases.withdraw(history, certificate, by=by, reason=reason, replaced_by=replaced_by)
+        else:
+            ask = _ask_why if not (quiet or json) and can_answer() else None
+            done = releases.release(history, certificate, by=by, reason=reason, despite=despite, ask=ask)
+        signatures = history.signatures(done.certificate.entry)
+    now = done.certificate
+    if json:
+        signed = [
+            {"what": one.what, "by": one.by, "reason": one.reason, "at": one.at.isoformat()} for one in signatures
+        ]
+        put_data({
+            "certificate": now.number, "job": now.job, "entry": now.entry, "state": now.state, "waiting": done.waiting,
+            "signatures": signed,
+        })  # fmt: skip
+    elif not quiet:
+        waits = f"; {done.waiting} more must sign" if done.waiting else ""
+        say(printable(f"{now.number} of {now.day} ({now.machine}): {now.state}{waits}"))
+
+
+def _ask_why(stated: str) -> str:
+    """What the one who releases says of a certificate that states no pass."""
+    say(printable(f"{stated}."))
+    return str(typer.prompt("Why is it released all the same (nothing: it is not)", default="", show_default=False))
+
+
+def affected(
+    version: Annotated[
+        str, option("Oldest version of the package whose certificates are looked at.", "A", True, "--version")
+    ],
+    to: Annotated[
+        str | None, option("Version that has the corrections.", "B", "the installed one", "--to")
+    ] = None,
+    only_list: Annotated[bool, flag("--list", "Only list them; compute nothing again.")] = False,
+    write: Annotated[
+        Path | None, option("Folder for a draft in place of each that changed.", "DIR", "none")
+    ] = None,
+    records: Records = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> None:
+    """Find the certificates that corrections touch, compute them again from the inputs in their PDF, compare figure by figure.
+
+    Exit code 4 where a figure, a decision or a verdict is another one now, or a certificate could not be computed again.
+    """
+    if only_list and write is not None:
+        raise CmmUqError("nothing is written of what is only listed", where="--list", fix="Leave out --list or --write")
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq import __version__
+        from cmm_uq.app.commands.certificates.affected import affected_certificates
+        from cmm_uq.app.commands.files import silent
+        from cmm_uq.laboratory.records import open_records
+
+        last = __version__ if to is None else to
+        with open_records(records, read_only=write is None) as history:
+            certificates = list(affected_certificates(
+                history, version, last, recompute=not only_list, out=write, where=str(history.place), stage=stage or silent
+            ))  # fmt: skip
+    if json:
+        put_data({"from": version, "to": last, "certificates": [_affected_data(one) for one in certificates]})
+    elif not quiet:
+        for one in certificates:
+            _show_affected(one)
+        count = len(certificates)
+        touched = "1 certificate touched" if count == 1 else f"{count} certificates touched"
+        say(touched if only_list else f"{touched}, {sum(one.changed for one in certificates)} changed")
+    if any(one.changed or (one.problem and not only_list) for one in certificates):
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def _show_affected(one: AffectedCertificate) -> None:
+    c = one.certificate
+    lines = [f"{c.number} of {c.day}, {c.machine}, version {c.version}, {c.state}"]
+    lines += [f"  {correction.version}: {correction.what}" for correction in one.corrections]
+    lines += [f"  not computed again: {one.problem}"] if one.problem else []
+    lines += [f"  {change.quantity}: {_change(change)}" for change in one.changes or ()]
+    if one.changed and one.decision != c.decision:
+        lines.append(f"  decision: {c.decision} -> {one.decision}")
+    if one.changed and one.diagnosis != c.diagnosis:
+        lines.append(f"  diagnosis: {c.diagnosis or 'none'} -> {one.diagnosis or 'none'}")
+    lines += ["  no figure changes"] if one.changes is not None and not one.changed else []
+    lines += [f"  draft in {one.written}"] if one.written is not None else []
+    for line in lines:
+        say(printable(line))
+
+
+def _change(change: FigureChange) -> str:
+    before, after = (_figure(figures, change.unit) for figures in (change.before, change.after))
+    if before == after and change.before is not None and change.after is not None:
+        before, after = (
+            f"95 % interval {figures[2]:.10g} to {figures[3]:.10g} {change.unit}"
+            for figures in (change.before, change.after)
+        )
+    return f"{before} -> {after}"
+
+
+def _figure(figures: Figures | None, unit: str) -> str:
+    """With the ten digits of results.json: fewer would print a small change as none."""
+    return "none" if figures is None else f"{figures[0]:.10g} (u {figures[1]:.10g}) {unit}"
+
+
+def _affected_data(one: AffectedCertificate) -> dict[str, Any]:
+    c = one.certificate
+    return {
+        "certificate": c.number, "job": c.job, "entry": c.entry, "machine": c.machine, "day": c.day.isoformat(),
+        "version": c.version, "state": c.state, "command": c.command,
+        "corrections": [{"version": each.version, "what": each.what} for each in one.corrections],
+        "computed": one.changes is not None, "changed": one.changed, "problem": one.problem or None,
+        "decision": {"before": c.decision, "after": one.decision or None},
+        "diagnosis": {"before": c.diagnosis, "after": one.diagnosis or None},
+        "changes": [
+            {"name": each.name, "unit": each.unit, "before": each.before, "after": each.after} for each in one.changes or ()
+        ],
+        "draft": None if one.written is None else str(one.written),
+    }  # fmt: skip
+
+
+def read(
+    files: Annotated[list[Path], argument("Certificates: DCC of version 3 (XML).", "FILE...")],
+    schema: Annotated[
+        Path | None,
+        option(
+            "Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"
+        ),
+    ] = None,
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Print digital calibration certificates (DCC). Exit code 2 for a file that is none.
+
+    Signatures are counted and not verified: cmm-uq verify does.
+    """
+    from cmm_uq.app.commands.jobs.exchange import read_certificate
+    from cmm_uq.jobs.dcc.shown import data, shown
+
+    certificates = [(file, read_certificate(file, schema)) for file in files]
+    if json:
+        rows = [{"file": str(file), **data(one)} for file, one in certificates]
+        put_data({"schema": "cmm-uq/read/1", "certificates": rows})
+    elif not quiet:
+        for file, one in certificates:
+            put(_certificate_text(str(file), shown(one)))
+
+
+def _certificate_text(file: str, certificate: Shown) -> str:
+    lines = [file, *_labels(certificate.rows)]
+    for title, rows, grids in certificate.parts:
+        lines += ["", title, *_labels(rows)]
+        for grid in grids:
+            lines += ["", *_table(grid)]
+    return "\n".join(printable(line).rstrip() for line in lines) + "\n\n"
+
+
+def _labels(rows: tuple[tuple[str, str], ...]) -> list[str]:
+    """Labels in a column, the lines of a text below each other."""
+    width = max((len(label) for label, _ in rows), default=0)
+    return [
+        f"  {'' if number else label:<{width}}  {line}"
+        for label, text in rows
+        for number, line in enumerate(text.splitlines())
+    ]
+
+
+def _table(grid: Grid) -> list[str]:
+    """Columns as wide as their widest cell; a value never breaks."""
+    cells = [grid.headings, *grid.rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    head, *rows = ("  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in cells)
+    return [f"  {grid.title}", f"    {head}", *(f"    {row}" for row in rows)]
+
+
+def qif(
+    report: Annotated[Path, argument("Folder of a report, or its results.json.", "REPORT")],
+    out: Annotated[Path | None, option("File to write.", "FILE", "<job id>.qif")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write every value that a standard decided on, and the error factors, as QIF 3.0. Nothing is overwritten."""
+    from cmm_uq.app.commands.jobs.exchange import write_qif
+
+    file = write_qif(report, out)
+    if not quiet:
+        say(printable(str(file)))
+
+
+keys = typer.Typer(
+    help="Keys for electronic signatures: a new one for trying. Those that count come from a trust service.",
+    epilog=examples("keys new test.p12 --name 'Calibration laboratory'"),
+    rich_markup_mode=None,
+)
+keys.callback(invoke_without_command=True)(helped)
+
+
+@keys.command("new", epilog=examples("keys new test.p12 --name 'Calibration laboratory'"))
+def new_key(
+    file: Annotated[Path, argument("PKCS#12 file to be made.", "FILE")],
+    name: Annotated[str, option("Of whom it is for.", "NAME")] = "cmm-uq",
+    quiet: Quiet = False,
+    json: Json = False,
+) -> None:
+    """Make a test key with its certificate, FILE for signing and FILE.pem for whoever is to trust it.
+
+    The passphrase is asked for, or read from CMM_UQ_SIGN_PASSPHRASE_FILE or CMM_UQ_SIGN_PASSPHRASE. Whatever is signed with
+    it says that it is a test key.
+    """
+    from cmm_uq.app.commands.certificates.keys import new_test_key
+    from cmm_uq.certificate.sign import TEST_NOTE
+
+    made = new_test_key(file, name, lambda question: ask_secret(question, twice=True))
+    if json:
+        put_data({"key": str(made.key), "certificate": str(made.certificate), "test_key": True})
+    elif not quiet:
+        say(printable(f"{made.key} signs until {made.until}; {made.certificate} is for whoever is to trust it."))
+        say(f"TEST KEY: whatever it signs says: {TEST_NOTE}")
+
+
+def standards(
+    name: Annotated[str | None, argument("Standard with its edition.", "[NAME]")] = None,
+    form: Annotated[Path | None, option("File to write its form to.", "FILE", "none")] = None,
+) -> None:
+    """List the standards that are decided, or what is done of each clause of one.
+
+    With --form a form is written that a laboratory fills in beside its own copy and names in [[conformity]] clauses.
+    Nothing is overwritten.
+    """
+    from cmm_uq.app.commands.certificates.standards import clauses_of, listed_standards, write_form
+
+    if name is None:
+        if form is not None:
+            raise CmmUqError("a form is of one standard", where="--form", fix="Name it: cmm-uq standards lists them")
+        for standard, characteristics in listed_standards():
+            say(printable(f"{standard}: {', '.join(characteristics)}" if characteristics else standard))
+    elif form is not None:
+        say(printable(str(write_form(name, form))))
+    else:
+        for clause in clauses_of(name):
+            say(printable(f"{clause.title}: {clause.does}"))
+            say(printable(f"    {'read' if clause.read else 'not read'}; {clause.source}"))
+
+
+def schema(
+    name: Annotated[str, argument("job (with its plan), part, budget, truth, instrument or schedule.", "NAME")] = "job",
+) -> None:
+    """Print the JSON Schema of a file, with the kinds, effects and standards that are installed."""
+    from cmm_uq.app.commands.jobs.schemas import as_text, schema_named
+
+    put_json(as_text(schema_named(name)))

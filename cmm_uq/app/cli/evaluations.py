@@ -1,0 +1,232 @@
+"""``cmm-uq report``, ``plan``, ``budget`` and ``selftest``: recordings, plans and measurement models evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cmm_uq.app.cli.jobs import show_imported
+from cmm_uq.app.cli.options import (
+    Force,
+    Json,
+    Language,
+    Level,
+    Quiet,
+    Records,
+    Seed,
+    Settled,
+    Sign,
+    Strict,
+    TimeServer,
+    Trusted,
+    Verbose,
+    argument,
+    flag,
+    job_folder,
+    open_key,
+    option,
+    out,
+    show_signatures,
+    toml_files,
+)
+from cmm_uq.app.cli.summary import conclude, screen_layout, show_summary
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, put_json, show
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.language import ENGLISH
+
+if TYPE_CHECKING:
+    from cmm_uq.base.messages import Text
+    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.maths.uncertainty.evaluation import Evaluation
+    from cmm_uq.maths.uncertainty.selftest import Outcome
+
+
+def report(
+    job: Annotated[
+        list[Path],
+        job_folder("Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders."),
+    ],
+    out: Annotated[Path | None, out("reports/<job id>")] = None,
+    seed: Seed = 0,
+    force: Force = False,
+    strict: Strict = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    language: Language = None,
+    records: Records = None,
+    sign: Sign = None,
+    time_server: TimeServer = None,
+    level: Level = None,
+    trust: Trusted = None,
+    scheduled: Annotated[
+        bool,
+        flag("--scheduled", "Every job that is new or changed; a line of JSON for each; DIR holds them all."),
+    ] = False,
+    schedule: Annotated[
+        Path | None,
+        option("With --scheduled: what the run goes by.", "FILE", "schedule.toml in the first JOB"),
+    ] = None,
+    lines: Annotated[
+        Path | None, option("With --scheduled: file that the lines are added to.", "FILE", "printed")
+    ] = None,
+    dry_run: Annotated[bool, flag("--dry-run", "With --scheduled: say what would happen, and do nothing.")] = False,
+) -> None:
+    """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
+    alone: dict[str, object] = {
+        "--force": force, "--strict": strict, "--verbose": verbose, "--language": language, "--sign": sign,
+    }  # fmt: skip
+    many: dict[str, object] = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
+    _refuse_other_way(job, alone if scheduled else many, scheduled=scheduled)
+    if scheduled:
+        from cmm_uq.app.cli.scheduled import STANDARD_OUTPUT, run
+        from cmm_uq.app.commands.scheduled import Asked
+
+        asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
+        raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
+    signing = None if sign is None else open_key(sign, time_server, level, trust)
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.report import write_report
+
+        written = write_report(
+            job[0], out, seed=seed, force=force, stage=stage, told=None if quiet or json else show_imported,
+            records=records, language=language, signing=signing,
+        )  # fmt: skip
+    try:
+        conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+    finally:
+        if signing is not None and not (quiet or json):
+            show_signatures(signing, [path for path in written.files.values() if path.suffix in (".pdf", ".xml")])
+
+
+def _refuse_other_way(jobs: list[Path], options: dict[str, object], *, scheduled: bool) -> None:
+    """Refuse what belongs to the other way of the command."""
+    for name, value in options.items():
+        if value:
+            fix = "Leave it out" if scheduled else "Add --scheduled"
+            raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=name, fix=fix)
+    if len(jobs) > 1 and not scheduled:
+        raise CmmUqError(f"{len(jobs)} jobs are named, and a report is of one", where=str(jobs[1]),
+                         fix="Report them one after the other, or with --scheduled")  # fmt: skip
+
+
+def plan(
+    job: Annotated[Path, job_folder("Job folder; its recording may still be missing.")],
+    out: Annotated[Path | None, out("reports/<job id>/plan")] = None,
+    power: Annotated[
+        bool, option("Predict how large an effect must be for the diagnosis to find it; takes most of the time.")
+    ] = True,
+    seed: Annotated[int, option("Seed of the recordings drawn for that.", "N", min=0)] = 0,
+    force: Force = False,
+    strict: Strict = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    language: Language = None,
+) -> None:
+    """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.plans.plan import write_plan
+
+        written = write_plan(job, out, power=power, seed=seed, force=force, stage=stage, language=language)
+    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+
+
+def budget(
+    file: Annotated[
+        Path,
+        argument("Measurement model: outputs, inputs, correlations, in TOML.", "FILE", autocompletion=toml_files),
+    ],
+    out: Annotated[Path | None, out("reports/<name of the file>")] = None,
+    seed: Annotated[int | None, option("Seed of the Monte Carlo.", "N", "the file's", min=0)] = None,
+    force: Force = False,
+    strict: Settled = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    json: Json = False,
+    language: Language = None,
+) -> None:
+    """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.budget import write_budget
+        from cmm_uq.app.commands.files import silent
+
+        written = write_budget(file, out, seed=seed, force=force, stage=stage or silent, language=language or ENGLISH)
+    if json:
+        put_json(written.results.decode())
+    elif not quiet:
+        show_summary(_budget_summary(written.evaluation), written.files, verbose=verbose, name=file.name)
+    if strict and not written.evaluation.stable:
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def _budget_summary(evaluation: Evaluation) -> Summary:
+    """Each output as a certificate could state it; in full as the row of a table too."""
+    from cmm_uq.base.messages import Verbatim, plural, say
+    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
+
+    names = tuple(evaluation.stated)
+    unstable = () if evaluation.stable else tuple(
+        Verdict("NOT STABLE", "open", Verbatim(name), (evaluation.stated[name].reason,)) for name in names
+    )  # fmt: skip
+    return Summary(
+        plural(len(names), one=say("one output"), many=say("{count} outputs", count=len(names))), verdicts=unstable,
+        remarks=tuple(statement(evaluation, name) for name in names), details=(SUMMARY, *summary_rows(evaluation)),
+    )  # fmt: skip
+
+
+def selftest(
+    quiet: Annotated[bool, flag("--quiet", "Print only what fails, and the count.", "-q")] = False,
+    verbose: Verbose = False,
+    json: Json = False,
+) -> None:
+    """Compute published reference figures and compare: expected, got, source. Exit code 4 when any differs."""
+    from cmm_uq import __version__
+    from cmm_uq.maths.uncertainty.selftest import run
+
+    outcomes = run()
+    passed = int(sum(outcome.passed for outcome in outcomes))
+    if json:
+        figures = [{**asdict(one), "got": float(one.got), "passed": bool(one.passed)} for one in outcomes]
+        program = f"cmm-uq {__version__}"
+        put_data({"schema": "cmm-uq/selftest/1", "program": program, "passed": passed, "figures": figures})
+    else:
+        show(screen_layout(verbose=verbose).screen(_selftest_summary(outcomes, quiet=quiet, verbose=verbose)))
+    if passed < len(outcomes):
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def _selftest_summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool) -> Summary:
+    """The count, what fails or all figures, and how many there are of each source."""
+    from cmm_uq import __version__
+    from cmm_uq.base.messages import NOTHING, Verbatim, say
+    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.maths.uncertainty.selftest import as_text
+
+    def verdict(what: Text, passed: bool, *remarks: Text) -> Verdict:
+        return Verdict("PASS", "good", what, remarks) if passed else Verdict("FAIL", "bad", what, remarks)
+
+    passed = sum(outcome.passed for outcome in outcomes)
+    count = say(
+        "cmm-uq {version}: {passed} of {total} figures within their tolerance", version=Verbatim(__version__),
+        passed=passed, total=len(outcomes),
+    )  # fmt: skip
+    verdicts = [verdict(count, passed == len(outcomes))]
+    for (case, expected, tolerance, got, source, _), outcome in zip(as_text(outcomes), outcomes, strict=True):
+        if not outcome.passed or (verbose and not quiet):
+            figures = Verbatim(f"{got}, expected {expected} within {tolerance} ({source})")
+            verdicts.append(verdict(Verbatim(case), outcome.passed, figures))
+    if quiet or verbose:
+        return Summary(verdicts=tuple(verdicts))
+    sources: dict[str, list[bool]] = {}
+    for outcome in outcomes:
+        sources.setdefault(outcome.source, []).append(outcome.passed)
+    return Summary(verdicts=tuple(verdicts), figures=tuple(
+        (Verbatim(source), say("{passed} of {total}", passed=sum(each), total=len(each)), NOTHING)
+        for source, each in sources.items()
+    ))  # fmt: skip
