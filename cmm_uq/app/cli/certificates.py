@@ -1,4 +1,4 @@
-"""``cmm-uq release``, ``affected``, ``read``, ``qif``, ``keys``, ``standards`` and ``schema``: about certificates and files."""
+"""``cmm-uq release``, ``affected``, ``read``, ``qif``, ``keys``, ``standards``, ``schema``: certificates and files."""
 
 from __future__ import annotations
 
@@ -83,13 +83,9 @@ def affected(
     version: Annotated[
         str, option("Oldest version of the package whose certificates are looked at.", "A", True, "--version")
     ],
-    to: Annotated[
-        str | None, option("Version that has the corrections.", "B", "the installed one", "--to")
-    ] = None,
+    to: Annotated[str | None, option("Version that has the corrections.", "B", "the installed one", "--to")] = None,
     only_list: Annotated[bool, flag("--list", "Only list them; compute nothing again.")] = False,
-    write: Annotated[
-        Path | None, option("Folder for a draft in place of each that changed.", "DIR", "none")
-    ] = None,
+    write: Annotated[Path | None, option("Folder for a draft in place of each that changed.", "DIR", "none")] = None,
     records: Records = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -175,9 +171,7 @@ def read(
     files: Annotated[list[Path], argument("Certificates: DCC of version 3 (XML).", "FILE...")],
     schema: Annotated[
         Path | None,
-        option(
-            "Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"
-        ),
+        option("Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"),
     ] = None,
     quiet: Quiet = False,
     json: Json = False,

@@ -48,7 +48,9 @@ if TYPE_CHECKING:
 def report(
     job: Annotated[
         list[Path],
-        job_folder("Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders."),
+        job_folder(
+            "Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders."
+        ),
     ],
     out: Annotated[Path | None, out("reports/<job id>")] = None,
     seed: Seed = 0,

@@ -12,7 +12,7 @@ import pytest
 
 from cmm_uq import __version__
 from cmm_uq.app.commands.certificates import affected as corrected
-from cmm_uq.app.commands.certificates.affected import Affected, Correction, Inputs, said
+from cmm_uq.app.commands.certificates.affected import AffectedCertificate, Correction, JobInputs, stated_version
 from cmm_uq.laboratory.records import open_records
 from tests.app.cli.laboratory import kept, older
 from tests.app.cli.process import run
@@ -104,7 +104,9 @@ def test_drafts_of_two_certificates_of_one_job_have_folders_of_their_own(
     """Only the folders: what is computed is left out here."""
     with open_records(archive / "lab.db") as records:
         records.append("report", next(records.entries(1)).data | {"results_sha256": "1" * 64})
-    monkeypatch.setattr(corrected, "_again", lambda one, said, _, folder, __: Affected(one, said, (), written=folder))
+    monkeypatch.setattr(
+        corrected, "_again", lambda one, said, _, folder, __: AffectedCertificate(one, said, (), written=folder)
+    )
     done = run("affected", "--version", "0.4.0", "--write", "drafts", "--records", "lab.db", "--json", cwd=archive)
     drafts = [one["draft"] for one in json.loads(done.stdout)["certificates"]]
     assert drafts == [str(Path("drafts") / "mount-1"), str(Path("drafts") / "mount-2")]
@@ -170,13 +172,13 @@ def test_a_column_of_a_recording_counts_however_its_file_is_written(
 ) -> None:
     """What cannot be ruled out is computed again: of another format the columns' names say nothing."""
     with_times = Correction("0.4.0", "", columns=("time_s",))
-    with_other = Inputs.of({"job.toml": toml, "r.csv": recording})
-    assert with_times.touches(_certificate(), with_other) is touched
+    with_other = JobInputs.of({"job.toml": toml, "r.csv": recording})
+    assert with_times.concerns(_certificate().command, _certificate().kind, with_other) is touched
 
 
 def test_a_version_that_a_certificate_says_of_itself_is_never_an_error() -> None:
-    assert [said(text) for text in ("0.4.0", "0.5.0rc1", "", "of today")] == [(0, 4, 0), (0, 5), (), ()]
-    assert said("0.5.0rc1") < said("0.5.0")
+    assert [stated_version(text) for text in ("0.4.0", "0.5.0rc1", "", "of today")] == [(0, 4, 0), (0, 5), (), ()]
+    assert stated_version("0.5.0rc1") < stated_version("0.5.0")
 
 
 def _certificate() -> Any:

@@ -13,7 +13,7 @@ import pytest
 
 from cmm_uq import __version__
 from cmm_uq.app.commands.certificates import affected as corrected
-from cmm_uq.app.commands.certificates.affected import Correction, Inputs, affected, between, corrections
+from cmm_uq.app.commands.certificates.affected import Correction, JobInputs, affected_certificates, between, corrections
 from cmm_uq.app.commands.certificates.release import release, withdraw
 from cmm_uq.app.commands.laboratory.records import import_reports, inputs_of, remove_retained, retention
 from cmm_uq.app.commands.report import write_report
@@ -221,7 +221,7 @@ def test_a_correction_is_found_computed_again_and_replaced_by_a_draft(
         Correction(__version__, "Of plates.", kinds=("plate",)), Correction(__version__, "Of times.", columns=("time_s",)),
     )  # fmt: skip
     monkeypatch.setattr(corrected, "between", lambda first, last: said)
-    (found,) = affected(records, "0.4.0", __version__, out=tmp_path / "drafts", where=str(records.place))
+    (found,) = affected_certificates(records, "0.4.0", __version__, out=tmp_path / "drafts", where=str(records.place))
     assert (found.certificate.entry, found.corrections, found.problem) == (number, said[:1], "")
     (change,) = found.changes or ()
     assert change.name == "scale_x.ppm"
@@ -237,12 +237,12 @@ def test_a_correction_is_found_computed_again_and_replaced_by_a_draft(
 
 def test_a_version_that_is_not_installed_cannot_compute(records: Records) -> None:
     with pytest.raises(CmmUqError, match="Install the version"):
-        list(affected(records, "0.1.0", "99.0"))
+        list(affected_certificates(records, "0.1.0", "99.0"))
     with pytest.raises(CmmUqError, match="only version"):
-        list(affected(records, "0.1.0", "0.4.0"))
+        list(affected_certificates(records, "0.1.0", "0.4.0"))
     with pytest.raises(CmmUqError, match="no version"):
-        list(affected(records, "0.1.0", "newest"))
-    assert list(affected(records, "0.1.0", "0.4.0", recompute=False)) == []
+        list(affected_certificates(records, "0.1.0", "newest"))
+    assert list(affected_certificates(records, "0.1.0", "0.4.0", recompute=False)) == []
 
 
 def test_corrections_stand_in_the_changelog_under_their_version_and_name_what_there_is() -> None:
@@ -279,5 +279,7 @@ def test_a_correction_touches_a_certificate_unless_its_inputs_rule_it_out(
     correction: Correction, touched: bool, reported: Path, records: Records
 ) -> None:  # fmt: skip
     (found,) = records.certificates()
-    assert correction.touches(found, Inputs.of(inputs_of(reported / "iota"))) is touched
-    assert correction.touches(found, None) is (touched or not (correction.commands or correction.kinds))
+    assert correction.concerns(found.command, found.kind, JobInputs.of(inputs_of(reported / "iota"))) is touched
+    assert correction.concerns(found.command, found.kind, None) is (
+        touched or not (correction.commands or correction.kinds)
+    )

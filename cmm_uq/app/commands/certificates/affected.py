@@ -1,4 +1,7 @@
-"""Which issued certificates a correction of the package touches: recomputed from their inputs, compared figure by figure."""
+"""Which issued certificates a correction of the package touches: recomputed from their inputs, compared figure by figure.
+
+The corrections are those of ``corrections.toml`` in the package.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +9,10 @@ import json
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
+from importlib.resources import files as package_files
 from itertools import takewhile
 from math import isclose
 from pathlib import Path
@@ -21,9 +25,8 @@ from cmm_uq.app.commands.reading import in_language, job_of
 from cmm_uq.app.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import ENGLISH, code_of
-from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.results_file import as_json
-from cmm_uq.jobs.job import Job, Recorded
+from cmm_uq.jobs.job import Recorded
 from cmm_uq.jobs.recording_file import header, is_own
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents
@@ -33,65 +36,17 @@ from cmm_uq.laboratory.records.place import NONE
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
-FILE = "corrections.toml"
+CORRECTIONS, JOB = "corrections.toml", "job.toml"
+
+SAME = 1e-9
+"""Relative difference within which figures are the same: results.json has ten digits."""
+
+Figures = tuple[float, float, float, float]
+"""Value, u, lower and upper end of the interval."""
 
 
 @dataclass(frozen=True)
-class Correction:
-    """One; empty parts say nothing, and are then no reason to pass a certificate over.
-
-    Parameters
-    ----------
-    version : that has it.
-    what : it is.
-    commands, kinds, effects, standards, keys, columns : that it touches.
-    """
-
-    version: str
-    what: str
-    commands: tuple[str, ...] = ()
-    kinds: tuple[str, ...] = ()
-    effects: tuple[str, ...] = ()
-    standards: tuple[str, ...] = ()
-    keys: tuple[str, ...] = ()
-    columns: tuple[str, ...] = ()
-
-    def touches(self, certificate: RecordedCertificate, inputs: Inputs | None) -> bool:
-        """Whether it may touch a certificate.
-
-        Parameters
-        ----------
-        certificate : as recorded.
-        inputs : of its job; ``None`` where they cannot be read, so that they are no reason to pass it over.
-        """
-        return self.concerns(certificate.command, certificate.kind, inputs)
-
-    def concerns(self, command: str, kind: str, inputs: Inputs | None) -> bool:
-        """Whether it may touch what a command made.
-
-        Parameters
-        ----------
-        command : report or diagnose.
-        kind : of measurement; empty where it is not known.
-        inputs : of the job; ``None`` where they cannot be read, so that they are no reason to pass it over.
-        """
-        if self.commands and command not in self.commands:
-            return False
-        if self.kinds and kind and kind not in self.kinds:
-            return False
-        if inputs is None:
-            return True
-        asked = (
-            (self.effects, lambda: inputs.effects & set(self.effects)),
-            (self.standards, lambda: any(name.startswith(self.standards) for name in inputs.standards)),
-            (self.keys, lambda: any(inputs.has(key) for key in self.keys)),
-            (self.columns, lambda: inputs.columns is None or inputs.columns & set(self.columns)),
-        )
-        return all(found() for named, found in asked if named)
-
-
-@dataclass(frozen=True)
-class Inputs:
+class JobInputs:
     """What of a job's inputs decides whether a correction touches it.
 
     Parameters
@@ -101,16 +56,14 @@ class Inputs:
     """
 
     job: Mapping[str, Any]
-    columns: frozenset[str] | None = field(default_factory=frozenset)
+    columns: frozenset[str] | None = frozenset()
 
     @property
     def effects(self) -> set[str]:
-        """That the job names."""
         return set((self.job.get("model") or {}).get("effects") or ())
 
     @property
     def standards(self) -> tuple[str, ...]:
-        """Of its statements of conformity."""
         return tuple(str(wish.get("standard")) for wish in self.job.get("conformity") or ())
 
     def has(self, key: str) -> bool:
@@ -123,93 +76,89 @@ class Inputs:
         return True
 
     @classmethod
-    def of(cls, files: Mapping[str, bytes]) -> Inputs:
+    def of(cls, files: Mapping[str, bytes]) -> JobInputs:
         """Of the files of a job: a column of any of them counts."""
-        job = tomllib.loads(files["job.toml"].decode("utf-8-sig"))
+        job = tomllib.loads(files[JOB].decode("utf-8-sig"))
         recording = job.get("recording") or {}
         recordings = [files[name] for key in ("file", "earlier") if (name := str(recording.get(key))) in files]
         if not set(recording) <= set(Recorded.model_fields) or not all(map(is_own, recordings)):
             return cls(job, None)
-        return cls(
-            job, frozenset(name for file, content in files.items() if file != "job.toml" for name in header(content))
+        return cls(job, frozenset(name for file, content in files.items() if file != JOB for name in header(content)))
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A correction of the version that has it; empty parts are no reason to pass a certificate over."""
+
+    version: str
+    what: str
+    commands: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    effects: tuple[str, ...] = ()
+    standards: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+
+    def concerns(self, command: str, kind: str, inputs: JobInputs | None) -> bool:
+        """Whether it may touch what a command made of a job; inputs that cannot be read, or no kind, pass nothing over."""
+        if (self.commands and command not in self.commands) or (self.kinds and kind and kind not in self.kinds):
+            return False
+        return inputs is None or not (
+            (self.effects and not inputs.effects & set(self.effects))
+            or (self.standards and not any(name.startswith(self.standards) for name in inputs.standards))
+            or (self.keys and not any(map(inputs.has, self.keys)))
+            or (self.columns and inputs.columns is not None and not inputs.columns & set(self.columns))
         )
 
 
 @cache
 def corrections() -> tuple[Correction, ...]:
-    """All, as the package has them.
-
-    Raises
-    ------
-    CmmUqError : the file is missing or no list of corrections.
-    """
-    package = Path(__file__).resolve().parents[3]
-    for folder in (package, package.parent):
-        if (folder / FILE).is_file():
-            return _read((folder / FILE).read_text(encoding="utf-8"), str(folder / FILE))
-    raise CmmUqError("the list of corrections is missing", where=str(package),
-                     fix="Install cmm-uq again, from a whole wheel")  # fmt: skip
+    """All, as the package has them."""
+    file = package_files("cmm_uq") / CORRECTIONS
+    if not file.is_file():
+        raise CmmUqError(
+            "the list of corrections is missing", where=str(file), fix="Install cmm-uq again, from a whole wheel"
+        )
+    try:
+        return tuple(
+            Correction(row.pop("version"), row.pop("what"), **{key: tuple(names) for key, names in row.items()})
+            for row in tomllib.loads(file.read_text(encoding="utf-8"))["correction"]
+        )
+    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
+        raise CmmUqError(f"is no list of corrections: {error}", where=str(file)) from error
 
 
 def between(first: str, last: str) -> tuple[Correction, ...]:
     """Corrections of versions after the first, that a certificate says of itself, up to the last."""
-    return tuple(one for one in corrections() if said(first) < order(one.version) <= order(last))
+    return tuple(one for one in corrections() if stated_version(first) < order(one.version) <= order(last))
 
 
 def order(version: str) -> tuple[int, ...]:
-    """A version for comparing: its numbers.
-
-    Raises
-    ------
-    CmmUqError : it has other parts.
-    """
+    """A version for comparing: its numbers, and no other parts."""
     parts = version.split(".")
     if not all(part.isascii() and part.isdigit() for part in parts):
         raise CmmUqError(f"{version!r} is no version", fix="Give it as 0.5.0")
-    return tuple(int(part) for part in parts)
+    return tuple(map(int, parts))
 
 
-def said(version: str) -> tuple[int, ...]:
+def stated_version(version: str) -> tuple[int, ...]:
     """The version that a certificate says of itself, for comparing: of ``0.5.0rc1`` 0.5, which is before 0.5.0; of none ()."""
     return tuple(map(int, takewhile(lambda part: part.isascii() and part.isdigit(), version.split("."))))
 
 
-def _read(text: str, where: str) -> tuple[Correction, ...]:
-    try:
-        rows = tomllib.loads(text)["correction"]
-        return tuple(
-            Correction(row.pop("version"), row.pop("what"), **{key: tuple(names) for key, names in row.items()})
-            for row in rows
-        )
-    except (tomllib.TOMLDecodeError, KeyError, TypeError) as error:
-        raise CmmUqError(f"is no list of corrections: {error}", where=where) from error
-
-
-JOB = "job.toml"
-
-SAME = 1e-9
-"""Relative difference within which figures are the same: results.json has ten digits."""
-
-
 @dataclass(frozen=True)
-class Change:
-    """One figure that is another one now.
-
-    Parameters
-    ----------
-    name, quantity, unit : of the figure.
-    before, after : value, u, lower and upper end of the interval; ``None`` where there is none.
-    """
+class FigureChange:
+    """One figure that is another one now; ``None`` where there is none before, or after."""
 
     name: str
     quantity: str
     unit: str
-    before: tuple[float, float, float, float] | None
-    after: tuple[float, float, float, float] | None
+    before: Figures | None
+    after: Figures | None
 
 
 @dataclass(frozen=True)
-class Affected:
+class AffectedCertificate:
     """One certificate that corrections touch.
 
     Parameters
@@ -224,7 +173,7 @@ class Affected:
 
     certificate: RecordedCertificate
     corrections: tuple[Correction, ...]
-    changes: tuple[Change, ...] | None = None
+    changes: tuple[FigureChange, ...] | None = None
     decision: str = ""
     diagnosis: str = ""
     problem: str = ""
@@ -233,16 +182,14 @@ class Affected:
     @property
     def changed(self) -> bool:
         """Whether a figure, the decision or the verdict is another one now."""
-        now = (self.decision, self.diagnosis)
-        return self.changes is not None and (
-            bool(self.changes) or now != (self.certificate.decision, self.certificate.diagnosis)
-        )
+        before = (self.certificate.decision, self.certificate.diagnosis)
+        return self.changes is not None and (bool(self.changes) or (self.decision, self.diagnosis) != before)
 
 
-def affected(
+def affected_certificates(
     records: Records, first: str, last: str, *, recompute: bool = True, out: Path | None = None, where: str | None = NONE,
     stage: Stage = silent,
-) -> Iterator[Affected]:  # fmt: skip
+) -> Iterator[AffectedCertificate]:  # fmt: skip
     """Certificates of versions from the first on that corrections up to the last touch, by day.
 
     Parameters
@@ -253,10 +200,6 @@ def affected(
     out : folder for drafts that are to replace those that changed; ``None`` to write none.
     where : records that the drafts are kept in.
     stage : told of progress.
-
-    Raises
-    ------
-    CmmUqError : the versions are none, or not those of this package.
     """
     if order(last) > order(__version__):
         raise CmmUqError(
@@ -268,24 +211,25 @@ def affected(
     if recompute and order(last) < order(__version__):
         raise CmmUqError(f"only version {last} computes as version {last} does, and this is {__version__}",
                          where=f"--to {last}", fix="Leave it out, or give --list")  # fmt: skip
-    found = [
+    certificates = [
         one for one in records.certificates(origin=None, states=STANDING, command=None)
-        if not said(one.version) or order(first) <= said(one.version) < order(last)
+        if not stated_version(one.version) or order(first) <= stated_version(one.version) < order(last)
     ]  # fmt: skip
-    jobs = Counter((one.command, one.job) for one in found)
-    for count, certificate in enumerate(found):
-        stage(f"Computing again: {certificate.job}", count / len(found))
+    jobs = Counter((one.command, one.job) for one in certificates)
+    for count, certificate in enumerate(certificates):
+        stage(f"Computing again: {certificate.job}", count / len(certificates))
         files, problem = _inputs(records, certificate)
-        inputs = Inputs.of(files) if files else None
-        touching = tuple(one for one in between(certificate.version, last) if one.touches(certificate, inputs))
-        if not touching:
-            continue
-        if recompute and files:
+        inputs = JobInputs.of(files) if files else None
+        touching = tuple(
+            one for one in between(certificate.version, last)
+            if one.concerns(certificate.command, certificate.kind, inputs)
+        )  # fmt: skip
+        if touching and recompute and files:
             one_of_many = jobs[certificate.command, certificate.job] > 1
             name = f"{certificate.job}-{certificate.entry}" if one_of_many else certificate.job
             yield _again(certificate, touching, files, out and out / name, where)
-        else:
-            yield Affected(certificate, touching, problem=problem)
+        elif touching:
+            yield AffectedCertificate(certificate, touching, problem=problem)
 
 
 def _inputs(records: Records, certificate: RecordedCertificate) -> tuple[dict[str, bytes], str]:
@@ -305,43 +249,41 @@ def _inputs(records: Records, certificate: RecordedCertificate) -> tuple[dict[st
 def _again(
     certificate: RecordedCertificate, touching: tuple[Correction, ...], files: Mapping[str, bytes], folder: Path | None,
     where: str | None,
-) -> Affected:  # fmt: skip
+) -> AffectedCertificate:  # fmt: skip
+    """The certificate computed again, in the language and with the seed of the first time."""
+    report = certificate.command == "report"
     try:
-        job, outcome = _outcome(certificate, job_of(files))
+        before: Mapping[str, Any] = json.loads((Path(certificate.folder) / RESULTS).read_bytes())
+        seed = int((before.get("sampling") or {}).get("seed") or 0)
+        job = in_language(job_of(files), code_of(before["job"].get("language", ENGLISH)))
+        outcome = report_outcome(job, seed=seed) if report else diagnosis_outcome(job, seed=seed)
         data = json.loads(as_json(outcome.results))
-        changes = tuple(compared(certificate.values, [RecordedValue(*row) for row in contents.values(data, called)]))
+        values = [Value(*row) for row in contents.values(data, called)]
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
-        found = Affected(certificate, touching, changes, Verdicts.of_results(data).overall, verdict)
-        if folder is None or not found.changed:
-            return found
-        form = REPORT if certificate.command == "report" else DIAGNOSE
-        folder = folder if form is REPORT else folder / form.below
+        again = AffectedCertificate(
+            certificate,
+            touching,
+            tuple(_changes(certificate.values, values)),
+            Verdicts.of_results(data).overall,
+            verdict,
+        )
+        if folder is None or not again.changed:
+            return again
+        form, folder = (REPORT, folder) if report else (DIAGNOSE, folder / DIAGNOSE.below)
         form.write(job, lambda: outcome, folder, records=where)
-        return replace(found, written=folder)
+        return replace(again, written=folder)
     except CmmUqError as error:
-        return Affected(certificate, touching, problem=str(error))
+        return AffectedCertificate(certificate, touching, problem=str(error))
 
 
-def _outcome(certificate: RecordedCertificate, job: Job) -> tuple[Job, Outcome]:
-    """In the language and with the seed of the first time."""
-    before: Mapping[str, Any] = json.loads((Path(certificate.folder) / RESULTS).read_bytes())
-    seed = int((before.get("sampling") or {}).get("seed") or 0)
-    job = in_language(job, code_of(before["job"].get("language", ENGLISH)))
-    again = report_outcome if certificate.command == "report" else diagnosis_outcome
-    return job, again(job, seed=seed)
-
-
-def compared(before: tuple[RecordedValue, ...], after: list[RecordedValue]) -> Iterator[Change]:
+def _changes(before: tuple[Value, ...], after: list[Value]) -> Iterator[FigureChange]:
     """Figures that differ, or are only there before or after, in the order of those before."""
-    new = {value.name: value for value in after}
-    old = {value.name: value for value in before}
-    for name in dict.fromkeys((*old, *new)):
+    old, new = ({value.name: value for value in values} for values in (before, after))
+    for name in old | new:
         a, b = old.get(name), new.get(name)
-        if a is not None and b is not None and a.unit == b.unit and _same(a, b):
-            continue
-        told = b or a
-        if told is not None:
-            yield Change(name, told.quantity, told.unit, _figures(a), _figures(b))
+        if a is None or b is None or a.unit != b.unit or not _same(a, b):
+            either = b or old[name]
+            yield FigureChange(name, either.quantity, either.unit, _figures(a), _figures(b))
 
 
 def _same(a: RecordedValue, b: RecordedValue) -> bool:
@@ -349,5 +291,5 @@ def _same(a: RecordedValue, b: RecordedValue) -> bool:
     return all(isclose(x, y, rel_tol=SAME, abs_tol=SAME * max(a.u, b.u)) for x, y in pairs)
 
 
-def _figures(value: RecordedValue | None) -> tuple[float, float, float, float] | None:
+def _figures(value: Value | None) -> Figures | None:
     return None if value is None else (value.value, value.u, value.lower, value.upper)

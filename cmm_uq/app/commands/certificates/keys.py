@@ -16,7 +16,7 @@ PRIVATE, PUBLIC = 0o600, 0o644
 
 
 @dataclass(frozen=True)
-class Made:
+class TrialKey:
     """What was made.
 
     Parameters
@@ -31,7 +31,7 @@ class Made:
     until: dt.date
 
 
-def new_test_key(path: Path, name: str, asking: Asking) -> Made:
+def new_test_key(path: Path, name: str, asking: Asking) -> TrialKey:
     """Make a test key; a file that is there is not written over.
 
     Parameters
@@ -59,7 +59,7 @@ def new_test_key(path: Path, name: str, asking: Asking) -> Made:
         with contextlib.suppress(OSError):
             path.unlink()
         raise
-    return Made(path, beside, made.until)
+    return TrialKey(path, beside, made.until)
 
 
 def _write(path: Path, content: bytes, mode: int) -> None:

@@ -22,7 +22,7 @@ _TOLD, _NEWEST = 4, 2000
 
 
 @dataclass(frozen=True)
-class Signed:
+class Release:
     """What a signature did.
 
     Parameters
@@ -72,7 +72,7 @@ def _near(records: Records, name: str) -> str:
 def release(
     records: Records, name: str, *, by: str, reason: str = "", despite: str = "",
     ask: Callable[[str], str] | None = None,
-) -> Signed:  # fmt: skip
+) -> Release:  # fmt: skip
     """Release a certificate, or sign it as the first of two persons.
 
     Parameters
@@ -113,10 +113,10 @@ def release(
                              fix='Say why it is released all the same: --despite "TEXT"')  # fmt: skip
         further = {"outcome": certificate.decision, "despite": word}
     _sign(records, "release", certificate, person, reason, complete=waiting <= 0, **further)
-    return Signed(records.certificate(certificate.entry), max(0, waiting))
+    return Release(records.certificate(certificate.entry), max(0, waiting))
 
 
-def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: str | None = None) -> Signed:
+def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: str | None = None) -> Release:
     """Withdraw a certificate, or put another in its place.
 
     Parameters
@@ -140,7 +140,7 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
         raise CmmUqError(f"{certificate.number} is {certificate.state} already", where=records.shown)
     if replaced_by is None:
         _sign(records, "withdrawal", certificate, person, reason)
-        return Signed(records.certificate(certificate.entry))
+        return Release(records.certificate(certificate.entry))
     other = certificate_named(records, replaced_by, ("released",))
     if other.entry == certificate.entry:
         raise CmmUqError("a certificate does not replace itself", where="--replaced-by", fix="Name the new one's entry")
@@ -151,7 +151,7 @@ def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: 
         )
     refuse_denial(records, certificate, other, reason)
     _sign(records, "replacement", certificate, person, reason, replaced_by=other.entry)
-    return Signed(records.certificate(certificate.entry))
+    return Release(records.certificate(certificate.entry))
 
 
 def blocked(certificate: RecordedCertificate) -> str | None:

@@ -1,5 +1,7 @@
 """All that is wrong with a job, without computing.
 
+All that is wrong with a job, without computing.
+
 All that is wrong with a job, without computing: what its readers and its model refuse, and what an assessor would miss.
 
 The rules are those of the commands: the same readers are asked, and go on behind a problem where they can.
