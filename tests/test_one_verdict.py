@@ -26,8 +26,6 @@ import typer
 from cmm_uq.analysis.conformity.decision import decide
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.app.cli.summary import conclude
-from cmm_uq.app.commands.batch_jobs import conforming
-from cmm_uq.app.commands.batch_table import COLUMNS, rows
 from cmm_uq.app.commands.certificates.release import release
 from cmm_uq.app.commands.files import Written
 from cmm_uq.app.commands.laboratory.batch_jobs import COLUMNS, conforming, rows

@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 from cmm_uq.app.cli import NEW_OBJECTS
-from cmm_uq.app.serve import Site
-from cmm_uq.app.serve.exchange import Asked, read_address
+from cmm_uq.app.serve.exchange import Request, read_address
+from cmm_uq.app.serve.site import Site
 from tests.laboratory.records.histories import made
 
 TIMES = 7

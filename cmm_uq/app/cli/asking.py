@@ -73,7 +73,7 @@ def _questions(usual: dict[str, Any]) -> list[tuple[str, str, str, str]]:
 
 def instrument_answers(title: str) -> InstrumentAnswers:
     """Line, quantities by their places, ranges, question, title and settings of an instrument."""
-    from cmm_uq.laboratory.live.instruments.draft import numbers_in, range_of
+    from cmm_uq.laboratory.live.instruments.library import numbers_in, range_of
 
     title = typer.prompt("What is the instrument", default=title)
     settings: dict[str, str | int] = {

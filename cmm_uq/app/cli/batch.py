@@ -75,7 +75,8 @@ def command(
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.batch import Asked, write_batch
+        from cmm_uq.app.commands.laboratory.batch import BatchOptions as Asked
+        from cmm_uq.app.commands.laboratory.batch import write_batch
 
         asked = Asked(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
         batch = write_batch(folders, out, asked, parquet=parquet, stage=stage, records=records)

@@ -86,7 +86,7 @@ def report(
     _refuse_other_way(job, alone if scheduled else many, scheduled=scheduled)
     if scheduled:
         from cmm_uq.app.cli.scheduled import STANDARD_OUTPUT, run
-        from cmm_uq.app.commands.scheduled import Asked
+        from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions as Asked
 
         asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
         raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))

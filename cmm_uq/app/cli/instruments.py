@@ -151,8 +151,7 @@ def new(
 ) -> None:  # fmt: skip
     """Write a profile from an example line; on a terminal it asks for what no option says."""
     from cmm_uq.app.commands.laboratory.instruments import write_profile
-    from cmm_uq.laboratory.live.instruments.library import ProfileDraft as Drafted
-    from cmm_uq.laboratory.live.instruments.library import range_of
+    from cmm_uq.laboratory.live.instruments.library import ProfileDraft, range_of
 
     settings: dict[str, str | int] = {"baud": baud, "data_bits": bits, "parity": parity.value, "stop_bits": stop}
     places = {_whole(text, name): name for name, text in _pairs(quantity, "--quantity", "temp_c=1")}
@@ -161,7 +160,7 @@ def new(
         if sys.stdin is None or not sys.stdin.isatty():
             raise CmmUqError("no example line is given", where="--line", fix="Give one: --line 'T=20.13 C<CR><LF>'")
         line, places, ranges, ask, title, settings = instrument_answers(title or file.stem)
-    write_profile(file, Drafted(file.stem, title or file.stem, line, places, ranges, ask, every, settings))
+    write_profile(file, ProfileDraft(file.stem, title or file.stem, line, places, ranges, ask, every, settings))
     say(str(file))
     say(f"Try it: cmm-uq instruments test {file} PORT")
 

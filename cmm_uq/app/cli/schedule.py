@@ -29,7 +29,7 @@ def new(
     file: Annotated[Path, typer.Argument(help="New file: schedule.toml.", metavar="FILE")] = Path("schedule.toml"),
 ) -> None:
     """Write a schedule.toml with every key explained; never over anything."""
-    from cmm_uq.app.commands.schedule import write_schedule
+    from cmm_uq.app.commands.laboratory.schedule import write_schedule
 
     write_schedule(file)
     say(str(file))
@@ -45,7 +45,7 @@ def try_out(
     json: Json = False,
 ) -> None:
     """Send a trial message to everybody whom the schedule names. Exit code 1 when one did not go out."""
-    from cmm_uq.app.commands.schedule import schedule_of, send_trial
+    from cmm_uq.app.commands.laboratory.schedule import schedule_of, send_trial
 
     told = send_trial(schedule_of(folders or (), schedule))
     if json:
@@ -73,7 +73,7 @@ def ready(
     ] = None,
 ) -> None:
     """Print what starts a scheduled run: a line of cron, a service and a timer of systemd, a task of Windows."""
-    from cmm_uq.app.commands.schedule import ready_files, write_ready
+    from cmm_uq.app.commands.laboratory.schedule import ready_files, write_ready
 
     files = ready_files(scheduler, folders, schedule, at=at, days=days)
     if out is not None:

@@ -42,7 +42,7 @@ SAME = 1e-9
 """Relative difference within which figures are the same: results.json has ten digits."""
 
 Figures = tuple[float, float, float, float]
-"""Value, u, lower and upper end of the interval."""
+"""RecordedValue, u, lower and upper end of the interval."""
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ def _again(
         job = in_language(job_of(files), code_of(before["job"].get("language", ENGLISH)))
         outcome = report_outcome(job, seed=seed) if report else diagnosis_outcome(job, seed=seed)
         data = json.loads(as_json(outcome.results))
-        values = [Value(*row) for row in contents.values(data, called)]
+        values = [RecordedValue(*row) for row in contents.values(data, called)]
         verdict = str((data.get("diagnosis") or {}).get("verdict") or "")
         again = AffectedCertificate(
             certificate,
@@ -276,7 +276,7 @@ def _again(
         return AffectedCertificate(certificate, touching, problem=str(error))
 
 
-def _changes(before: tuple[Value, ...], after: list[Value]) -> Iterator[FigureChange]:
+def _changes(before: tuple[RecordedValue, ...], after: list[RecordedValue]) -> Iterator[FigureChange]:
     """Figures that differ, or are only there before or after, in the order of those before."""
     old, new = ({value.name: value for value in values} for values in (before, after))
     for name in old | new:
@@ -291,5 +291,5 @@ def _same(a: RecordedValue, b: RecordedValue) -> bool:
     return all(isclose(x, y, rel_tol=SAME, abs_tol=SAME * max(a.u, b.u)) for x, y in pairs)
 
 
-def _figures(value: Value | None) -> Figures | None:
+def _figures(value: RecordedValue | None) -> Figures | None:
     return None if value is None else (value.value, value.u, value.lower, value.upper)
