@@ -28,8 +28,6 @@ from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.maths.inference.linear_model import LinearModel
 
-__all__ = ["Finding", "Screened", "gross_outliers", "impossible_values", "repeated_figures", "screen", "screened"]
-
 GROSS = 1e-3
 """Probability, over all observations together, that noise alone makes one look like an outlier."""
 
