@@ -9,8 +9,8 @@ import numpy as np
 from cmm_uq.analysis.planning.advice import Suggestion, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
-from cmm_uq.analysis.screening import screened as screening
-from cmm_uq.analysis.screening.screened import Screened
+from cmm_uq.analysis.screening import screening
+from cmm_uq.analysis.screening.screening import ScreenedRecording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Floats, Machine, Points
@@ -42,11 +42,13 @@ def with_columns(points: Points, **columns: Floats) -> Points:
                   {**points.columns, **columns}, points.lines)  # fmt: skip
 
 
-def screened(points: Points, facts: ArtefactFacts, **how: Any) -> Screened:
+def screened(points: Points, facts: ArtefactFacts, **how: Any) -> ScreenedRecording:
     """A recording screened by what its kind asks of it."""
     kind = kind_named(facts.kind)
     assert kind is not None
-    return screening.screened(points, facts, kind.offers("screen", Screening), kind.observing("screened"), **how)
+    return screening.screen_recording(
+        points, facts, kind.offers("screen", Screening), kind.observing("screened"), **how
+    )
 
 
 def suggested(diagnosis: Any, facts: ArtefactFacts) -> tuple[Suggestion, ...]:

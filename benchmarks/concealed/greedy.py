@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import known
+from cmm_uq.analysis.diagnosis.comparison.explanations import known_effects
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.app.commands.reading import read_job
@@ -23,7 +23,7 @@ def searched(job: Path, sigma_um: float) -> list[str]:
     """Names of the effects found."""
     model, _ = screened_model(read_job(job))
     values = model.estimate().least_squares.value
-    effects = [e for e in known(model, values, tuple(e.name for e in model.effects)) if e.weight == 1]
+    effects = [e for e in known_effects(model, values, tuple(e.name for e in model.effects)) if e.weight == 1]
     sigma = sigma_um * 1e-3
     comparison = comparison_of(model, sigma, ())
     scale = comparison.noise_scale[:, None]

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.identifiability import NOT_TOLD_APART, identifiability
-from cmm_uq.analysis.planning.information import certified, gram
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
-from cmm_uq.analysis.planning.separation import FAINT, cosines, imitators, left_of, visible
+from cmm_uq.analysis.planning.information import FAINT, certified, cosines, gram, imitators, left_of, visible
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.artefacts import artefact_facts, kind_named
@@ -60,7 +59,7 @@ def column(kind: str) -> dict[str, str]:
         of, known.observing("planned"), known.needs("plan", Planning, "planned"), plan, Volume.of(MACHINE, plan),
         effects(SIX), 1e-3, 1e-3,
     )  # fmt: skip
-    points = joined(ready_plan(setting)[1])
+    points = join(ready_plan(setting)[1])
     found = identifiability(setting.model(points))
     cells = {}
     for parameter in found.parameters:

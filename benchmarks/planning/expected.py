@@ -12,9 +12,9 @@ import argparse
 import numpy as np
 from settings import SETTINGS
 
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.identifiability import identifiability
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -27,7 +27,7 @@ def main() -> None:
     every = []
     for name, make in SETTINGS.items():
         setting = make()
-        points = joined(ready_plan(setting)[1])
+        points = join(ready_plan(setting)[1])
         found = identifiability(setting.model(points)).parameters
         expected = np.array([p.u for p in found if p.unknown.key[0] != ARTEFACT])
         acting = MeasurementModel(artefact_of(setting.artefact, points), setting.named)

@@ -22,11 +22,10 @@ from settings import SETTINGS
 from cmm_uq.analysis.diagnosis.comparison.search import search
 from cmm_uq.analysis.diagnosis.diagnosis import _indistinguishable
 from cmm_uq.analysis.diagnosis.power import powers, without_fault
-from cmm_uq.analysis.planning.candidates import candidates
+from cmm_uq.analysis.planning.candidates import candidates, ready_plan
 from cmm_uq.analysis.planning.exchange import choose, score_of
-from cmm_uq.analysis.planning.information import told, whole
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.information import recording_information, set_up_information
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.machine.model import MeasurementModel, Noise
@@ -38,11 +37,11 @@ ALPHA = 0.01
 def plans(setting):
     """Rivals; the seven lines, and the same with the placing that parts rivals best."""
     _, lines = ready_plan(setting)
-    setting = setting.sized(joined(lines))
-    rivals = setting.rivals(joined(lines))
+    setting = setting.sized(join(lines))
+    rivals = setting.rivals(join(lines))
     possible = candidates(setting)
-    known = told(setting, possible, rivals)
-    start = known.prior + whole(setting, joined(lines), rivals)
+    known = set_up_information(setting, possible, rivals)
+    start = known.prior + recording_information(setting, join(lines), rivals)
     score = score_of("separation", known, known.where(rivals))
     began = time.perf_counter()
     chosen = choose(known, start, score, 1)
@@ -52,7 +51,7 @@ def plans(setting):
 
 
 def predicted(setting, placings, rivals):
-    model = without_fault(setting.observed, setting.model(joined(placings)), Noise(setting.sigma), 0)
+    model = without_fault(setting.observed, setting.model(join(placings)), Noise(setting.sigma), 0)
     found = powers(model, rivals, stated=setting.sigma, sigma=setting.sigma, alpha=ALPHA, seed=0, draws=96)
     return {power.effect: power for power in found}
 
@@ -98,7 +97,7 @@ def main() -> None:
     for count, i in enumerate(order, 1):
         name, amplitude, seed = truth[i]
         for plan, placings in both.items():
-            points = joined(placings)
+            points = join(placings)
             detected, named, fitted = searched(setting, points, CATALOGUE[name], amplitude, seed)
             power = expected[plan][name]
             rows.append({

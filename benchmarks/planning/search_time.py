@@ -9,8 +9,8 @@ from settings import MACHINE, SIX, setting
 
 from cmm_uq.analysis.planning.candidates import candidates
 from cmm_uq.analysis.planning.exchange import CRITERIA, choose, score_of, step
-from cmm_uq.analysis.planning.information import told
-from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.information import set_up_information
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_facts
 
 
@@ -19,8 +19,8 @@ def main() -> None:
     plan = setting(artefact_facts(kind="step_gauge", u_um=0.4), SIX, pitch_mm=20.0, length_mm=1000.0, columns=columns)
     began = time.perf_counter()
     possible = candidates(plan)
-    rivals = plan.rivals(joined(possible[:2], columns=columns))[:24]
-    known = told(plan, possible, rivals)
+    rivals = plan.rivals(join(possible[:2], columns=columns))[:24]
+    known = set_up_information(plan, possible, rivals)
     print(f"{MACHINE.name}: {len(possible)} candidates, {len(SIX) + len(rivals)} effects, "
           f"their information {time.perf_counter() - began:.2f} s")  # fmt: skip
     for criterion in CRITERIA:

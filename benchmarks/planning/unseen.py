@@ -1,7 +1,7 @@
 """How far the closed form of a recording's power is from recordings drawn and tested one by one.
 
 For artefacts in their ready plans, noise stated or not, white or with set-up offsets: the visible length found with 90 % by
-``cmm_uq.analysis.diagnosis.unseen`` over that of ``cmm_uq.analysis.diagnosis.power`` (40 draws a size).
+``cmm_uq.analysis.diagnosis.smallest`` over that of ``cmm_uq.analysis.diagnosis.power`` (40 draws a size).
 
     python -m benchmarks.planning.unseen
 """
@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.comparison.search import Found, model_comparison
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, model_comparison
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, powers, without_fault
-from cmm_uq.analysis.diagnosis.unseen import POWER, smallest_effects
+from cmm_uq.analysis.diagnosis.smallest import POWER, smallest_effects
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.noise import PlannedNoise
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, setting
@@ -53,12 +53,12 @@ CASES = (
 def compared(case: Case) -> Iterator[tuple[str, float, float]]:
     """Each visible effect, with the closed form over the drawn amplitude, detected and named; nan where neither is."""
     chosen = setting(case.facts, **case.wishes)
-    model = chosen.model(joined(ready_plan(chosen)[1]))
+    model = chosen.model(join(ready_plan(chosen)[1]))
     noise = PlannedNoise((SIGMA,) * 3, placing=case.placing * SIGMA)
     quiet = without_fault(chosen.observed, model, noise.drawn, 1)
     stated = SIGMA if case.stated else None
     first = model_comparison(quiet, stated, 0)
-    found = Found(first, first.comparison, None, frozenset(), (), quiet, 0.0)
+    found = SearchResult(first, first.comparison, None, frozenset(), (), quiet, 0.0)
     began = time.process_time()
     rows = {row.effect: row for row in smallest_effects(found, ALPHA, quiet) if row.shown and row.periods is None}
     took = time.process_time() - began
@@ -88,7 +88,7 @@ def compared(case: Case) -> Iterator[tuple[str, float, float]]:
         yield power.effect, ratios[0], ratios[1]
 
 
-def _found(found: Found) -> float:
+def _found(found: SearchResult) -> float:
     """Noise that the recording shows, over what it has: the drawn recordings get the same."""
     both = found.first.comparison.noise_posterior()
     return float(np.sqrt(both.sum(axis=0) @ found.first.comparison.sigma**2)) / SIGMA

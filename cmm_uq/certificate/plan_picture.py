@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmm_uq.analysis.planning.placing import Placing
+from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.base.messages import Text, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.certificate.document import Plot
@@ -48,7 +48,7 @@ _ROOM_MM = WIDTH_MM * (1 / A_ROW - 0.05)
 _TEXT_MM = 15.0
 
 
-def placing_pictures(placings: Sequence[Placing], box: Floats, first: int) -> list[Plot]:
+def placing_pictures(placings: Sequence[SetUp], box: Floats, first: int) -> list[Plot]:
     """Placings in the machine's volume seen from the front, three in a row.
 
     Parameters
@@ -61,7 +61,7 @@ def placing_pictures(placings: Sequence[Placing], box: Floats, first: int) -> li
     return [_row(row, box, first + A_ROW * i) for i, row in enumerate(rows)]
 
 
-def _row(placings: Sequence[Placing], box: Floats, first: int) -> Plot:
+def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
     corners = _seen(np.array(list(product(*box))))
     low, high = corners.min(axis=0), corners.max(axis=0)
     span = 1.22 * (high - low)
@@ -108,7 +108,7 @@ def _seen(xyz: Floats) -> Floats:
     return np.asarray(xyz[:, [0, 2]] + xyz[:, 1:2] * DEPTH)
 
 
-def _draw(ax: Axes, placing: Placing, box: Floats) -> None:
+def _draw(ax: Axes, placing: SetUp, box: Floats) -> None:
     _frame(ax, box)
     readings = placing.points.machine_xyz[placing.points.repeat == placing.points.repeat.min()]
     floor = readings.copy()

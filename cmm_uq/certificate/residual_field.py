@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.diagnosis.residual_field import ResidualField
+from cmm_uq.analysis.diagnosis.location import ResidualField
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot

@@ -13,9 +13,9 @@ from cmm_uq.analysis.conformity.consequences import Consequences, Costs
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.conformity.verdicts import by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.diagnosis.unseen import Smallest
+from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.planning.advice import NextPlan, Suggestion
-from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.simulated import Simulated
 from cmm_uq.certificate.stating import Stating
@@ -106,7 +106,7 @@ class Diagnosed:
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
     simulated: Simulated | None = None
-    unseen: tuple[Smallest, ...] = ()
+    unseen: tuple[SmallestEffect, ...] = ()
     next_plan: NextPlan | None = None
     costs: Costs | None = None
 

@@ -10,17 +10,15 @@ import numpy as np
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.analysis.conformity.verdicts import TOLERANCE_WORDS
-from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, LeftOut
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
-from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.languages.language import ENGLISH
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.against import corrections
 from cmm_uq.certificate.as_json import as_json as as_json
-from cmm_uq.certificate.diagnosis.costs import costs_data
-from cmm_uq.certificate.diagnosis.next import next_data
-from cmm_uq.certificate.diagnosis.unseen import unseen_data
-from cmm_uq.certificate.diagnosis.words import sentence
+from cmm_uq.certificate.diagnosis.overview import sentence
+from cmm_uq.certificate.diagnosis.sections import costs_data, next_data, unseen_data
 from cmm_uq.certificate.program import software
 from cmm_uq.certificate.quantity_data import quantity_data as quantity_data
 from cmm_uq.certificate.result import Diagnosed, Result
@@ -163,7 +161,7 @@ def _simulation(simulated: Simulated, diagnosis: Diagnosis) -> dict[str, Any]:
     return simulated.data({owner: _quantities(values) for owner, values in found.items()})
 
 
-def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
+def effect_data(item: OmittedEffect, gain: Improvement) -> dict[str, Any]:
     """One effect that was left out."""
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from cmm_uq.analysis.conformity.lengths_decided import unknown_expansion
 from cmm_uq.base.messages import Text, listed, say, sentences
-from cmm_uq.certificate.diagnosis.words import VERDICTS
+from cmm_uq.certificate.diagnosis.overview import VERDICTS
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import title_of, with_uncertainty
 from cmm_uq.maths.uncertainty.rounding import figure, nominal, significant

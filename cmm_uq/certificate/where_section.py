@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.diagnosis.location import Place
-from cmm_uq.analysis.diagnosis.residual_field import residual_field
+from cmm_uq.analysis.diagnosis.location import Place, residual_field
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, after, alternatives, commas, number, say, signed
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import unit

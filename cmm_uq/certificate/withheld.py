@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cmm_uq.analysis.diagnosis.asserting import Withheld
-from cmm_uq.analysis.diagnosis.diagnosis import LeftOut
-from cmm_uq.analysis.diagnosis.periods import Mode
+from cmm_uq.analysis.diagnosis.assertion import WithheldEffect
+from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
+from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.base.messages import NOTHING, Text, commas, say
 from cmm_uq.certificate.wording import probability
 from cmm_uq.maths.uncertainty.rounding import rounded
@@ -16,7 +16,7 @@ _TOLD = 8
 """Periods that a sentence tells; results.json has all."""
 
 
-def sentences(withheld: Sequence[Withheld]) -> list[Text]:
+def sentences(withheld: Sequence[WithheldEffect]) -> list[Text]:
     """A sentence on each."""
     return [
         say(
@@ -27,7 +27,7 @@ def sentences(withheld: Sequence[Withheld]) -> list[Text]:
     ]  # fmt: skip
 
 
-def other_periods(item: LeftOut) -> Text:
+def other_periods(item: OmittedEffect) -> Text:
     """A sentence on further periods that fit, to follow that on an effect; nothing where there are none."""
     if not item.modes:
         return NOTHING
@@ -40,7 +40,7 @@ def other_periods(item: LeftOut) -> Text:
     )  # fmt: skip
 
 
-def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
+def withheld_data(withheld: Sequence[WithheldEffect]) -> list[dict[str, Any]]:
     """For results.json."""
     return [
         {

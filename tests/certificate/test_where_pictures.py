@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.residual_field import ResidualField
+from cmm_uq.analysis.diagnosis.location import ResidualField
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plot_style import ACCENT, BAND, DIVERGING, MUTED

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.analysis.screening.finding import Finding
-from cmm_uq.analysis.screening.screened import REVERSED, with_sound_sensors
+from cmm_uq.analysis.screening.screening import REVERSED, with_sound_sensors
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Message, Text, commas, number, say
 from cmm_uq.base.points import Floats, Ints, Points

@@ -14,7 +14,7 @@ from cmm_uq.analysis.conformity.as_recorded import LeftOut
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.screening.copies import counted_with
+from cmm_uq.analysis.screening.screening import counted_with
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import MeasurementModel

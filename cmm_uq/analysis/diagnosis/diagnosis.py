@@ -8,15 +8,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.asserting import Withheld, group_of, settled, unpredicted, with_periods, without_size
-from cmm_uq.analysis.diagnosis.compared import compared_on
-from cmm_uq.analysis.diagnosis.comparison.search import Found, ModelComparison, in_place_of, search, without
+from cmm_uq.analysis.diagnosis.assertion import (
+    WithheldEffect,
+    effects_without_size,
+    group_of,
+    period_settled,
+    withhold_unpredicted,
+    withhold_unresolved,
+)
+from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison, SearchResult, search, substitute, withhold
 from cmm_uq.analysis.diagnosis.held_out import Improvement, improvement
-from cmm_uq.analysis.diagnosis.joint import Joint, joint_posterior
-from cmm_uq.analysis.diagnosis.location import Place, located
-from cmm_uq.analysis.diagnosis.noise import heavy, named
-from cmm_uq.analysis.diagnosis.periods import Mode, modes_of
-from cmm_uq.analysis.diagnosis.rivals import Remaining, remaining
+from cmm_uq.analysis.diagnosis.joint import JointPosterior, Mode, joint_posterior, period_modes
+from cmm_uq.analysis.diagnosis.location import Place, locate
+from cmm_uq.analysis.diagnosis.model_average import ModelAverage, average_models
+from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probability_by_name
+from cmm_uq.analysis.diagnosis.observations import thin_out
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -43,7 +49,7 @@ _NOISE_KIND = 0.9
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class OmittedEffect:
     """An effect that the model left out.
 
     Parameters
@@ -72,7 +78,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class NoiseFound:
+class NoiseEstimate:
     """What the noise is like once everything found is modelled; lengths in µm."""
 
     coordinate: Quantity
@@ -109,19 +115,19 @@ class Diagnosis:
     p_value: float
     alpha: float
     where: tuple[Place, ...]
-    effects: tuple[LeftOut, ...]
+    effects: tuple[OmittedEffect, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     rivals: tuple[tuple[Text, float], ...]
-    noise: NoiseFound
+    noise: NoiseEstimate
     improvement: Improvement
     before: MeasurementModel
     after: MeasurementModel
     components: Components
     posterior: NoisyPosterior
     compared: int
-    found: Found
-    withheld: tuple[Withheld, ...] = ()
-    remaining: Remaining = field(default_factory=Remaining)
+    found: SearchResult
+    withheld: tuple[WithheldEffect, ...] = ()
+    remaining: ModelAverage = field(default_factory=ModelAverage)
 
 
 def diagnose(
@@ -147,54 +153,54 @@ def diagnose(
     """
     stated = None if stated_um is None else stated_um * MICROMETRE
     model = _with_last_digit(model)
-    some = model if observe is None else compared_on(model, observe, seed)
+    some = model if observe is None else thin_out(model, observe, seed)
     found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
     if found.effects and gain.elpd_gain <= gain.elpd_gain_se:
-        withheld = (*withheld, *unpredicted(found, gain.unseen))
-        found = _of_all(without(found, found.chosen), model)
+        withheld = (*withheld, *withhold_unpredicted(found, gain.unseen))
+        found = _of_all(withhold(found, found.chosen), model)
         gain, joint = improvement(model, model), joint_posterior(found, seed, progress, known)
     noise = _noise(found, joint, stated)
     after = replace(found.model, sigma=noise.coordinate.value * MICROMETRE)
     return Diagnosis(
-        _verdict(found, alpha), found.first.p_value, alpha, located(found.first, alpha, found.chosen),
+        _verdict(found, alpha), found.first.p_value, alpha, locate(found.first, alpha, found.chosen),
         _left_out(found, joint, model), _indistinguishable(found), _rivals(found.first), noise, gain, model, after,
         joint.components, joint.posterior, int(some.used.sum()), found, withheld,
-        remaining(found, joint, model, seed),
+        average_models(found, joint, model, seed),
     )  # fmt: skip
 
 
 def _asserted(
-    found: Found, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
-) -> tuple[Found, Joint, tuple[Withheld, ...]]:
+    found: SearchResult, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
+) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...]]:
     """What of a search may be asserted, estimated from all observations, and what is withheld.
 
     Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place. Where there
     is none, the least probable of those whose size is open goes first: without it that of the others may be known.
     """
-    found, gone = with_periods(found)
-    places: dict[int, Withheld] = {}  # of each effect that was tried in the place of others, the first of these
+    found, gone = withhold_unresolved(found)
+    places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
     while True:
         found = _of_all(found, model)
         joint = joint_posterior(found, seed, progress, known)
-        more = without_size(found, joint)
+        more = effects_without_size(found, joint)
         if not more:
             return found, joint, gone
         tried |= frozenset(more)
         alone = []
         for i, withheld in more.items():
-            if (instead := in_place_of(found, i, tried)) is not None:
+            if (instead := substitute(found, i, tried)) is not None:
                 found, other = instead
                 places[other] = places.get(i, withheld)
             else:
                 alone.append(i)
         if len(alone) == len(more):
             least = min(alone, key=lambda i: more[i].probability)
-            found, gone = without(found, frozenset({least})), (*gone, places.get(least, more[least]))
+            found, gone = withhold(found, frozenset({least})), (*gone, places.get(least, more[least]))
 
 
-def _of_all(found: Found, model: MeasurementModel) -> Found:
+def _of_all(found: SearchResult, model: MeasurementModel) -> SearchResult:
     """The same, its model that of all observations."""
     if not found.chosen or found.model.artefact is model.artefact:
         return found if found.chosen else replace(found, model=model)
@@ -207,7 +213,7 @@ def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
     return replace(model, least_noise=least) if least > model.least_noise else model
 
 
-def _verdict(found: Found, alpha: float) -> str:
+def _verdict(found: SearchResult, alpha: float) -> str:
     if found.first.p_value >= alpha:
         return "consistent"
     if not found.effects:
@@ -215,7 +221,7 @@ def _verdict(found: Found, alpha: float) -> str:
     return "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
 
 
-def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[LeftOut, ...]:
+def _left_out(found: SearchResult, joint: JointPosterior, before: MeasurementModel) -> tuple[OmittedEffect, ...]:
     index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
@@ -223,8 +229,8 @@ def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[Lef
     total = first - _squares(linear, ())
     listed = []
     for effect in (e for e in found.model.effects if e.name in found.effects):
-        modes = modes_of(found, index[effect.name])
-        known = not modes or settled(found, index[effect.name], modes)
+        modes = period_modes(found, index[effect.name])
+        known = not modes or period_settled(found, index[effect.name], modes)
         probability, together, group = _probability(found, index[effect.name], known=known)
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
@@ -240,7 +246,7 @@ def _left_out(found: Found, joint: Joint, before: MeasurementModel) -> tuple[Lef
             if known or name not in _of_a_period(effect)
         }
         explained = max(share, 0.0) if total > 0 else 0.0
-        item = LeftOut(
+        item = OmittedEffect(
             effect.name, effect.title, probability, parameters, explained, together, effect.points_to, group,
             modes[1:] if known else modes, known,
         )  # fmt: skip
@@ -253,7 +259,7 @@ def _of_a_period(effect: Effect) -> frozenset[str]:
     return frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
 
 
-def _probability(found: Found, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
+def _probability(found: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
     """Of an effect by itself, and with all that could stand in its place; and the names of those.
 
     Without a known period these are the functions of the reading, too.
@@ -283,7 +289,7 @@ def _squares(linear: LinearModel, without: Sequence[int]) -> float:
     return float(np.sum(solve(linear.only(kept)).residuals ** 2))
 
 
-def _indistinguishable(found: Found) -> tuple[tuple[str, ...], ...]:
+def _indistinguishable(found: SearchResult) -> tuple[tuple[str, ...], ...]:
     if found.combinations is None:
         return ()
     names, groups = [e.name for e in found.first.explanations], []
@@ -300,18 +306,18 @@ def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
     return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
 
-def _noise(found: Found, joint: Joint, stated: float | None) -> NoiseFound:
+def _noise(found: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseEstimate:
     """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
     sizes, weight = joint.posterior.sizes, found.last.noise_posterior().sum(axis=1)
     estimate = found.model.estimate()
     residuals = studentised(estimate.linear, joint.components, sizes.typical, estimate.least_squares.residuals)
     likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
     squares = found.last.squares[likeliest] * found.last.kinds[likeliest].scatter ** 2
-    return NoiseFound(
+    return NoiseEstimate(
         Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
         Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
-        named(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or heavy(residuals),
+        probability_by_name(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
         stated is not None and _contradicts(stated, squares, found.last.degrees_of_freedom),
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.diagnosis.numbering import numbered_by_place
+from cmm_uq.analysis.diagnosis.observations import numbered_by_place
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE

@@ -1,15 +1,17 @@
-"""The joint posterior of what the job names and what it left out, under the noise that was found."""
+"""The joint posterior of what the job names and what it left out; every mode of a period that fits."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import evenly, unevenly
-from cmm_uq.analysis.diagnosis.comparison.search import Found
-from cmm_uq.base.points import Floats
+from cmm_uq.analysis.diagnosis.comparison.explanations import STEP, effect_of, even_scale, from_even_scale
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import Unit
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.bending import with_curvature
 from cmm_uq.machine.model.noise import noise_of
@@ -18,6 +20,107 @@ from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
 from cmm_uq.maths.inference.sampling import sample_with_noise
 from cmm_uq.maths.inference.shaped import Shaped, sample_shaped
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+_LIKELY = 1e-4
+"""Part of the largest probability below which a trial parts one mode from the next."""
+
+_APART = 0.5
+"""Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes."""
+
+_VALLEY = 0.1
+"""Evidence over that of the lower of two peaks below which what lies between parts two modes."""
+
+_TOLD = 1e-3
+"""Probability from which a mode is told."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A period, its interval within this mode, and how probable the mode is among all.
+
+    ``ends`` are the lowest and the highest value that belong to it.
+    """
+
+    period: Quantity
+    probability: float
+    ends: tuple[float, float]
+
+    def holds(self, shape: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Which values (N,) belong to it."""
+        return (shape >= self.ends[0]) & (shape <= self.ends[1])
+
+
+def period_modes(found: SearchResult, index: int) -> tuple[Mode, ...]:
+    """All modes of the period of an effect that was found, the most probable first; none of one without a period.
+
+    Periods shorter than those that are searched count too: where positions repeat at equal distances, they fit as well.
+
+    Parameters
+    ----------
+    found : by the search.
+    index : of the effect, among the candidates.
+    """
+    explanation = found.first.explanations[index]
+    effect = effect_of(explanation)
+    if not (effect.shape and effect.shape[0].period_along):
+        return ()
+    given = [v for v in found.versions if v.explanation != index]
+    log, before, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
+    for group, cube in found.first.comparison.each(None, given, (index,)):
+        own = group.explanation == index
+        log.append(special.logsumexp(cube[own, :, 0], axis=1))
+        before.append(group.weight[own])
+        shape.append(np.array([explanation.members[m].shape[0] for m in group.member[own]]))
+    evidence = np.concatenate(log)
+    total = evidence + np.concatenate(before)
+    weight = np.exp(total - special.logsumexp(total))
+    frequency = even_scale(effect, np.concatenate(shape))
+    likely = np.flatnonzero(weight > _LIKELY * weight.max())
+    likely = likely[np.argsort(frequency[likely])]
+    span = _span(found, effect.shape[0].period_along)
+    apart = np.split(likely, np.flatnonzero(np.diff(frequency[likely]) > _APART / span) + 1)
+    found_modes = []
+    for part in (peak for trials in apart for peak in _peaks(trials, evidence)):
+        step = 0.5 * STEP / span
+        ends = from_even_scale(
+            effect, np.array([frequency[part].max() + step, max(frequency[part].min() - step, 1e-9)])
+        )
+        period = _within(from_even_scale(effect, frequency[part]), weight[part], effect.shape[0].unit, ends)
+        found_modes.append(Mode(period, float(weight[part].sum()), (float(ends[0]), float(ends[1]))))
+    return tuple(sorted((m for m in found_modes if m.probability > _TOLD), key=lambda m: -m.probability))
+
+
+def holds_whole_period(found: SearchResult, index: int, mode: Mode) -> bool:
+    """Whether the readings hold a whole period of an effect: less is a bow, or any other curve."""
+    axis = effect_of(found.first.explanations[index]).shape[0].period_along
+    return axis is None or mode.period.interval95[1] <= _span(found, axis)
+
+
+def _peaks(trials: Ints, evidence: Floats) -> Iterator[Ints]:
+    """Trials in order of frequency, parted at the deepest valley between two peaks, and so on."""
+    log = evidence[trials]
+    lower = np.minimum(np.maximum.accumulate(log), np.maximum.accumulate(log[::-1])[::-1])
+    valley = int(np.argmin(log - lower))
+    if log[valley] - lower[valley] < np.log(_VALLEY):
+        yield from _peaks(trials[:valley], evidence)
+        yield from _peaks(trials[valley:], evidence)
+    else:
+        yield trials
+
+
+def _span(found: SearchResult, axis: str) -> float:
+    return float(np.ptp(found.first.model.artefact.points.readings[axis]))
+
+
+def _within(periods: Floats, weight: Floats, unit: Unit, ends: Floats) -> Quantity:
+    """Mean, standard deviation and interval of periods with weights; of a single trial, as wide as trials are apart."""
+    weight = weight / weight.sum()
+    value = float(weight @ periods)
+    own = float(np.ptp(ends)) / np.sqrt(12) / max(len(periods), 1)
+    u = float(np.sqrt(weight @ (periods - value) ** 2 + own**2))
+    return Quantity(value, u, (value - 1.96 * u, value + 1.96 * u), unit)
+
 
 _FINER = 12
 """Nodes of a shape between two of the search's."""
@@ -27,7 +130,7 @@ _IMPROBABLE = 12.0
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class JointPosterior:
     """A posterior, the components of its noise, and the draws (N, s) of each effect's shape, by its name."""
 
     posterior: NoisyPosterior
@@ -36,8 +139,8 @@ class Joint:
 
 
 def joint_posterior(
-    found: Found, seed: int, progress: Progress | None = None, known: NoisyPosterior | None = None
-) -> Joint:
+    found: SearchResult, seed: int, progress: Progress | None = None, known: NoisyPosterior | None = None
+) -> JointPosterior:
     """Sample everything at once.
 
     Parameters
@@ -50,12 +153,12 @@ def joint_posterior(
     model = found.model
     components = replace(noise_of(model), known=model.least_noise)
     if known is not None and not found.effects:
-        return Joint(known, components, {})
+        return JointPosterior(known, components, {})
     estimate = model.estimate()
     new = [e for e in model.effects if e.shape and e.name in found.effects]
     posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, None if new else progress)
     if not new:
-        return Joint(with_curvature(model, components, posterior), components, {})
+        return JointPosterior(with_curvature(model, components, posterior), components, {})
     # what shapes columns is sampled under the noise that is typical with the shapes held
     white = components.white(posterior.sizes.typical)
     linear, values = estimate.linear.uncorrelated(white), estimate.about
@@ -64,12 +167,12 @@ def joint_posterior(
     drawn = sample_shaped(replace(linear, sigma=None), shaped, seed, progress)
     sizes = posterior.sizes.at(np.resize(np.arange(len(posterior.draws)), len(drawn.draws)))
     shapes = {e.name: drawn.shapes[:, j : j + 1] for j, e in enumerate(new)}
-    return Joint(
+    return JointPosterior(
         NoisyPosterior(**{f.name: getattr(drawn, f.name) for f in fields(drawn)}, sizes=sizes), components, shapes
     )
 
 
-def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
+def _shaped(found: SearchResult, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
     """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
     nodes = _nodes(found, effect)
     table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])
@@ -77,17 +180,17 @@ def _shaped(found: Found, model: MeasurementModel, effect: Effect, values: Float
     return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)
 
 
-def _nodes(found: Found, effect: Effect) -> Floats:
+def _nodes(found: SearchResult, effect: Effect) -> Floats:
     comparison = found.first.comparison
     index = next(i for i in found.chosen if found.first.explanations[i].name == effect.name)
     given = [v for v in found.versions if v.explanation != index]
     ((group, cube),) = comparison.each(None, given, (index,))
-    even = evenly(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in group.member]))
+    even = even_scale(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in group.member]))
     evidence = special.logsumexp(cube[:, :, 0], axis=1)
     step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
     likely = even[evidence > evidence.max() - _IMPROBABLE]
     offsets = np.arange(-_FINER, _FINER + 1) / _FINER
     fine = np.unique(np.round((likely[:, None] + step * offsets).ravel() / step * _FINER)) * step / _FINER
     (shape,) = effect.shape
-    low, high = np.sort(evenly(effect, np.array([shape.low, shape.high])))
-    return np.sort(unevenly(effect, np.unique(np.clip(fine, low, high))))
+    low, high = np.sort(even_scale(effect, np.array([shape.low, shape.high])))
+    return np.sort(from_even_scale(effect, np.unique(np.clip(fine, low, high))))

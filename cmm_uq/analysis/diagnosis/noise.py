@@ -43,7 +43,7 @@ _POINTS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class NoiseKind:
     """One shape of the noise.
 
     Parameters
@@ -64,7 +64,7 @@ class Kind:
     probability: float
     slow: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     log_factor: float = 0.0
-    unrounded: Kind | None = None
+    unrounded: NoiseKind | None = None
     scatter: float = 1.0
 
     def white(self, columns: Floats) -> Floats:
@@ -81,7 +81,7 @@ class Kind:
         return found + self.slow @ random.standard_normal((self.slow.shape[1], draws)) if self.slow.size else found
 
 
-def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probability: float) -> Kind:
+def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probability: float) -> NoiseKind:
     """A single draw of sizes as a kind of noise, over the noise scale (m,), for a reading noise of one.
 
     Slow noise that is too quick for the cosines has its covariance in full: what they leave out would look like physics.
@@ -97,10 +97,10 @@ def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probabil
     columns = columns / noise_scale[:, None] if columns.size else columns
     fine = replace(components, display=0.0) if components.display else None
     unrounded = shape_of(fine, sizes, noise_scale, probability) if fine else None
-    return Kind("components", sparse.csr_array(whitening), log, probability, columns, unrounded=unrounded)
+    return NoiseKind("components", sparse.csr_array(whitening), log, probability, columns, unrounded=unrounded)
 
 
-def tails(residual: Floats) -> Kind:
+def heavy_tails(residual: Floats) -> NoiseKind:
     """Student's t with four degrees of freedom, by its tangent at residuals (m,) over the noise scale.
 
     ln t is convex in the square of its argument, so that the tangent is a normal density below it, wherever it touches: the
@@ -109,11 +109,11 @@ def tails(residual: Floats) -> Kind:
     scale = 1.4826 * float(np.median(np.abs(residual)))
     precision, log_factor = _tangent(residual / max(scale, _NANOMETRE))
     whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)))
-    return Kind("tails", whitening, 0.5 * float(np.log(precision).sum()), TAILS, log_factor=log_factor)
+    return NoiseKind("tails", whitening, 0.5 * float(np.log(precision).sum()), TAILS, log_factor=log_factor)
 
 
-def with_tails(kind: Kind, residual: Floats, probability: float) -> Kind:
-    """A kind of noise whose independent part is of Student's t, by its tangent at residuals; see :func:`tails`.
+def with_tails(kind: NoiseKind, residual: Floats, probability: float) -> NoiseKind:
+    """A kind of noise whose independent part is of Student's t, by its tangent at residuals; see :func:`heavy_tails`.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def tail_precision(residual: Floats) -> Floats:
     return np.asarray(weight / _SHRINK, dtype=np.float64)
 
 
-def heavy(residuals: Floats) -> bool:
+def has_heavy_tails(residuals: Floats) -> bool:
     """Whether Student's t with four degrees of freedom describes residuals (n,) e⁴ times better than a normal distribution.
 
     Parameters
@@ -200,7 +200,7 @@ def _grid(stated: float | None, grid: Floats) -> tuple[Floats, Floats]:
     return grid, np.log(weight * np.gradient(grid) / np.sqrt(2 * np.pi))
 
 
-def named(kinds: Sequence[Kind], weight: Floats) -> dict[str, float]:
+def probability_by_name(kinds: Sequence[NoiseKind], weight: Floats) -> dict[str, float]:
     """Probability of each name of ``kinds`` by their weights (k,)."""
     total: dict[str, float] = {}
     for kind, part in zip(kinds, weight, strict=True):

@@ -19,10 +19,10 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
-from cmm_uq.analysis.diagnosis.comparison.prior import Prior
+from cmm_uq.analysis.diagnosis.comparison.prior import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
@@ -204,7 +204,7 @@ class Naming:
     @cached_property
     def priors(self) -> Floats:
         """(c,) log probability, beforehand, of each explanation alone among combinations; minus infinity for several."""
-        prior = Prior(self.explanations)
+        prior = CombinationPrior(self.explanations)
         return np.array([prior.log([i]) for i in range(len(self.explanations))])
 
     def __call__(self, odds: Floats, true: int) -> Floats:
@@ -217,7 +217,7 @@ class Naming:
         """
         weight = odds + self.priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.explanations])
-        nothing = np.full((1, odds.shape[1]), Prior(self.explanations).log([]))
+        nothing = np.full((1, odds.shape[1]), CombinationPrior(self.explanations).log([]))
         none = special.logsumexp(np.vstack([nothing, weight[kinds == UNKNOWN]]), axis=0)
         others = weight[(kinds == EFFECT) & (np.arange(len(kinds)) != true)]
         other = others.max(axis=0, initial=-np.inf)
@@ -231,7 +231,7 @@ class Naming:
 class _Rule:
     """The search's rule on data (m, b), mm, of which the baseline has been taken."""
 
-    comparison: Comparison
+    comparison: CandidateComparison
     sigma: float
     alpha: float
     coloured: DrawnNoise | None = None

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from cmm_uq.analysis.planning.placing import Placing, joined
-from cmm_uq.analysis.planning.repeats import repeated
+from cmm_uq.analysis.planning.expected import repeat_points
+from cmm_uq.analysis.planning.set_up import SetUp, join
 from cmm_uq.base.messages import Text, Verbatim, number, plural, say, semicolons
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.catalogue import every
@@ -21,7 +21,7 @@ _OF_FITS = ("radius_mm", "fit_rms_um", "n_points")
 
 
 @dataclass(frozen=True)
-class Parting:
+class Separation:
     """Two effects that the recording cannot tell apart.
 
     Parameters
@@ -37,7 +37,7 @@ class Parting:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class DetectionGoal:
     """An effect that is to be shown.
 
     Parameters
@@ -53,7 +53,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Shown:
+class DetectionChange:
     """How well an effect that was not seen will show.
 
     Parameters
@@ -82,19 +82,19 @@ class NextPlan:
     box : (3, 2) the room for the artefact, scale readings, mm.
     """
 
-    placings: tuple[Placing, ...]
+    placings: tuple[SetUp, ...]
     repeats: int
     first: int
-    partings: tuple[Parting, ...]
-    shown: tuple[Shown, ...]
+    partings: tuple[Separation, ...]
+    shown: tuple[DetectionChange, ...]
     reached: bool
     box: Floats
 
     @property
     def points(self) -> Points:
         """All of it as a recording at nominal coordinates, numbered on from what is recorded; without what fits told."""
-        points = joined(
-            [replace(each, points=repeated(each.points, self.repeats)) for each in self.placings], first=self.first
+        points = join(
+            [replace(each, points=repeat_points(each.points, self.repeats)) for each in self.placings], first=self.first
         )
         return replace(points, columns={k: v for k, v in points.columns.items() if k not in _OF_FITS})
 

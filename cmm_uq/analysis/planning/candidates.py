@@ -1,4 +1,4 @@
-"""Candidate placings: the artefact in many places and attitudes inside the machine's volume."""
+"""Candidate set-ups, the artefact in many places and attitudes inside the machine's volume; and ready plans."""
 
 from __future__ import annotations
 
@@ -8,19 +8,18 @@ from itertools import product
 
 import numpy as np
 
-from cmm_uq.analysis.planning.directions import PLANES, attitudes_of_lines
-from cmm_uq.analysis.planning.placing import Pattern, Placing
+from cmm_uq.analysis.planning.set_up import PLANES, Pattern, SetUp, attitudes_of_lines, direction_words
 from cmm_uq.analysis.planning.setting import Setting, Start
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, say
+from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.artefact import Artefact
 
 THIRDS = (0.0, 0.5, 1.0)
 _FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
-Shape = Callable[[Floats], Pattern | None]
+PatternFor = Callable[[Floats], Pattern | None]
 """The pattern for an attitude; ``None`` where it does not fit."""
 
 Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
@@ -28,7 +27,7 @@ Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
 
 
 @dataclass(frozen=True)
-class Elsewhere:
+class RelocatedCandidates:
     """A recorded artefact, that stands by itself in each placing, set up in other places.
 
     Parameters
@@ -38,7 +37,7 @@ class Elsewhere:
 
     attitudes: Attitudes
 
-    def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[Placing, ...]:
+    def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
         """The first recorded placing, once, in many places and attitudes.
 
         Raises
@@ -49,7 +48,7 @@ class Elsewhere:
         pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
         return self.like(pattern, attitude, volume, count)
 
-    def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[Placing, ...]:
+    def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[SetUp, ...]:
         """A pattern in other places; first of all in the recorded attitude (3, 3).
 
         Raises
@@ -61,7 +60,7 @@ class Elsewhere:
 
 
 @dataclass(frozen=True)
-class Everywhere:
+class VolumeCandidates:
     """Candidates of an artefact that stands by itself in each placing.
 
     Parameters
@@ -72,10 +71,10 @@ class Everywhere:
     """
 
     attitudes: Attitudes
-    shape: Callable[[Setting], Shape]
-    elsewhere: Elsewhere
+    shape: Callable[[Setting], PatternFor]
+    elsewhere: RelocatedCandidates
 
-    def candidates(self, setting: Setting, start: Start | None) -> tuple[Placing, ...]:
+    def candidates(self, setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
         """In many places: as the plan says, or as it was recorded.
 
         Raises
@@ -89,7 +88,7 @@ class Everywhere:
         return thinned(everywhere(volume, self.attitudes(volume), self.shape(setting)), plan.candidates, volume)
 
 
-def candidates(setting: Setting, start: Start | None = None) -> tuple[Placing, ...]:
+def candidates(setting: Setting, start: Start | None = None) -> tuple[SetUp, ...]:
     """Placings that the volume and the fixtures allow, at most as many as the plan says.
 
     Raises
@@ -114,7 +113,7 @@ def upright(volume: Volume) -> list[tuple[Text, Floats]]:
     return [(say("upright"), np.eye(3))]
 
 
-def thinned(placings: Iterator[Placing], count: int, volume: Volume) -> tuple[Placing, ...]:
+def thinned(placings: Iterator[SetUp], count: int, volume: Volume) -> tuple[SetUp, ...]:
     """At most so many of them, spread evenly over the list.
 
     Raises
@@ -134,7 +133,7 @@ def thinned(placings: Iterator[Placing], count: int, volume: Volume) -> tuple[Pl
     return tuple(found[i] for i in np.unique(np.linspace(0, len(found) - 1, count).round().astype(int)))
 
 
-def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Shape) -> Iterator[Placing]:
+def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: PatternFor) -> Iterator[SetUp]:
     """Every attitude in the corners, on the edges and in the middle of the room that it has."""
     steps = _FIFTHS if len(ways) < 4 else THIRDS
     for title, attitude in ways:
@@ -150,3 +149,45 @@ def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Shape
             if key not in seen:
                 seen.add(key)
                 yield pattern.placed(volume.machine, attitude, middle, title)
+
+
+MIDDLE = (0.5, 0.5, 0.5)
+"""Of the room that a placing has, along each axis."""
+
+ACROSS = " (across it)"
+"""How a plate stands to the direction by which it is held."""
+
+
+def ready_plan(setting: Setting) -> tuple[Text, tuple[SetUp, ...]]:
+    """Name and placings of the ready plan that a job asks for, or of the usual one for its kind.
+
+    Raises
+    ------
+    CmmUqError : its kind has no such plan, it does not fit the volume, or no fixture holds it.
+    """
+    ready, kind = setting.planning.ready, setting.artefact.kind
+    usual = next(iter(ready))
+    name = Verbatim(setting.plan.ready or usual)
+    if name not in ready:
+        raise CmmUqError(f"{name!r} is no plan for a job of kind {kind!r}", where="job.toml [plan] ready",
+                         fix=f"Leave it out: the usual plan is {usual!r}")  # fmt: skip
+    return name, ready[name](setting)
+
+
+def check_allowed(setting: Setting, direction: Floats, how: str = "") -> None:
+    """Refuse a direction that no fixture holds.
+
+    Parameters
+    ----------
+    how : the artefact stands to the direction, as ``(across it)``.
+
+    Raises
+    ------
+    CmmUqError : with the direction in words.
+    """
+    if not setting.volume.allows(direction):
+        raise CmmUqError(
+            f"no fixture holds the artefact {direction_words(direction)}{how}, which this plan wants",
+            where="job.toml [plan.fixtures] directions",
+            fix='Allow the direction, or leave out ready and ask for number = 20 placings by criterion = "D"',
+        )  # fmt: skip

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.analysis.planning.information import Told
-from cmm_uq.analysis.planning.separation import cosines, left_of
+from cmm_uq.analysis.planning.information import Information, cosines, left_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
@@ -31,7 +30,7 @@ Score = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Chosen:
+class Selection:
     """What a search ends with.
 
     Parameters
@@ -45,7 +44,7 @@ class Chosen:
     before: float
 
 
-def score_of(criterion: str, told: Told, targets: Sequence[int]) -> Score:
+def score_of(criterion: str, told: Information, targets: Sequence[int]) -> Score:
     """A criterion as a function of information.
 
     Parameters
@@ -99,7 +98,7 @@ def step(score: Score, start: Floats, each: Floats) -> Floats:
     return score(start + each)
 
 
-def choose(told: Told, start: Floats, score: Score, count: int, *, again: bool = False) -> Chosen:
+def choose(told: Information, start: Floats, score: Score, count: int, *, again: bool = False) -> Selection:
     """Take ``count`` candidates, greedily, then exchange them one for one until nothing gains.
 
     Where no single candidate improves the score (nothing is told apart by one placing alone), the one is taken that shrinks
@@ -124,7 +123,7 @@ def choose(told: Told, start: Floats, score: Score, count: int, *, again: bool =
             best = int(np.argmin(_free(step(everything, information, told.each), taken, again)))
         taken.append(best)
         information, now = information + told.each[best], float(scores[best])
-    return Chosen(*_exchanged(told, information, score, taken, again), before)
+    return Selection(*_exchanged(told, information, score, taken, again), before)
 
 
 def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
@@ -136,7 +135,7 @@ def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
 
 
 def _exchanged(
-    told: Told, information: Floats, score: Score, taken: list[int], again: bool
+    told: Information, information: Floats, score: Score, taken: list[int], again: bool
 ) -> tuple[tuple[int, ...], float]:
     """Exchange one for one, in turn, until a whole round gains nothing."""
     now = float(score(information[None])[0])

@@ -1,4 +1,6 @@
-"""Expected standard uncertainties of a plan under its noise: generalised least squares, for every size of the noise at once.
+"""Expected standard uncertainties of a plan under its noise, and what repeats are worth beside set-ups.
+
+Expected standard uncertainties of a plan under its noise: generalised least squares, for every size of the noise at once.
 
 The weights of least squares are those of the noise, as in the posterior of a recording that shows it. Sums over observations
 are made of columns that are orthonormal under white noise, so that no noise makes them worse than itself.
@@ -6,7 +8,9 @@ are made of columns that are orthonormal under white noise, so that no noise mak
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +18,14 @@ from scipy import linalg
 
 from cmm_uq.analysis.planning.information import certified, scales
 from cmm_uq.analysis.planning.noise import PlannedNoise
-from cmm_uq.base.points import Floats
+from cmm_uq.analysis.planning.set_up import SetUp, join
+from cmm_uq.analysis.planning.setting import Setting
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.freedoms import reached
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
-from cmm_uq.maths.inference.linear_model import LinearModel
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.noise import Components, Sizes
 
 _ROUNDING = 1e-9
@@ -27,7 +33,7 @@ _ZERO = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Expected:
+class ExpectedUncertainty:
     """Standard uncertainties (k,) of each parameter, in its unit.
 
     Parameters
@@ -40,7 +46,7 @@ class Expected:
     with_prior: Floats
 
 
-def expected(model: MeasurementModel, noise: PlannedNoise) -> Expected:
+def expected_uncertainty(model: MeasurementModel, noise: PlannedNoise) -> ExpectedUncertainty:
     """What placings will determine under a noise.
 
     Parameters
@@ -52,7 +58,7 @@ def expected(model: MeasurementModel, noise: PlannedNoise) -> Expected:
     linear, components = model.linearised(values), noise.components(model, values)
     sizes, weight = noise.spread(components)
     u, with_prior = uncertainties(linear, components, sizes)
-    return Expected(_averaged(u, weight), _averaged(with_prior, weight))
+    return ExpectedUncertainty(_averaged(u, weight), _averaged(with_prior, weight))
 
 
 def uncertainties(linear: LinearModel, components: Components, sizes: Sizes) -> tuple[Floats, Floats]:
@@ -107,3 +113,114 @@ def _averaged(values: Floats, weight: Floats) -> Floats:
     """Geometric mean (k,) of values (w, k), infinite where one is."""
     with np.errstate(divide="ignore"):
         return np.asarray(np.exp(weight @ np.log(values)) if len(weight) > 1 else values[0])
+
+
+COMPARED = 10
+"""Repeats that are compared, or one more than the plan has."""
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatsRow:
+    """What placings tell with a number of repeats.
+
+    Parameters
+    ----------
+    repeats, readings, minutes : of every point; of all placings together.
+    u : (p,) expected of each parameter, in its unit, infinite where it stays free.
+    readings_more, minutes_more, u_more : with one more placing, which tells as much as they do on average.
+    """
+
+    repeats: int
+    readings: int
+    minutes: float
+    u: Floats
+    readings_more: float
+    minutes_more: float
+    u_more: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatsComparison:
+    """Repeats against placings.
+
+    Parameters
+    ----------
+    unknowns : p parameters, those without a certificate.
+    placings : how many there are.
+    rows : for 1, 2, … repeats.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    placings: int
+    rows: tuple[RepeatsRow, ...]
+
+    @property
+    def enough(self) -> int | None:
+        """Repeats from which on a minute of one more placing lowers every uncertainty more than one of one more repeat.
+
+        ``None`` where that is so for no number of them in the table.
+        """
+        better = [_placing_is_better(one, following) for one, following in pairwise(self.rows)]
+        first = len(better) + 1 - [*reversed(better), False].index(False)
+        return first if first <= len(better) else None
+
+
+def _placing_is_better(one: RepeatsRow, following: RepeatsRow) -> bool:
+    """Whether the logarithm of every uncertainty falls more in a minute of one more placing than of the following repeat."""
+    there = np.isfinite(one.u)
+    by_placing = np.log(one.u[there] / one.u_more[there]) * (following.minutes - one.minutes)
+    by_repeat = np.log(one.u[there] / following.u[there]) * (one.minutes_more - one.minutes)
+    return bool(np.all(by_placing > by_repeat))
+
+
+def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsComparison | None:
+    """Repeats against placings; ``None`` where no parameter is determined or the noise is taken as white.
+
+    Parameters
+    ----------
+    setting : with the noise.
+    placings : of the plan.
+    """
+    noise, n = setting.noise, len(placings)
+    if noise is None or not setting.named:
+        return None
+    rows = []
+    for repeats in range(1, max(COMPARED, setting.plan.repeats + 1) + 1):
+        points = _joined(setting, placings, repeats)
+        model, minutes = setting.model(points), _minutes(setting, n, len(points))
+        sought = [i for i, unknown in enumerate(model.unknowns) if not unknown.known]
+        # information of n + 1 placings is to that of n as if variances were n / (n + 1) of what they are
+        now, more = (
+            expected_uncertainty(model, each).u[sought] for each in (noise, noise.times(float(np.sqrt(n / (n + 1)))))
+        )
+        with_one_more = len(points) * (1 + 1 / n)
+        rows.append(
+            RepeatsRow(
+                repeats, len(points), minutes, now, with_one_more, _minutes(setting, n + 1, with_one_more), more,
+            )
+        )  # fmt: skip
+    unknowns = tuple(unknown for unknown in model.unknowns if not unknown.known)
+    return RepeatsComparison(unknowns, n, tuple(rows)) if np.any(np.isfinite(rows[0].u)) else None
+
+
+def repeat_points(points: Points, times: int) -> Points:
+    """What was read first, that many times over."""
+    once = points.select(points.repeat == points.repeat.min())
+    n = len(once)
+    return replace(
+        once, xyz=np.tile(once.xyz, (times, 1)), measurement=np.tile(once.measurement, times),
+        point=np.tile(once.point, times), repeat=np.repeat(np.arange(1, times + 1), n), lines=np.zeros(0, dtype=np.int64),
+        columns={name: np.tile(values, times) for name, values in once.columns.items()},
+    )  # fmt: skip
+
+
+def _joined(setting: Setting, placings: Sequence[SetUp], repeats: int) -> Points:
+    plan = setting.plan
+    return join(
+        [replace(placing, points=repeat_points(placing.points, repeats)) for placing in placings],
+        seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing, columns=plan.columns,
+    )  # fmt: skip
+
+
+def _minutes(setting: Setting, placings: int, readings: float) -> float:
+    return setting.plan.minutes_per_placing * placings + setting.plan.seconds_per_point * readings / 60

@@ -13,10 +13,9 @@ from itertools import combinations
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.analysis.planning.expected import Expected, expected
-from cmm_uq.analysis.planning.information import certified, gram, scales
+from cmm_uq.analysis.planning.expected import ExpectedUncertainty, expected_uncertainty
+from cmm_uq.analysis.planning.information import FAINT, certified, cosines, gram, imitators, left_of, scales, visible
 from cmm_uq.analysis.planning.noise import PlannedNoise, uncorrelated, white_noise
-from cmm_uq.analysis.planning.separation import FAINT, cosines, imitators, left_of, visible
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -37,7 +36,7 @@ WEAK = 0.1
 
 
 @dataclass(frozen=True)
-class Determined:
+class Determination:
     """What to expect of one parameter.
 
     Parameters
@@ -70,7 +69,7 @@ class Identifiability:
     unseen : effects, not named by the job, of which nothing would show at all.
     """
 
-    parameters: tuple[Determined, ...]
+    parameters: tuple[Determination, ...]
     free: tuple[Mapping[tuple[str, str], float], ...]
     singular_values: Floats
     alike: tuple[Pair, ...]
@@ -98,8 +97,8 @@ def identifiability(
     linear = model.linearised(values)
     estimate = solve(_enough(linear))
     white = white_noise(model) if noise is None else noise.white
-    under_white = expected(model, white)
-    under_noise = under_white if noise is None else expected(model, noise)
+    under_white = expected_uncertainty(model, white)
+    under_noise = under_white if noise is None else expected_uncertainty(model, noise)
     information = gram(model, values, noise) + certified(model.unknowns)
     named = _named_pairs(information, [unknown.key[0] for unknown in model.unknowns])
     alike, absorbed, unseen = _among_rivals(model, rivals, noise) if rivals else ([], (), ())
@@ -133,8 +132,8 @@ def _singular_values(linear: LinearModel, sigma: float) -> Floats:
 
 
 def _parameters(
-    linear: LinearModel, estimate: LeastSquares, noisy: Expected, white: Expected
-) -> tuple[Determined, ...]:  # fmt: skip
+    linear: LinearModel, estimate: LeastSquares, noisy: ExpectedUncertainty, white: ExpectedUncertainty
+) -> tuple[Determination, ...]:  # fmt: skip
     scale, found = scales(linear.unknowns), []
     for i, unknown in enumerate(linear.unknowns):
         if unknown.known:
@@ -142,7 +141,7 @@ def _parameters(
         u, u_white = (float(each.u[i]) if estimate.determined[i] else None for each in (noisy, white))
         weak = unknown.key[0] != ARTEFACT and noisy.with_prior[i] ** 2 > WEAK * scale[i] ** 2
         status = "free" if u is None else "weak" if weak else "determined"
-        found.append(Determined(unknown, u, float(noisy.with_prior[i]), u_white, status))
+        found.append(Determination(unknown, u, float(noisy.with_prior[i]), u_white, status))
     return tuple(found)
 
 

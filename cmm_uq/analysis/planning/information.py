@@ -1,8 +1,16 @@
-"""How much each placing tells of every unknown.
+"""How much each set-up tells of every unknown, and how well effects are told apart by it.
+
+How much each placing tells of every unknown.
 
 The placing's own freedoms are projected out, the noise of placings is independent, and so their information adds (JCGM 101
 has no word for it; Atkinson, Donev & Tobias 2007, *Optimum Experimental Designs*, 5.1). Unknowns are in units of their prior
 standard deviation, a size of the artefact in units of a tenth of a millimetre.
+
+How well effects are told apart, from the information on them and on all that must be fitted besides.
+
+Two effects whose columns are parallel after everything else has been projected out cannot be told apart by any method; the
+sine of the angle between them is the part of one that the other cannot imitate. (Baarda 1968; Teunissen 2018, *Distributional
+theory for the DIA method*: minimal detectable and identifiable bias.)
 """
 
 from __future__ import annotations
@@ -11,9 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.analysis.planning.noise import PlannedNoise, uncorrelated
-from cmm_uq.analysis.planning.placing import Placing, joined
+from cmm_uq.analysis.planning.set_up import SetUp, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import MeasurementModel
@@ -26,7 +35,7 @@ _HELD = 1e12
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Information:
     """Information of placings, one matrix each.
 
     Parameters
@@ -52,7 +61,7 @@ class Told:
         return [i for i in range(len(self.prior)) if i not in effects]
 
 
-def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...] = ()) -> Told:
+def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[Effect, ...] = ()) -> Information:
     """What each placing tells of the effects that the job names, and of some others.
 
     Raises
@@ -60,7 +69,7 @@ def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...]
     CmmUqError : an effect needs what these placings do not give.
     """
     plan = setting.plan
-    points = joined(
+    points = join(
         placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
         columns=plan.columns,
     )  # fmt: skip
@@ -69,11 +78,11 @@ def told(setting: Setting, placings: Sequence[Placing], also: tuple[Effect, ...]
     numbers = np.unique(points.measurement)
     models = [setting.model(points.select(points.measurement == number), also) for number in numbers]
     matrices = [gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise) for model in models]
-    return Told(models[0].unknowns, np.stack(matrices), certified(models[0].unknowns))
+    return Information(models[0].unknowns, np.stack(matrices), certified(models[0].unknowns))
 
 
-def whole(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:
-    """Information (k, k) of a whole recording, in the rows of :func:`told`, without that of certificates."""
+def recording_information(setting: Setting, points: Points, also: tuple[Effect, ...] = ()) -> Floats:
+    """Information (k, k) of a whole recording, in the rows of :func:`set_up_information`, without that of certificates."""
     model = setting.model(points, also)
     if setting.planning.shared:
         return np.asarray(shared(model, setting.noise).each.sum(axis=0), dtype=np.float64)
@@ -118,7 +127,7 @@ def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
     return np.diag(values)
 
 
-def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Told:
+def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Information:
     """Information of each measurement of a recording whose placing's freedoms are common to all of them: a swept bar."""
     values = np.array([u.prior_mean for u in model.unknowns])
     linear = uncorrelated(model, values, noise)
@@ -127,7 +136,7 @@ def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Told:
     numbers, index = np.unique(model.artefact.measurement, return_inverse=True)
     each = np.zeros((len(numbers), rows.shape[1], rows.shape[1]))
     np.add.at(each, index.ravel(), rows[:, :, None] * rows[:, None, :])
-    return Told(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
+    return Information(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
 
 
 def _sigma(model: MeasurementModel, noise: PlannedNoise | None) -> float:
@@ -135,3 +144,67 @@ def _sigma(model: MeasurementModel, noise: PlannedNoise | None) -> float:
     if sigma is None:
         raise ValueError("the information of a measurement needs the noise")
     return sigma
+
+
+SEEN = 1e-6
+"""Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
+
+FAINT = 1.0
+"""Information, for an effect of its prior standard deviation, below which it does not stand out of the noise."""
+
+_RIDGE = 1e-13
+_PART = 0.1
+"""Share from which on a column counts as part of what looks like another."""
+
+
+def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:
+    """Information (..., r, r) on rivals once the base (rows) is fitted: the Schur complement.
+
+    Parameters
+    ----------
+    information : (..., k, k).
+    """
+    rival, fitted = list(rivals), list(base)
+    own = information[..., rival, :][..., :, rival]
+    if not fitted:
+        return np.asarray(own)
+    cross = information[..., fitted, :][..., :, rival]
+    within = information[..., fitted, :][..., :, fitted]
+    scale = np.sqrt(np.maximum(np.einsum("...ii->...i", within), 1e-300))
+    scaled = within / scale[..., :, None] / scale[..., None, :]
+    scaled = scaled + _RIDGE * np.eye(len(fitted))
+    solved = np.linalg.solve(scaled, cross / scale[..., :, None]) / scale[..., :, None]
+    return np.asarray(own - np.swapaxes(cross, -1, -2) @ solved)
+
+
+def cosines(left: Floats, alone: Floats) -> Floats:
+    """Absolute cosines (..., r, r) between effects; 1 on the diagonal, and with an effect that is not seen.
+
+    Parameters
+    ----------
+    left : (..., r, r) information on them, see :func:`left_of`.
+    alone : (..., r) information on each if nothing else were fitted.
+    """
+    size = np.einsum("...ii->...i", left)
+    seen = visible(left, alone)
+    root = np.sqrt(np.where(seen, size, 1.0))
+    cosine = np.abs(left) / root[..., :, None] / root[..., None, :]
+    cosine = np.where(seen[..., :, None] & seen[..., None, :], np.minimum(cosine, 1.0), 1.0)
+    return np.asarray(np.where(np.eye(left.shape[-1], dtype=bool), 1.0, cosine))
+
+
+def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
+    """(..., r) whether anything of each effect is left."""
+    return np.asarray(np.einsum("...ii->...i", left) > np.maximum(SEEN * alone, FAINT))
+
+
+def imitators(information: Floats, row: int, base: Sequence[int]) -> list[int]:
+    """Rows of the base that together look like an effect that they hide, those that matter.
+
+    By least squares of the effect's column on those of the base; of many solutions the smallest.
+    """
+    fitted = list(base)
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / scale[:, None] / scale[None, :]
+    parts = np.linalg.lstsq(scaled[np.ix_(fitted, fitted)], scaled[fitted, row], rcond=_RIDGE**0.5)[0]
+    return [i for i, part in zip(fitted, parts, strict=True) if abs(part) > _PART]

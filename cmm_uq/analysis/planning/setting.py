@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from cmm_uq.analysis.planning.noise import PlannedNoise
-from cmm_uq.analysis.planning.placing import Placing
+from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
@@ -37,7 +37,7 @@ class Start:
     """
 
     artefact: Artefact
-    again: Placing | None
+    again: SetUp | None
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class Planning:
     free : what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
     """
 
-    ready: Mapping[str, Callable[[Setting], tuple[Placing, ...]]]
-    candidates: Callable[[Setting, Start | None], tuple[Placing, ...]]
-    elsewhere: Callable[[Artefact, Volume, int], tuple[Placing, ...]] | None = None
+    ready: Mapping[str, Callable[[Setting], tuple[SetUp, ...]]]
+    candidates: Callable[[Setting, Start | None], tuple[SetUp, ...]]
+    elsewhere: Callable[[Artefact, Volume, int], tuple[SetUp, ...]] | None = None
     shared: bool = False
     sought: bool = False
     free: Callable[[Setting, Points, str], tuple[Text, ...]] | None = None

@@ -19,14 +19,12 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import shapes
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.analysis.planning.advice import ODDS, NextPlan, Parting, Shown, Wanted
-from cmm_uq.analysis.planning.exchange import Chosen, choose
-from cmm_uq.analysis.planning.information import Told, by_measurement, certified, gram, scales, shared
-from cmm_uq.analysis.planning.placing import Placing, appended
-from cmm_uq.analysis.planning.separation import left_of
+from cmm_uq.analysis.planning.advice import ODDS, DetectionChange, DetectionGoal, NextPlan, Separation
+from cmm_uq.analysis.planning.exchange import Selection, choose
+from cmm_uq.analysis.planning.information import Information, by_measurement, certified, gram, left_of, scales, shared
+from cmm_uq.analysis.planning.set_up import SetUp, append
 from cmm_uq.analysis.planning.setting import Planning
-from cmm_uq.analysis.planning.turned import turned_placings
-from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.planning.volume import Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -87,7 +85,7 @@ class _Information:
     ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits.
     """
 
-    told: Told
+    told: Information
     names: tuple[str, ...]
     fitted: frozenset[str]
     recorded: Floats
@@ -108,7 +106,7 @@ def next_plan(
     observe: Observe,
     planning: Planning | None,
     plan: PlanFacts | None = None,
-    wanted: Sequence[Wanted] = (),
+    wanted: Sequence[DetectionGoal] = (),
 ) -> NextPlan | None:
     """The fewest set-ups, within the machine's travel or the recorded volume, that part all that cannot be told apart.
 
@@ -139,7 +137,7 @@ def next_plan(
         places = planning.elsewhere(after.artefact, volume, _CANDIDATES)
         if not planning.shared:
             some = places[:: max(1, len(places) // _TURNED)]
-            places = (*places, *turned_placings(some, volume))
+            places = (*places, *turned_set_ups(some, volume))
         known = _information(after, model, partial(observe, facts), places, shared_freedoms=planning.shared)
     except CmmUqError:  # nowhere else to put it
         return None
@@ -201,12 +199,12 @@ def _information(
     after: MeasurementModel,
     model: MeasurementModel,
     observe: Observed,
-    places: Sequence[Placing],
+    places: Sequence[SetUp],
     *,
     shared_freedoms: bool,
 ) -> _Information:
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
-    joint = observe(appended(model.artefact.points, places))
+    joint = observe(append(model.artefact.points, places))
     together = MeasurementModel(joint, model.effects, model.sigma, shapes=model.shapes)
     names = tuple(unknown.key[0] for unknown in together.unknowns)
     if shared_freedoms:
@@ -214,7 +212,7 @@ def _information(
         more = len(whole.prior) - len(names)
     else:
         values = np.array([unknown.prior_mean for unknown in together.unknowns])
-        whole, more = Told(together.unknowns, by_measurement(together, values), certified(together.unknowns)), 0
+        whole, more = Information(together.unknowns, by_measurement(together, values), certified(together.unknowns)), 0
     count = len(whole.each) - len(places)
     recorded = whole.each[:count].sum(axis=0)
     if not shared_freedoms and len(names) == len(model.unknowns):  # without observations that were set aside
@@ -257,7 +255,7 @@ class _Aims:
 
     known: _Information
     groups: Sequence[_Group]
-    wanted: tuple[Wanted, ...]
+    wanted: tuple[DetectionGoal, ...]
     sizes: Mapping[tuple[str, str], Floats]
     variances: tuple[float, float]
     _start: dict[tuple[int, int, int], float] = field(default_factory=dict)
@@ -267,7 +265,7 @@ class _Aims:
         reading, set_up = self.variances
         return np.asarray(self.known.told.each / (reading / repeats + set_up))
 
-    def after(self, chosen: Chosen, repeats: int) -> Floats:
+    def after(self, chosen: Selection, repeats: int) -> Floats:
         """Information (k, k) of the recording and what is added to it."""
         return np.asarray(self.start + self.added(repeats)[list(chosen.indices)].sum(axis=0))
 
@@ -283,10 +281,10 @@ class _Aims:
             total += np.maximum(2 * np.log(self.amplitudes(information, self.wanted) / goal), 0.0).sum(axis=1)
         return total
 
-    def partings(self, information: Floats) -> tuple[Parting, ...]:
+    def partings(self, information: Floats) -> tuple[Separation, ...]:
         """Every pair with its odds before, and with this information (k, k)."""
         return tuple(
-            Parting(
+            Separation(
                 (group.names[a], group.names[b]), float(np.exp(group.log_odds[a] - group.log_odds[b])),
                 float(np.exp(min(self._log_odds(left, g, a, b)[0], 50.0))),
             )
@@ -295,13 +293,15 @@ class _Aims:
             for a, b in group.pairs
         )  # fmt: skip
 
-    def shown(self, information: Floats) -> tuple[Shown, ...]:
+    def shown(self, information: Floats) -> tuple[DetectionChange, ...]:
         """Every effect that is wanted, as it shows without and with this information (k, k)."""
         both = np.stack([self.known.recorded, information])
         found = self.amplitudes(both, self.wanted).T.tolist()
-        return tuple(Shown(one.effect, *amplitudes) for one, amplitudes in zip(self.wanted, found, strict=True))
+        return tuple(
+            DetectionChange(one.effect, *amplitudes) for one, amplitudes in zip(self.wanted, found, strict=True)
+        )
 
-    def amplitudes(self, information: Floats, wanted: Sequence[Wanted]) -> Floats:
+    def amplitudes(self, information: Floats, wanted: Sequence[DetectionGoal]) -> Floats:
         """Smallest amplitude (c, w) of each effect by itself that is detected, over its prior standard deviation."""
         names = [one.effect for one in wanted]
         rows = [self.known.rows(name)[0] for name in names]
@@ -347,7 +347,7 @@ class _Aims:
         return self.known.recorded
 
 
-def _within_reach(aims: _Aims) -> tuple[Chosen, int] | None:
+def _within_reach(aims: _Aims) -> tuple[Selection, int] | None:
     """The plan for all aims but effects to show that would need too many set-ups, the one that needs most first."""
     found = _fewest(aims)
     while found is not None and found[0].after > 0 and aims.wanted:
@@ -362,10 +362,10 @@ def _within_reach(aims: _Aims) -> tuple[Chosen, int] | None:
     return found
 
 
-def _fewest(aims: _Aims) -> tuple[Chosen, int] | None:
+def _fewest(aims: _Aims) -> tuple[Selection, int] | None:
     """As few set-ups as reach all aims, each repeated no more often than that needs; what comes closest where none does."""
 
-    def chosen(count: int, repeats: int) -> Chosen:
+    def chosen(count: int, repeats: int) -> Selection:
         told = replace(aims.known.told, each=aims.added(repeats))
         return choose(told, aims.start, aims.short, count)
 

@@ -28,7 +28,7 @@ Misfit = Callable[[Floats, Floats, float], Floats]
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ArtefactShape:
     """What one kind of artefact asks of the points of each of its placings.
 
     Parameters
@@ -81,7 +81,7 @@ class Screening:
     balls : whether its points are centres of balls or cylinders, each of several touches.
     """
 
-    shape_of: Callable[..., Shape | None]
+    shape_of: Callable[..., ArtefactShape | None]
     balls: bool = False
 
 

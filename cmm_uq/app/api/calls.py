@@ -246,9 +246,9 @@ def prove(
     ------
     CmmUqError : the job has an analysis of its own, or neither recording nor stated noise.
     """
+    from cmm_uq.app.commands.prove import ProofOptions as Asked
     from cmm_uq.app.commands.prove import prove_outcome
-    from cmm_uq.app.commands.proving import Asked
-    from cmm_uq.laboratory.schedule.processes import processes
+    from cmm_uq.laboratory.schedule.pool import processes
 
     asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
     return Proof(prove_outcome(in_language(_job(job), language), asked))

@@ -52,10 +52,10 @@ def command(
     language: Language = None,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
-    with progress(quiet=quiet or json, verbose=verbose) as stage:
+    with shown(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.prove import ProofOptions as Asked
         from cmm_uq.app.commands.prove import write_proof
-        from cmm_uq.app.commands.proving import Asked
-        from cmm_uq.laboratory.schedule.processes import processes
+        from cmm_uq.laboratory.schedule.pool import processes
 
         asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
         written = write_proof(

@@ -11,11 +11,11 @@ from cmm_uq.analysis.conformity.as_recorded import LeftOut
 from cmm_uq.analysis.conformity.consequences import consequences, costs
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.power import ALLOWED
-from cmm_uq.analysis.diagnosis.unseen import USUAL_LENGTH, Smallest, smallest_effects
-from cmm_uq.analysis.planning.advice import NextPlan, Wanted, suggestions
+from cmm_uq.analysis.diagnosis.smallest import USUAL_LENGTH, SmallestEffect, smallest_effects
+from cmm_uq.analysis.planning.advice import DetectionGoal, NextPlan, suggestions
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
-from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.app.commands.against import Against, against_simulation
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of, recorded_model, refuse_planned
@@ -23,8 +23,8 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.overflow import refusing_overflow
-from cmm_uq.certificate.diagnosis.next import TO_FILL_IN
 from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
+from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.outcome import Found, Outcome, Recipe
 from cmm_uq.certificate.result import Diagnosed
 from cmm_uq.jobs.job import Job
@@ -144,22 +144,22 @@ def diagnosed(
     return Diagnosed(job, findings, diagnosis, next_ones, changes, unseen=unseen, next_plan=plan, costs=cost)
 
 
-def _wanted(job: Job, diagnosis: Diagnosis, unseen: Sequence[Smallest]) -> tuple[Wanted, ...]:
+def _wanted(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEffect]) -> tuple[DetectionGoal, ...]:
     """What further set-ups shall show: as the job says, else what a recording that agrees could not have shown."""
     asked = job.facts.plan.unseen
     if not (diagnosis.verdict == "consistent" if asked is None else asked):
         return ()
     blind = [row for row in unseen if row.blind and row.periods is None]
     needed = max((row.length for row in unseen if row.length is not None), default=USUAL_LENGTH)
-    return tuple(Wanted(row.effect, ALLOWED * _enough(row), row.length or needed) for row in blind)
+    return tuple(DetectionGoal(row.effect, ALLOWED * _enough(row), row.length or needed) for row in blind)
 
 
-def _enough(row: Smallest) -> float:
+def _enough(row: SmallestEffect) -> float:
     """Part of what physics allows that further set-ups shall show: all of it, or half of what shows already."""
     return 1.0 if row.detected is None or not row.shown else 0.5 * row.detected / row.allowed
 
 
-def _next(job: Job, diagnosis: Diagnosis, observe: Observe, wanted: tuple[Wanted, ...]) -> NextPlan | None:
+def _next(job: Job, diagnosis: Diagnosis, observe: Observe, wanted: tuple[DetectionGoal, ...]) -> NextPlan | None:
     facts = job.facts
     return next_plan(diagnosis, facts.artefact, observe, kind_of(job).offers("plan", Planning), facts.plan, wanted)
 

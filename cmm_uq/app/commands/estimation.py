@@ -10,10 +10,9 @@ from scipy import special
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
 from cmm_uq.analysis.conformity.measurement_lines import ALIGNED
-from cmm_uq.analysis.screening.copies import counted_with
-from cmm_uq.analysis.screening.finding import finding
-from cmm_uq.analysis.screening.moved import moved_stretches, recurring_points, words_of_point, words_of_stretch
-from cmm_uq.analysis.screening.screened import Finding, gross_outliers
+from cmm_uq.analysis.screening.finding import Finding, finding
+from cmm_uq.analysis.screening.outliers import moved_stretches, point_words, recurring_points, stretch_words
+from cmm_uq.analysis.screening.screening import counted_with, gross_outliers
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
@@ -68,8 +67,8 @@ def _told(
     points, untold = artefact.points, dict(times_off)
     outliers = np.array(sorted(set(rows.values())), dtype=np.int64)
     causes = [
-        *((each, words_of_point, False) for each in recurring),
-        *((each, words_of_stretch, True) for each in moved_stretches(points, outliers)),
+        *((each, point_words, False) for each in recurring),
+        *((each, stretch_words, True) for each in moved_stretches(points, outliers)),
     ]
     for i, times in times_off.items():
         if i not in untold:

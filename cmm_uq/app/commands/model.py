@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.screening.copies import counted_with
-from cmm_uq.analysis.screening.finding import finding
-from cmm_uq.analysis.screening.screened import Finding, screened
+from cmm_uq.analysis.screening.finding import Finding, finding
+from cmm_uq.analysis.screening.screening import counted_with, screen_recording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
@@ -134,7 +133,7 @@ def recorded_model(job: Job, *, placings: bool = False) -> tuple[MeasurementMode
     kind = kind_of(job)
     where, observe = job.recording_path, kind.observing("screened")
     acting = effects(job.facts.model.effects, where="job.toml [model] effects")
-    recording = screened(
+    recording = screen_recording(
         job.points, job.facts.artefact, kind.offers("screen", Screening), observe,
         needed={column for effect in acting for column in effect.columns},
         set_aside=job.facts.recording.measurements_aside, where=where,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.diagnosis.compared import compared_on
+from cmm_uq.analysis.diagnosis.observations import thin_out
 from cmm_uq.analysis.parts.conditional import given_recording
 from cmm_uq.analysis.parts.machine import MachineState
 from cmm_uq.analysis.parts.machine_stated import machine_stated
@@ -394,7 +394,7 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
         model, _, _ = with_noise(model)
         count, observe = int(model.used.sum()), kind_of(job).observing("the machine of a part")
         most = _MOST * count // max(_quantities(model), 1)
-        model = compared_on(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
+        model = thin_out(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
         together = given_recording(state, model, seed=seed)
     except CmmUqError as error:
         why = Verbatim(error.problem)

@@ -12,11 +12,15 @@ from itertools import product
 import numpy as np
 
 from cmm_uq.analysis.conformity.plans import B89
-from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
-from cmm_uq.analysis.planning.directions import words
-from cmm_uq.analysis.planning.patterns import length_of
-from cmm_uq.analysis.planning.placing import Pattern, Placing, along
-from cmm_uq.analysis.planning.ready import MIDDLE, check_allowed
+from cmm_uq.analysis.planning.candidates import (
+    MIDDLE,
+    PatternFor,
+    RelocatedCandidates,
+    VolumeCandidates,
+    along_lines,
+    check_allowed,
+)
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -36,12 +40,12 @@ _PARALLELS = (
 
 def ballbar(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
     """Both balls."""
-    half = 0.5 * length_of(facts, plan)
+    half = 0.5 * planned_length(facts, plan)
     one = Pattern(np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]), np.array([1, 2]), np.ones(2, dtype=np.int64))
     return one.repeated(plan.repeats)
 
 
-def ballbar_positions(setting: Setting) -> tuple[Placing, ...]:
+def ballbar_positions(setting: Setting) -> tuple[SetUp, ...]:
     """Twenty positions for a nearly cubic volume; in a longer one ten diagonals more for each further cube along it."""
     pattern = ballbar(setting.artefact, setting.plan)
     sections = _sections(setting.volume)
@@ -55,12 +59,12 @@ def ballbar_positions(setting: Setting) -> tuple[Placing, ...]:
 def _lines(
     setting: Setting, volume: Volume, pattern: Pattern,
     wanted: list[tuple[tuple[int, int, int], tuple[float, float, float]]],
-) -> list[Placing]:  # fmt: skip
+) -> list[SetUp]:  # fmt: skip
     found = []
     for direction, place in wanted:
         u = np.array(direction, dtype=np.float64)
         check_allowed(setting, u)
-        found.append(volume.set_up(pattern, along(u), place, words(u)))
+        found.append(volume.set_up(pattern, attitude_along(u), place, direction_words(u)))
     return found
 
 
@@ -79,11 +83,11 @@ def _sections(volume: Volume) -> list[Volume]:
     return found
 
 
-def _shape(setting: Setting) -> Shape:
+def _shape(setting: Setting) -> PatternFor:
     pattern = ballbar(setting.artefact, setting.plan)
     return lambda _: pattern
 
 
-_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
+_PLACES = VolumeCandidates(along_lines, _shape, RelocatedCandidates(along_lines))
 
 PLANNING = Planning({"ASME B89.4.1": ballbar_positions}, _PLACES.candidates, _PLACES.elsewhere)

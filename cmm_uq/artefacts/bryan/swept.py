@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.planning.directions import words
-from cmm_uq.analysis.planning.placing import Placing
+from cmm_uq.analysis.planning.set_up import SetUp, direction_words
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
@@ -16,7 +15,7 @@ LEAST = 4
 _TRIED = 4000
 
 
-def swept(volume: Volume, length: float, count: int, repeats: int, centre: Floats | None = None) -> tuple[Placing, ...]:
+def swept(volume: Volume, length: float, count: int, repeats: int, centre: Floats | None = None) -> tuple[SetUp, ...]:
     """Positions of the swept ball, spread evenly over all directions that stay inside the volume and are held.
 
     Parameters
@@ -49,7 +48,7 @@ def swept(volume: Volume, length: float, count: int, repeats: int, centre: Float
         xyz = volume.machine.coordinates(np.tile(places[i], (repeats, 1)))
         one = np.ones(repeats, dtype=np.int64)
         points = Points(xyz, one, one, np.arange(1, repeats + 1), volume.machine)
-        found.append(Placing(words(spiral[i]), points))
+        found.append(SetUp(direction_words(spiral[i]), points))
     return tuple(found)
 
 

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.planning.placing import Placing
+from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.artefacts.digitizer.attitudes import ANGLES, SCAN
 from cmm_uq.artefacts.digitizer.facts import AlignmentFacts
@@ -39,7 +39,7 @@ def scan(attitude: Floats, offset: Floats, radius: float) -> tuple[Floats, Float
     return seen[:, :2], (along + offset) @ attitude.T
 
 
-def three_attitudes(setting: Setting) -> tuple[Placing, ...]:
+def three_attitudes(setting: Setting) -> tuple[SetUp, ...]:
     """The source's three; scans where the job gives the sphere's diameter, else centres.
 
     Raises
@@ -73,11 +73,11 @@ def three_attitudes(setting: Setting) -> tuple[Placing, ...]:
         )  # fmt: skip
         alpha, beta, gamma = angles
         title = say("α = {alpha:g}°, β = {beta:g}°, γ = {gamma:g}°", alpha=alpha, beta=beta, gamma=gamma)
-        found.append(Placing(title, points))
+        found.append(SetUp(title, points))
     return tuple(found)
 
 
-def candidates(setting: Setting, start: Start | None) -> tuple[Placing, ...]:
+def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
     """None: the wrist has the attitudes that it has.
 
     Raises

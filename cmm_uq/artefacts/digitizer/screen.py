@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.screening.shape import TOLERANCE_MM, Screening, Shape, ball_misfit, rows_by, samples_of, spread
+from cmm_uq.analysis.screening.shape import (
+    TOLERANCE_MM,
+    ArtefactShape,
+    Screening,
+    ball_misfit,
+    rows_by,
+    samples_of,
+    spread,
+)
 from cmm_uq.artefacts.digitizer.attitudes import ANGLES, scan_of
 from cmm_uq.artefacts.digitizer.facts import AlignmentFacts
 from cmm_uq.base.points import Floats, Points
@@ -15,21 +23,21 @@ _SOUND = 1e-2
 """Least singular value, over the largest, of three attitudes that tell an offset."""
 
 
-def shape_of(facts: AlignmentFacts, points: Points) -> Shape | None:
+def shape_of(facts: AlignmentFacts, points: Points) -> ArtefactShape | None:
     """Spheres, one in each attitude, or centres; ``None`` without attitudes, or with scans of a few points."""
     if any(name not in points.columns for name in ANGLES):
         return None
     attitude, scan = attitudes(points), scan_of(points)
     if scan is None:
         everything = (np.arange(len(points)),)
-        return Shape(everything, offset_misfit, np.nan, 0.0, reference=attitude.reshape(-1, 9))
+        return ArtefactShape(everything, offset_misfit, np.nan, 0.0, reference=attitude.reshape(-1, 9))
     rows = rows_by(points.measurement)
     if any(len(one) < 5 for one in rows):
         return None
     seen = np.einsum("nij,nj->ni", attitude[:, :, :2], scan)
     radius = (facts.length_mm or np.nan) / 2
     extent = 0.5 * float(np.median([spread((points.xyz + seen)[one]) for one in rows]))
-    return Shape(rows, scan_misfit, radius, radius if np.isfinite(radius) else extent, reference=seen)
+    return ArtefactShape(rows, scan_misfit, radius, radius if np.isfinite(radius) else extent, reference=seen)
 
 
 def scan_misfit(xyz: Floats, seen: Floats, radius: float) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.artefacts.error_maps.columns import MapColumn, columns_of
 from cmm_uq.artefacts.error_maps.diagnosis import MapsDiagnosis, diagnose_maps
 from cmm_uq.artefacts.error_maps.squareness import squareness_findings

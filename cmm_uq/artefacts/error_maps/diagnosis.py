@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.diagnosis import LeftOut
+from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.artefacts.error_maps.columns import MapColumn, turned
@@ -85,7 +85,7 @@ class MapsDiagnosis:
     p_value: float
     alpha: float
     comparisons: tuple[ColumnComparison, ...]
-    effects: tuple[LeftOut, ...]
+    effects: tuple[OmittedEffect, ...]
     differences: tuple[Difference, ...]
     displacement: Quantity | None
     rotation: Quantity | None
@@ -136,7 +136,7 @@ def diagnose_maps(
     )  # fmt: skip
 
 
-def expansion_shown(compared: ColumnComparison) -> LeftOut | None:
+def expansion_shown(compared: ColumnComparison) -> OmittedEffect | None:
     """An effect that the maps of a column show: probable, not zero, and better at predicting what was held out."""
     if compared.effect is None:
         return None
@@ -152,7 +152,7 @@ def expansion_shown(compared: ColumnComparison) -> LeftOut | None:
         return None
     whole, rest, left = (float(np.sum(residual(compared, some) ** 2)) for some in ((), without, compared.versions))
     probability = compared.combinations.of(compared.effect)
-    return LeftOut(
+    return OmittedEffect(
         effect.name, effect.title, probability, parameters, (rest - left) / whole, probability, effect.points_to
     )  # fmt: skip
 

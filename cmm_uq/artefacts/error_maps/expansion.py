@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from scipy import linalg, special
 
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
-from cmm_uq.analysis.diagnosis.noise import Kind
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.noise import NoiseKind
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import PPM, unit
@@ -97,7 +97,7 @@ def _normals(model: LinearModel, size: float) -> Normals:
 
 
 def _whitening(
-    compared: ColumnComparison, kind: Kind, versions: Sequence[Version], index: int
+    compared: ColumnComparison, kind: NoiseKind, versions: Sequence[Version], index: int
 ) -> Callable[[Floats], Floats]:
     """What whitens noise of one kind together with the given rivals but one."""
     columns, spread = compared.columns_of([v for v in versions if v.explanation != index])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
 from cmm_uq.base.points import Floats
 

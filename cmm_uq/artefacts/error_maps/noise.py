@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from cmm_uq.analysis.diagnosis.noise import TAILS, Kind
+from cmm_uq.analysis.diagnosis.noise import TAILS, NoiseKind
 from cmm_uq.base.points import Ints
 
 WHITE = "white"
 
 
-def kinds_along(chain: Ints, white: float, correlations: Sequence[float]) -> list[Kind]:
+def kinds_along(chain: Ints, white: float, correlations: Sequence[float]) -> list[NoiseKind]:
     """Kinds of noise of readings (m,) in the order of their positions.
 
     Parameters
@@ -24,10 +24,10 @@ def kinds_along(chain: Ints, white: float, correlations: Sequence[float]) -> lis
     """
     identity = sparse.csr_array(sparse.eye_array(len(chain)))
     share = (1 - white) / len(correlations)
-    return [Kind(WHITE, identity, 0.0, white - TAILS), *(_correlated(phi, chain, share) for phi in correlations)]
+    return [NoiseKind(WHITE, identity, 0.0, white - TAILS), *(_correlated(phi, chain, share) for phi in correlations)]
 
 
-def _correlated(phi: float, chain: Ints, probability: float) -> Kind:
+def _correlated(phi: float, chain: Ints, probability: float) -> NoiseKind:
     """First-order autoregression along each chain."""
     m, innovation = len(chain), np.sqrt(1 - phi**2)
     follows = np.append(False, chain[1:] == chain[:-1])
@@ -36,4 +36,4 @@ def _correlated(phi: float, chain: Ints, probability: float) -> Kind:
     rows, columns = np.append(np.arange(m), after), np.append(np.arange(m), after - 1)
     values = np.append(diagonal, np.full(len(after), -phi / innovation))
     whitening = sparse.csr_array((values, (rows, columns)), shape=(m, m))
-    return Kind("correlated", whitening, float(np.log(diagonal).sum()), probability)
+    return NoiseKind("correlated", whitening, float(np.log(diagonal).sum()), probability)

@@ -6,7 +6,7 @@ from cmm_uq.artefacts.error_maps.analysis import MapsDiagnosed, diagnose_error_m
 from cmm_uq.artefacts.error_maps.overview import told
 from cmm_uq.artefacts.error_maps.page import maps_document
 from cmm_uq.artefacts.error_maps.results import maps_results
-from cmm_uq.certificate.diagnosis.words import summary_of
+from cmm_uq.certificate.diagnosis.overview import summary_of
 from cmm_uq.certificate.lettering import lettered_in
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
 

@@ -10,7 +10,7 @@ from cmm_uq.artefacts.error_maps.search import ColumnComparison
 from cmm_uq.artefacts.error_maps.squareness import squareness_sections
 from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
-from cmm_uq.certificate.diagnosis.words import held_out, sure
+from cmm_uq.certificate.diagnosis.overview import held_out, sure
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import effect_of, size_of, titles
 from cmm_uq.certificate.improvement_table import improvement_table

@@ -15,12 +15,12 @@ import numpy as np
 from scipy import linalg
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
+from cmm_uq.analysis.diagnosis.comparison.functions import smooth_functions
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import lack_of_fit
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
-from cmm_uq.analysis.diagnosis.comparison.unknown_functions import smooth_functions
-from cmm_uq.analysis.diagnosis.noise import tails
+from cmm_uq.analysis.diagnosis.noise import heavy_tails
 from cmm_uq.artefacts.error_maps.columns import MapColumn, roughness
 from cmm_uq.artefacts.error_maps.noise import kinds_along
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -97,7 +97,7 @@ class ColumnComparison:
         return np.hstack([*columns, *(self.seen(rival.over_maps, rival.functions[0]) for rival in self.given)])
 
     @cached_property
-    def comparison(self) -> Comparison:
+    def comparison(self) -> CandidateComparison:
         """All rivals."""
         m, p = len(self.observed), len(self.column.positions)
         rough = roughness(self.column)
@@ -114,8 +114,8 @@ class ColumnComparison:
             for rival in self.rivals
         ]  # fmt: skip
         # no heavy tails in what is drawn: p-values are corrected for all columns, and few draws do not tell that far a tail
-        return Comparison(
-            self.observed, self.baseline, [*noises, tails(left)], sigma, np.full(_SIGMAS, -np.log(_SIGMAS)),
+        return CandidateComparison(
+            self.observed, self.baseline, [*noises, heavy_tails(left)], sigma, np.full(_SIGMAS, -np.log(_SIGMAS)),
             explanations, np.ones(m), rough, often_heavy=0.0,
         )  # fmt: skip
 

@@ -9,10 +9,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cmm_uq.analysis.planning.directions import words
-from cmm_uq.analysis.planning.patterns import length_of
-from cmm_uq.analysis.planning.placing import Pattern, Placing, along
-from cmm_uq.analysis.planning.ready import MIDDLE, check_allowed
+from cmm_uq.analysis.planning.candidates import MIDDLE, check_allowed
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -34,7 +32,7 @@ def faces_of(facts: ArtefactFacts, plan: PlanFacts) -> Floats:
     """
     if plan.lengths_mm:
         return np.unique(np.array(plan.lengths_mm, dtype=np.float64))
-    length = length_of(facts, plan)
+    length = planned_length(facts, plan)
     pitch = plan.pitch_mm or PITCH
     faces: Floats = pitch * np.arange(1, int(length / pitch + 1e-9) + 1, dtype=np.float64)
     return faces if len(faces) else np.array([length])
@@ -49,7 +47,7 @@ def blocks_of(facts: ArtefactFacts, plan: PlanFacts) -> Floats:
     """
     if plan.lengths_mm:
         return np.unique(np.array(plan.lengths_mm, dtype=np.float64))
-    return np.asarray(length_of(facts, plan) * np.arange(1, FIVE + 1) / FIVE, dtype=np.float64)
+    return np.asarray(planned_length(facts, plan) * np.arange(1, FIVE + 1) / FIVE, dtype=np.float64)
 
 
 def five_of(lengths: Floats, longest: float) -> Floats:
@@ -83,7 +81,7 @@ def block(length: float, plan: PlanFacts) -> Pattern:
     return one.repeated(plan.repeats)
 
 
-def seven_lines(setting: Setting, lengths: Floats, shapes: Callable[[Floats], list[Pattern]]) -> tuple[Placing, ...]:
+def seven_lines(setting: Setting, lengths: Floats, shapes: Callable[[Floats], list[Pattern]]) -> tuple[SetUp, ...]:
     """Four space diagonals and three axes through the middle of the volume, five lengths on each.
 
     Parameters
@@ -99,6 +97,11 @@ def seven_lines(setting: Setting, lengths: Floats, shapes: Callable[[Floats], li
         check_allowed(setting, direction)
         fitting = five_of(lengths, volume.chord(direction))
         if not len(fitting):
-            raise volume.too_small(np.outer([-0.5, 0.5], lengths[0] * along(direction)[:, 0]), words(direction))
-        found += [volume.set_up(shape, along(direction), MIDDLE, words(direction)) for shape in shapes(fitting)]
+            raise volume.too_small(
+                np.outer([-0.5, 0.5], lengths[0] * attitude_along(direction)[:, 0]), direction_words(direction)
+            )
+        found += [
+            volume.set_up(shape, attitude_along(direction), MIDDLE, direction_words(direction))
+            for shape in shapes(fitting)
+        ]
     return tuple(found)

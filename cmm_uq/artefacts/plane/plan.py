@@ -6,8 +6,8 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, across_planes
-from cmm_uq.analysis.planning.placing import Pattern, Placing
+from cmm_uq.analysis.planning.candidates import PatternFor, RelocatedCandidates, VolumeCandidates, across_planes
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.artefacts.plane.facts import PlaneFacts
 from cmm_uq.base.messages import say
@@ -30,17 +30,17 @@ def surface(facts: ArtefactFacts, plan: PlanFacts, size: Floats) -> Pattern:
     return Pattern(touched, number, np.ones(len(touched), dtype=np.int64)).repeated(plan.repeats)
 
 
-def surface_places(setting: Setting) -> tuple[Placing, ...]:
+def surface_places(setting: Setting) -> tuple[SetUp, ...]:
     """A grid over the lower face of the volume."""
     pattern = surface(setting.artefact, setting.plan, setting.volume.size[:2])
     return (setting.volume.set_up(pattern, np.eye(3), (0.5, 0.5, 0.0), say("flat")),)
 
 
-def _shape(setting: Setting) -> Shape:
+def _shape(setting: Setting) -> PatternFor:
     pattern = surface(setting.artefact, setting.plan, np.full(2, 0.5 * setting.volume.size.min()))
     return lambda _: pattern
 
 
-_PLACES = Everywhere(across_planes, _shape, Elsewhere(across_planes))
+_PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_planes))
 
 PLANNING = Planning({"surface plate": surface_places}, _PLACES.candidates, _PLACES.elsewhere)

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, across_planes
-from cmm_uq.analysis.planning.directions import PRINCIPAL_PLANES
-from cmm_uq.analysis.planning.placing import Pattern, Placing
-from cmm_uq.analysis.planning.ready import ACROSS, check_allowed
+from cmm_uq.analysis.planning.candidates import (
+    ACROSS,
+    PatternFor,
+    RelocatedCandidates,
+    VolumeCandidates,
+    across_planes,
+    check_allowed,
+)
+from cmm_uq.analysis.planning.set_up import PRINCIPAL_PLANES, Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -27,7 +32,7 @@ def plate(facts: ArtefactFacts, plan: PlanFacts, size: float) -> Pattern:
     return one.repeated(plan.repeats)
 
 
-def plate_placings(setting: Setting) -> tuple[Placing, ...]:
+def plate_placings(setting: Setting) -> tuple[SetUp, ...]:
     """Flat at two heights, upright along X front and back, upright along Y left and right."""
     volume = setting.volume
     pattern = plate(setting.artefact, setting.plan, float(volume.size.min()))
@@ -40,11 +45,11 @@ def plate_placings(setting: Setting) -> tuple[Placing, ...]:
     return tuple(found)
 
 
-def _shape(setting: Setting) -> Shape:
+def _shape(setting: Setting) -> PatternFor:
     pattern = plate(setting.artefact, setting.plan, float(setting.volume.size.min()))
     return lambda _: pattern
 
 
-_PLACES = Everywhere(across_planes, _shape, Elsewhere(across_planes))
+_PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_planes))
 
 PLANNING = Planning({"plate placings": plate_placings}, _PLACES.candidates, _PLACES.elsewhere)

@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.planning.placing import Pattern, Placing
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.artefacts.gauge_lines.patterns import faces_of
 from cmm_uq.artefacts.shift_axis.analysis import recorded_series
@@ -17,7 +17,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Points
 
 
-def shift_series(setting: Setting) -> tuple[Placing, ...]:
+def shift_series(setting: Setting) -> tuple[SetUp, ...]:
     """The artefact's points along its axis, once for each shift.
 
     Raises
@@ -51,7 +51,7 @@ def shift_series(setting: Setting) -> tuple[Placing, ...]:
     )
 
 
-def candidates(setting: Setting, start: Start | None) -> tuple[Placing, ...]:
+def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
     """None: its series are all that is measured.
 
     Raises

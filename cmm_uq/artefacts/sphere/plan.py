@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, upright
-from cmm_uq.analysis.planning.patterns import length_of
-from cmm_uq.analysis.planning.placing import Pattern, Placing
-from cmm_uq.analysis.planning.ready import MIDDLE
+from cmm_uq.analysis.planning.candidates import MIDDLE, PatternFor, RelocatedCandidates, VolumeCandidates, upright
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.base.messages import say
 from cmm_uq.jobs.artefact import ArtefactFacts
@@ -27,23 +25,23 @@ def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
         normals.append(np.column_stack(ring))
     n = np.vstack(normals)
     one = Pattern(
-        0.5 * length_of(facts, plan) * n, np.arange(1, len(n) + 1), np.ones(len(n), dtype=np.int64), {},
+        0.5 * planned_length(facts, plan) * n, np.arange(1, len(n) + 1), np.ones(len(n), dtype=np.int64), {},
         {"normal": n, "approach": -np.where(np.abs(n) > 1e-9, n, 0.0)},
     )  # fmt: skip
     return one.repeated(plan.repeats)
 
 
-def sphere_places(setting: Setting) -> tuple[Placing, ...]:
+def sphere_places(setting: Setting) -> tuple[SetUp, ...]:
     """Once in the middle of the volume."""
     pattern = sphere(setting.artefact, setting.plan)
     return (setting.volume.set_up(pattern, np.eye(3), MIDDLE, say("in the middle")),)
 
 
-def _shape(setting: Setting) -> Shape:
+def _shape(setting: Setting) -> PatternFor:
     pattern = sphere(setting.artefact, setting.plan)
     return lambda _: pattern
 
 
-_PLACES = Everywhere(upright, _shape, Elsewhere(lambda volume: []))
+_PLACES = VolumeCandidates(upright, _shape, RelocatedCandidates(lambda volume: []))
 
 PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.elsewhere)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.analysis.screening.shape import (
+    ArtefactShape,
     Screening,
-    Shape,
     ball_misfit,
     no_references,
     recentred,
     rows_by,
     samples_of,
-    spread,
-)  # fmt: skip
+    spread,  # fmt: skip
+)
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.jobs.artefact import ArtefactFacts
 
@@ -23,16 +23,16 @@ _NORMAL = 0.4
 _NORMALS = tuple(f"n{a}" for a in AXES)
 
 
-def shape_of(facts: ArtefactFacts, points: Points) -> Shape | None:
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
     """Spheres, with normals where they are recorded; ``None`` where one has too few points."""
     rows, radius = rows_by(points.measurement), (facts.length_mm or np.nan) / 2
     if any(len(r) < 5 for r in rows):
         return None
     extent = radius if np.isfinite(radius) else 0.5 * float(np.median([spread(points.xyz[r]) for r in rows]))
     if not all(name in points.columns for name in _NORMALS):
-        return Shape(rows, ball_misfit, radius, extent, False, (), no_references(points))
+        return ArtefactShape(rows, ball_misfit, radius, extent, False, (), no_references(points))
     normals = np.column_stack([points.columns[name] for name in _NORMALS])
-    return Shape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
+    return ArtefactShape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
 
 
 def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:

@@ -9,9 +9,15 @@ from typing import cast
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import THIRDS, Elsewhere, across_planes, thinned
-from cmm_uq.analysis.planning.placing import Placing, split
-from cmm_uq.analysis.planning.ready import ACROSS, check_allowed
+from cmm_uq.analysis.planning.candidates import (
+    ACROSS,
+    THIRDS,
+    RelocatedCandidates,
+    across_planes,
+    check_allowed,
+    thinned,
+)
+from cmm_uq.analysis.planning.set_up import SetUp, split
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
 from cmm_uq.artefacts.triangle.facts import TriangleFacts
 from cmm_uq.artefacts.triangle.placings import PLANES, SEVEN_PLACINGS, placed_triangle
@@ -21,7 +27,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 
 
-def triangle_placings(setting: Setting) -> tuple[Placing, ...]:
+def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
     """The seven placings of the triangle standard."""
     sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
     machine = replace(setting.machine, travel_mm=setting.volume.box)
@@ -29,12 +35,12 @@ def triangle_placings(setting: Setting) -> tuple[Placing, ...]:
         check_allowed(setting, np.eye(3)[3 - sum(PLANES[placing.plane])], ACROSS)
     points = placed_triangle(machine, sides, repeats=setting.plan.repeats)
     return tuple(
-        Placing(placing.title, replace(some.points, machine=setting.machine))
+        SetUp(placing.title, replace(some.points, machine=setting.machine))
         for placing, some in zip(SEVEN_PLACINGS, split(points), strict=True)
     )
 
 
-def candidates(setting: Setting, start: Start | None) -> tuple[Placing, ...]:
+def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
     """Every plane, place and tip, at most as many as the plan says."""
     return thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
 
@@ -44,7 +50,7 @@ def _title(plane: str, *, longer: bool) -> Text:
     return say("in the plane {plane}, longer tip", plane=named) if longer else say("in the plane {plane}", plane=named)
 
 
-def _everywhere(setting: Setting) -> Iterator[Placing]:
+def _everywhere(setting: Setting) -> Iterator[SetUp]:
     """Every plane, place and tip."""
     volume = setting.volume
     sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
@@ -64,7 +70,7 @@ def _everywhere(setting: Setting) -> Iterator[Placing]:
             continue
         for placing, some in zip(tipped, split(points), strict=True):
             if volume.heights[0] <= some.middle[2] <= volume.heights[1]:
-                yield Placing(placing.title, replace(some.points, machine=setting.machine))
+                yield SetUp(placing.title, replace(some.points, machine=setting.machine))
 
 
-PLANNING = Planning({"triangle placings": triangle_placings}, candidates, Elsewhere(across_planes))
+PLANNING = Planning({"triangle placings": triangle_placings}, candidates, RelocatedCandidates(across_planes))

@@ -8,25 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
-from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, LeftOut
+from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.base.messages import Text, Verbatim, commas, day, names, number, say, sentences
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.against import contained, corrections, simulation_section
-from cmm_uq.certificate.diagnosis.costs import costs_section
-from cmm_uq.certificate.diagnosis.next import next_section
-from cmm_uq.certificate.diagnosis.overview import overview_of
-from cmm_uq.certificate.diagnosis.unseen import unseen_section
-from cmm_uq.certificate.diagnosis.words import (
+from cmm_uq.certificate.diagnosis.overview import (
     ambiguous,
     held_out,
-    lines,
     noise_words,
+    overview_of,
     stated_um,
+    summary_lines,
     summary_of,
     sure,
     verdict_of,
 )
+from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, size_of, title_of, titles
 from cmm_uq.certificate.improvement_table import improvement_table
@@ -141,7 +139,7 @@ def _left_out(found: Diagnosed) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _effect(found: Diagnosed, item: LeftOut) -> Facts:
+def _effect(found: Diagnosed, item: OmittedEffect) -> Facts:
     """One effect: what it is, how large, what to look at, how sure."""
     d = found.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
@@ -318,7 +316,7 @@ def _rivals(found: Diagnosed) -> Table:
 
 def diagnosed_outcome(found: Diagnosed) -> Outcome:
     """What there is to write of a diagnosis."""
-    short = summary_of(found.job.facts, found.diagnosis.verdict, lines(found), found.findings)
+    short = summary_of(found.job.facts, found.diagnosis.verdict, summary_lines(found), found.findings)
     with lettered_in(found.job.facts.job.language):
         document = diagnosis_document(found)
     consistent = found.diagnosis.verdict == "consistent"

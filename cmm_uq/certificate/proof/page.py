@@ -1,4 +1,7 @@
-"""A proof of the diagnosis as a document: a laboratory's validation of the method (ISO/IEC 17025:2017, 7.2.2)."""
+"""What a proof says of itself: purpose and method, what it does not cover, how to check it.
+
+A proof of the diagnosis as a document: a laboratory's validation of the method (ISO/IEC 17025:2017, 7.2.2).
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,13 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.program import program
-from cmm_uq.certificate.proof.method import how_to_check, method, not_covered
-from cmm_uq.certificate.proof.plots import said_plot, strength_plot
-from cmm_uq.certificate.proof.proof import Proof
-from cmm_uq.certificate.proof.reach import effects_section, unseen_section
+from cmm_uq.certificate.proof.sections import effects_section, said_plot, strength_plot, unseen_section
 from cmm_uq.certificate.proof.words import (
     ANSWER_WORDS,
     INTERVAL_WORDS,
     KIND_WORDS,
     NOISE_WORDS,
+    DiagnosisProof,
     counted,
     in_words,
     interval,
@@ -24,15 +25,80 @@ from cmm_uq.certificate.proof.words import (
     standing,
 )
 from cmm_uq.certificate.working_page import working_page
-from cmm_uq.laboratory.proving.accepted import MISSED, OPEN
-from cmm_uq.laboratory.proving.cases import KINDS, STRONGEST, micrometres
-from cmm_uq.laboratory.proving.intervals import Rate
-from cmm_uq.laboratory.proving.judged import REFUSED, VERDICTS
-from cmm_uq.laboratory.proving.running import RECORDS, TRUTH
-from cmm_uq.laboratory.proving.smallest import FEWEST, LARGEST
+from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
+from cmm_uq.laboratory.proving.cases import KINDS, STRONGEST, WEAKEST, micrometres
+from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, REFUSED, VERDICTS
+from cmm_uq.laboratory.proving.rates import FEWEST, LARGEST, Rate
+from cmm_uq.laboratory.proving.sensitivity import ALLOWED
 
 
-def proof_document(proof: Proof) -> Document:
+def method() -> tuple[Text, ...]:
+    """Purpose, cases, strengths, noise, seal."""
+    return (
+        say(
+            "Purpose: validation of a method (ISO/IEC 17025:2017, 7.2.2). The diagnosis of cmm-uq is to be fit for "
+            "recordings made with these set-ups: to find what the job's model leaves out, to call it by its name, to stay "
+            "silent where nothing is left out, and to state uncertainties and probabilities that hold."
+        ),
+        say(
+            "Cases are drawn by the forward model of the job: its artefact in its set-ups, the errors that the job "
+            "names as they were estimated, the size of the artefact within its certificate's uncertainty, and noise. "
+            "Of every ten cases three hide nothing, three an effect of the catalogue, two two effects, one a "
+            "function of place, time or set-up that no effect has, and one a fault of the artefact. Where a cause "
+            "does not show in these set-ups, another takes its place."
+        ),
+        say(
+            "A hidden cause has a strength √λ: its length in all observations over the noise, once all that the job "
+            "names, and what else is hidden, has taken what it can. Strengths are evenly distributed from {weakest:g} "
+            "to {strongest:g}, or to that of {allowed:g} standard deviations of what physics allows where an effect is "
+            "then weaker. Of a function or a fault, no single effect leaves less than {weakest:g}.",
+            weakest=WEAKEST, strongest=STRONGEST, allowed=ALLOWED,
+        ),
+        say(
+            "Every other case has the noise of the job; the others in turn each kind of noise that these set-ups "
+            "could show, as large as the job's readings."
+        ),
+        say(
+            "The truth of all cases was written down and sealed by its hash before the first of them was diagnosed. "
+            "Each recording then went through screening and diagnosis as a measured one does, with a seed of its "
+            "own."
+        ),
+    )  # fmt: skip
+
+
+def not_covered() -> tuple[Text, ...]:
+    """What the figures say nothing of."""
+    return (
+        say(
+            "Cases are drawn by the same forward model that the diagnosis fits. What is shown is that the diagnosis "
+            "does what it says where machine and artefact behave as that model says, or have one of the strangers "
+            "that were drawn; not that this machine does. An error in the model's own equations would not show here."
+        ),
+        say(
+            "Not drawn: three and more causes at once, damaged and mistyped recordings, wrong temperatures and other "
+            "columns beside a job's own, periods shorter than 6 mm or longer than the readings reach, set-ups other "
+            "than these."
+        ),
+        say(
+            "The figures hold for the strengths and the mixture that were drawn. Another share of strong causes "
+            "would give another share of them found; the table by strength does not depend on it."
+        ),
+    )
+
+
+def how_to_check() -> tuple[Text, ...]:
+    """The seal, and the same again."""
+    return (
+        say(
+            "{truth} holds the truth of every case, {records} what was said of it. The hash above is that of the "
+            "first file as it stands: sha256sum {truth} gives it again.",
+            truth=Verbatim(TRUTH), records=Verbatim(RECORDS),
+        ),
+        say("The same command with the same seed, on any number of processes, writes the same files."),
+    )  # fmt: skip
+
+
+def proof_document(proof: DiagnosisProof) -> Document:
     """The page of a proof."""
     facts, judgement = proof.job.facts, proof.judgement
     points = proof.design.model.artefact.points
@@ -80,7 +146,7 @@ def proof_document(proof: Proof) -> Document:
     )
 
 
-def warnings_of(proof: Proof) -> tuple[Text, ...]:
+def warnings_of(proof: DiagnosisProof) -> tuple[Text, ...]:
     """What must be known before a figure is used."""
     found = [
         say(
@@ -101,7 +167,7 @@ def warnings_of(proof: Proof) -> tuple[Text, ...]:
     return tuple(found)
 
 
-def conclusion_of(proof: Proof) -> Text:
+def conclusion_of(proof: DiagnosisProof) -> Text:
     """Whether the method is accepted, in a sentence."""
     standings = [one.standing for one in proof.accepted]
     if MISSED in standings:
@@ -124,7 +190,7 @@ def _set_ups(count: int, points: int) -> Text:
     )
 
 
-def _conclusion(proof: Proof) -> tuple[Block, ...]:
+def _conclusion(proof: DiagnosisProof) -> tuple[Block, ...]:
     rows = tuple(
         (one.what, counted(one.rate), percent(one.rate), interval(one.rate), limits(one), standing(one))
         for one in proof.accepted
@@ -141,7 +207,7 @@ def _conclusion(proof: Proof) -> tuple[Block, ...]:
     return (Paragraph(conclusion_of(proof)), Table(say("Acceptance"), heads, rows, (note,)))
 
 
-def _noise(proof: Proof) -> Block:
+def _noise(proof: DiagnosisProof) -> Block:
     own = micrometres(proof.design.noise)
     rows = [
         (say("Reading along x, y, z"), say("{x:.3g}, {y:.3g}, {z:.3g} µm", x=own["x_um"], y=own["y_um"], z=own["z_um"]))
@@ -159,7 +225,7 @@ def _noise(proof: Proof) -> Block:
     return Facts((*rows, (say("Noise of the cases"), drawn)))
 
 
-def _answers(proof: Proof) -> tuple[Block, ...]:
+def _answers(proof: DiagnosisProof) -> tuple[Block, ...]:
     judgement = proof.judgement
     heads = (
         Column(say("Hidden"), numeric=False), Column(say("Cases")),
@@ -178,7 +244,7 @@ def _answers(proof: Proof) -> tuple[Block, ...]:
     return (Table(say("Verdicts"), heads, tuple(rows), (note,)), _rates(proof))
 
 
-def _rates(proof: Proof) -> Block:
+def _rates(proof: DiagnosisProof) -> Block:
     judgement = proof.judgement
     figures: tuple[tuple[Text, Rate], ...] = (
         (say("False alarms, of cases that hide nothing"), judgement.false_alarms),
@@ -217,7 +283,7 @@ def _rate_heads(what: Text) -> tuple[Column, ...]:
     )
 
 
-def _strength(proof: Proof) -> tuple[Block, ...]:
+def _strength(proof: DiagnosisProof) -> tuple[Block, ...]:
     judgement, found = proof.judgement, proof.judgement.by_strength
     if found is None:
         return (Paragraph(say("Fewer than {fewest} effects were hidden: too few to say.", fewest=FEWEST)),)
@@ -232,7 +298,7 @@ def _strength(proof: Proof) -> tuple[Block, ...]:
     )
 
 
-def often_words(proof: Proof) -> Text:
+def often_words(proof: DiagnosisProof) -> Text:
     """From which strength on an effect is found in nine of ten."""
     found = proof.judgement.by_strength
     if found is None:
@@ -255,7 +321,7 @@ def _strength_words(value: float) -> Text:
     return number(value, ".1f") if value <= LARGEST else say("beyond {largest:g}", largest=LARGEST)
 
 
-def _probabilities(proof: Proof) -> tuple[Block, ...]:
+def _probabilities(proof: DiagnosisProof) -> tuple[Block, ...]:
     each = proof.judgement.probabilities
     if not each:
         return (Paragraph(say("No effect was asserted.")),)
@@ -275,7 +341,7 @@ def _probabilities(proof: Proof) -> tuple[Block, ...]:
     return (said_plot(each), Table(say("Probabilities"), heads, rows, (note,)))
 
 
-def _intervals(proof: Proof) -> Block:
+def _intervals(proof: DiagnosisProof) -> Block:
     rows = []
     for sort, what in INTERVAL_WORDS.items():
         rate = proof.judgement.coverage_of(sort)
@@ -290,7 +356,7 @@ def _intervals(proof: Proof) -> Block:
     return Table(say("95 % intervals that hold"), _rate_heads(say("Intervals")), tuple(rows), (note,))
 
 
-def _by_noise(proof: Proof) -> Block:
+def _by_noise(proof: DiagnosisProof) -> Block:
     rows = []
     for kind in dict.fromkeys(proof.design.noises):
         alarms, found, coverage = proof.judgement.by_noise(kind)

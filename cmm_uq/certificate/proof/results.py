@@ -13,14 +13,23 @@ from cmm_uq.certificate.document import Standing
 from cmm_uq.certificate.in_short import Summary, Verdict
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.proof.page import conclusion_of, often_words, proof_document, warnings_of
-from cmm_uq.certificate.proof.proof import Proof
-from cmm_uq.certificate.proof.words import in_words, limits, standing
+from cmm_uq.certificate.proof.words import DiagnosisProof, in_words, limits, standing
 from cmm_uq.certificate.results_file import head
-from cmm_uq.laboratory.proving.accepted import MET, MISSED, OPEN
+from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.laboratory.proving.cases import KINDS, micrometres
-from cmm_uq.laboratory.proving.intervals import Rate
-from cmm_uq.laboratory.proving.judged import NAMED, NAMED_BESIDE, NAMED_GROUPED, NAMED_MISSED, REFUSED, STATED, VERDICTS
-from cmm_uq.laboratory.proving.running import RECORDS, TRUTH
+from cmm_uq.laboratory.proving.judgement import (
+    MET,
+    MISSED,
+    NAMED,
+    NAMED_BESIDE,
+    NAMED_GROUPED,
+    NAMED_MISSED,
+    OPEN,
+    REFUSED,
+    STATED,
+    VERDICTS,
+)
+from cmm_uq.laboratory.proving.rates import Rate
 
 SCHEMA = "cmm-uq/prove/1"
 
@@ -94,7 +103,7 @@ KEYS: Mapping[str, str] = MappingProxyType(
 """By dotted name; a part in capitals stands for any name, ``[]`` for each entry of a list."""
 
 
-def proof_outcome(proof: Proof) -> Outcome:
+def proof_outcome(proof: DiagnosisProof) -> Outcome:
     """What there is to write."""
     return Outcome(
         proof, lambda: proof_document(proof), proof_results(proof), proof_summary(proof), warnings_of(proof),
@@ -102,7 +111,7 @@ def proof_outcome(proof: Proof) -> Outcome:
     )  # fmt: skip
 
 
-def proof_results(proof: Proof) -> dict[str, Any]:
+def proof_results(proof: DiagnosisProof) -> dict[str, Any]:
     """results.json."""
     judgement, found = proof.judgement, proof.judgement.by_strength
     sorts = {
@@ -163,7 +172,7 @@ def proof_results(proof: Proof) -> dict[str, Any]:
     }
 
 
-def _effects(proof: Proof) -> list[dict[str, Any]]:
+def _effects(proof: DiagnosisProof) -> list[dict[str, Any]]:
     strength, rows = proof.judgement.by_strength, []
     for reach in proof.reaches:
         found, wrong = proof.judgement.of_effect(reach.effect)
@@ -184,7 +193,7 @@ def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def proof_summary(proof: Proof) -> Summary:
+def proof_summary(proof: DiagnosisProof) -> Summary:
     """For the end of the command."""
     judgement = proof.judgement
     words: dict[str, tuple[str, Standing]] = {MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad")}

@@ -1,36 +1,72 @@
-"""Words of a proof: kinds of cases and of noise, faults, rates, and whether a figure is kept."""
+"""What a proof of the diagnosis found, and its words: kinds of cases and of noise, faults, rates."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 from cmm_uq.base.messages import DASH, Text, number, say
-from cmm_uq.certificate.diagnosis.words import VERDICT_WORDS
-from cmm_uq.laboratory.proving import accepted, cases, judged
-from cmm_uq.laboratory.proving.accepted import Accepted
-from cmm_uq.laboratory.proving.intervals import Rate
+from cmm_uq.certificate.diagnosis.overview import VERDICT_WORDS
+from cmm_uq.jobs.job import Job
+from cmm_uq.laboratory.proving.cases import (
+    ARTEFACT,
+    AXIS,
+    GROWING,
+    NOTHING,
+    ONE,
+    OUTSIDE,
+    OWN,
+    RESOLUTION,
+    SET_UP,
+    SLOWLY,
+    TAILS,
+    TWO,
+    WALKING,
+    WHITE,
+    canonical_json,
+    sha256_of,
+)
+from cmm_uq.laboratory.proving.design import Design
+from cmm_uq.laboratory.proving.judgement import (
+    MET,
+    MISSED,
+    NAMED,
+    NAMED_BESIDE,
+    NAMED_GROUPED,
+    NAMED_MISSED,
+    OPEN,
+    REFUSED,
+    STATED,
+    AcceptanceFigure,
+    Judgement,
+    acceptance_figures,
+)
+from cmm_uq.laboratory.proving.rates import Rate
+from cmm_uq.laboratory.proving.reach import FaultReach, Reach, fault_reaches, reaches
 
 KIND_WORDS: Mapping[str, Text] = MappingProxyType(
     {
-        cases.NOTHING: say("nothing"),
-        cases.ONE: say("one effect"),
-        cases.TWO: say("two effects"),
-        cases.OUTSIDE: say("a function outside the catalogue"),
-        cases.ARTEFACT: say("a fault of the artefact"),
+        NOTHING: say("nothing"),
+        ONE: say("one effect"),
+        TWO: say("two effects"),
+        OUTSIDE: say("a function outside the catalogue"),
+        ARTEFACT: say("a fault of the artefact"),
     }
 )
 NOISE_WORDS: Mapping[str, Text] = MappingProxyType(
     {
-        cases.OWN: say("the job's own"),
-        cases.WHITE: say("white"),
-        cases.SET_UP: say("with set-up offsets"),
-        cases.AXIS: say("one axis three times noisier"),
-        cases.GROWING: say("growing with length"),
-        cases.SLOWLY: say("with slow noise in time"),
-        cases.WALKING: say("walking at random in time"),
-        cases.TAILS: say("heavy tails"),
-        cases.RESOLUTION: say("coarse display"),
+        OWN: say("the job's own"),
+        WHITE: say("white"),
+        SET_UP: say("with set-up offsets"),
+        AXIS: say("one axis three times noisier"),
+        GROWING: say("growing with length"),
+        SLOWLY: say("with slow noise in time"),
+        WALKING: say("walking at random in time"),
+        TAILS: say("heavy tails"),
+        RESOLUTION: say("coarse display"),
     }
 )
 FAULT_WORDS: Mapping[str, Text] = MappingProxyType(
@@ -43,19 +79,19 @@ FAULT_WORDS: Mapping[str, Text] = MappingProxyType(
 )
 INTERVAL_WORDS: Mapping[str, Text] = MappingProxyType(
     {
-        judged.STATED: say("of effects that were found"),
-        judged.NAMED: say("of what the job names, nothing hidden"),
-        judged.NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
-        judged.NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
-        judged.NAMED_MISSED: say("of what the job names, something hidden not found"),
+        STATED: say("of effects that were found"),
+        NAMED: say("of what the job names, nothing hidden"),
+        NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
+        NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
+        NAMED_MISSED: say("of what the job names, something hidden not found"),
     }
 )
-ANSWER_WORDS: Mapping[str, Text] = MappingProxyType({**VERDICT_WORDS, judged.REFUSED: say("no answer")})
+ANSWER_WORDS: Mapping[str, Text] = MappingProxyType({**VERDICT_WORDS, REFUSED: say("no answer")})
 STANDING_WORDS: Mapping[str, Text] = MappingProxyType(
     {
-        accepted.MET: say("shown"),
-        accepted.OPEN: say("too few cases to decide"),
-        accepted.MISSED: say("missed"),
+        MET: say("shown"),
+        OPEN: say("too few cases to decide"),
+        MISSED: say("missed"),
     }
 )
 
@@ -86,7 +122,7 @@ def in_words(rate: Rate) -> Text:
                interval=interval(rate))  # fmt: skip
 
 
-def limits(one: Accepted) -> Text:
+def limits(one: AcceptanceFigure) -> Text:
     """What is asked of a figure."""
     if one.low == 0:
         return say("at most {high:g} %", high=100 * one.high)
@@ -95,19 +131,72 @@ def limits(one: Accepted) -> Text:
     return say("{low:g} to {high:g} %", low=100 * one.low, high=100 * one.high)
 
 
-def standing(one: Accepted) -> Text:
+def standing(one: AcceptanceFigure) -> Text:
     """Whether it is kept, and what would decide it."""
     told = STANDING_WORDS[one.standing]
-    if one.standing == accepted.OPEN and one.kept and one.cases is not None and one.rate.of < one.cases:
+    if one.standing == OPEN and one.kept and one.cases is not None and one.rate.of < one.cases:
         return say(
             "{told}; counted within the limit; {needed} cases of this sort without one would show it",
             told=told,
             needed=one.cases,
         )
-    if one.standing == accepted.OPEN and one.rate.of:
+    if one.standing == OPEN and one.rate.of:
         return (
             say("{told}; counted within the limits", told=told)
             if one.kept
             else say("{told}; counted outside the limits", told=told)
         )
     return told
+
+
+@dataclass(frozen=True, eq=False)
+class DiagnosisProof:
+    """A job whose diagnosis was tried on sealed cases.
+
+    Parameters
+    ----------
+    job : with the set-ups that cases were drawn on.
+    design : these, with the job's own errors and noise.
+    seed, alpha : of the cases, and rate of false alarms that the diagnosis was asked for.
+    truth : contents of the sealed file.
+    records : what was said of each case, by number.
+    judgement : of all.
+    """
+
+    job: Job
+    design: Design
+    seed: int
+    alpha: float
+    truth: bytes
+    records: tuple[Mapping[str, Any], ...]
+    judgement: Judgement
+
+    @property
+    def sha256(self) -> str:
+        """Of the truth."""
+        return sha256_of(self.truth)
+
+    @property
+    def answers(self) -> bytes:
+        """All that was said, a line of JSON a case."""
+        return b"".join(canonical_json(record) for record in self.records)
+
+    @cached_property
+    def accepted(self) -> tuple[AcceptanceFigure, ...]:
+        """The figures that the laboratory accepts the method by."""
+        return acceptance_figures(self.judgement, self.job.facts.prove)
+
+    @cached_property
+    def reaches(self) -> tuple[Reach, ...]:
+        """What the set-ups show of every effect."""
+        return reaches(self.design)
+
+    @cached_property
+    def faults(self) -> tuple[FaultReach, ...]:
+        """What they show of the artefact's faults."""
+        return tuple(fault_reaches(self.design))
+
+    @property
+    def conforming(self) -> bool:
+        """Whether the cases show of no figure that it is missed."""
+        return all(one.standing != MISSED for one in self.accepted)

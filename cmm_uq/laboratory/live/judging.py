@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.screening.screened import impossible_values, screened
+from cmm_uq.analysis.screening.screening import impossible_values, screen_recording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
@@ -81,7 +81,7 @@ class Judge:
         points = self.points(rows)
         needed = {column for effect in self.effects for column in effect.columns}
         try:
-            found = screened(
+            found = screen_recording(
                 points, self.facts, self.screening, self.observe, needed=needed & set(points.columns), set_aside=(),
                 where=self.where,
             )  # fmt: skip

@@ -1,12 +1,21 @@
-"""What is true of a case: what it hides, how large, in which noise.
+"""What is true of a case: what it hides, how large, in which noise; written down and hashed before it is diagnosed.
+
+What is true of a case: what it hides, how large, in which noise.
 
 Kinds of cases follow each other in a fixed cycle: of every ten three hide nothing, three one effect, two two effects, one a
 function that no effect has, one a fault of the artefact.
+
+The truth of all cases, written down and hashed before the first of them is diagnosed.
+
+The file is JSON in one canonical form, so that its SHA-256 is that of what it says: ``sha256sum truth.json`` gives it
+again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any
@@ -15,7 +24,7 @@ import numpy as np
 
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.laboratory.proving.foreign import Form
+from cmm_uq.laboratory.proving.unknown_causes import FunctionForm
 from cmm_uq.machine.model import Noise
 
 NOTHING, ONE, TWO, OUTSIDE, ARTEFACT = "nothing", "one effect", "two effects", "outside", "artefact"
@@ -32,7 +41,7 @@ WEAKEST, STRONGEST = 3.0, 15.0
 
 
 @dataclass(frozen=True)
-class Hidden:
+class HiddenEffect:
     """An effect of the catalogue that acts and that the job does not name.
 
     Parameters
@@ -47,7 +56,7 @@ class Hidden:
 
 
 @dataclass(frozen=True)
-class Stranger:
+class UnknownCause:
     """A cause that no catalogue has.
 
     Parameters
@@ -65,7 +74,7 @@ class Stranger:
     strength: float
     left: float
     like: str
-    form: Form | None = None
+    form: FunctionForm | None = None
     errors: tuple[tuple[float, ...], ...] = ()
 
 
@@ -87,8 +96,8 @@ class Case:
     noise_kind: str
     noise: Noise
     sizes: tuple[float, ...]
-    hidden: tuple[Hidden, ...] = ()
-    stranger: Stranger | None = None
+    hidden: tuple[HiddenEffect, ...] = ()
+    stranger: UnknownCause | None = None
 
     def as_data(self) -> dict[str, Any]:
         """For the sealed file."""
@@ -109,3 +118,30 @@ def micrometres(noise: Noise) -> dict[str, Any]:
         "slow_um": noise.slow / MICROMETRE, "slow_time_s": _told(noise.slow_time_s) if noise.slow else None,
         "tails_dof": noise.tails or None, "resolution_um": noise.resolution / MICROMETRE,
     }  # fmt: skip
+
+
+SCHEMA = "cmm-uq/prove-truth/1"
+
+
+def truth_file(cases: Sequence[Case], common: Mapping[str, Any]) -> bytes:
+    """The truth as the bytes of a file.
+
+    Parameters
+    ----------
+    cases : all of them, by number.
+    common : what holds for all: job, hashes of its inputs, program, seed, options, true parameters of what the job
+        names.
+    """
+    whole = {"schema": SCHEMA, **common, "cases": [case.as_data() for case in cases]}
+    return canonical_json(whole)
+
+
+def canonical_json(data: Any) -> bytes:
+    """JSON with sorted keys, a line feed at its end and nowhere else, of finite numbers."""
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return (text + "\n").encode()
+
+
+def sha256_of(content: bytes) -> str:
+    """Of a file's bytes."""
+    return hashlib.sha256(content).hexdigest()

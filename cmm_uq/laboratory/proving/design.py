@@ -34,20 +34,20 @@ from cmm_uq.laboratory.proving.cases import (
     WEAKEST,
     WHITE,
     Case,
-    Hidden,
-    Stranger,
-)  # fmt: skip
-from cmm_uq.laboratory.proving.foreign import (
+    HiddenEffect,  # fmt: skip
+    UnknownCause,
+)
+from cmm_uq.laboratory.proving.sensitivity import ALLOWED, Sensitivity, possible_effects, remaining_length, white_of
+from cmm_uq.laboratory.proving.unknown_causes import (
     FUNCTIONS,
-    Foreign,
-    Form,
-    OfForm,
+    ForeignEffect,
+    FormEffect,
+    FunctionForm,
+    artefact_fault,
     drawn_form,
-    fault,
     nodes,
     possible_faults,
 )
-from cmm_uq.laboratory.proving.sight import ALLOWED, Sight, acting, remaining, white_of
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.model.placings import LAST_DIGIT
@@ -83,18 +83,18 @@ class Design:
     noise: Noise
     cte_per_k: float = 0.0
     dates: int = 1
-    sights: dict[str, Sight] = field(default_factory=dict)
+    sights: dict[str, Sensitivity] = field(default_factory=dict)
 
     @property
     def coefficients(self) -> Floats:
         """Of the effects that the job names."""
         return self.values[: len(self.values) - len(self.model.artefact.sizes)]
 
-    def sight(self, noise: Noise) -> Sight:
+    def sight(self, noise: Noise) -> Sensitivity:
         """What shows under one noise."""
         key = repr(noise)
         if key not in self.sights:
-            self.sights[key] = Sight.of(self.model, self.values, noise)
+            self.sights[key] = Sensitivity.of(self.model, self.values, noise)
         return self.sights[key]
 
     @cached_property
@@ -112,7 +112,7 @@ class Design:
         reach = {name: max(_length(c) for c in versions) for name, versions in sight.candidates.items()}
         return tuple(
             effect
-            for effect in acting(self.model)
+            for effect in possible_effects(self.model)
             if ALLOWED * reach[effect.name] >= WEAKEST and self._between(effect) is not None
         )
 
@@ -173,8 +173,8 @@ class Design:
         return tuple(float(size) for size in drawn)
 
     def _hidden(
-        self, sight: Sight, count: int, seed: int, rank: int, random: np.random.Generator
-    ) -> tuple[Hidden, ...]:
+        self, sight: Sensitivity, count: int, seed: int, rank: int, random: np.random.Generator
+    ) -> tuple[HiddenEffect, ...]:
         """One or two effects, the first of them each in its turn."""
         if not self.effects:
             return ()
@@ -188,7 +188,9 @@ class Design:
                 return found
         return self._hidden(sight, 1, seed, rank, random) if count == 2 else ()
 
-    def _of_effects(self, sight: Sight, chosen: list[Effect], random: np.random.Generator) -> tuple[Hidden, ...]:
+    def _of_effects(
+        self, sight: Sensitivity, chosen: list[Effect], random: np.random.Generator
+    ) -> tuple[HiddenEffect, ...]:
         """These effects with strengths at random; none where one would have to be larger than physics allows."""
         shapes = [_drawn(self._between(effect) or [], random) for effect in chosen]
         ways = [_direction(len(effect.coefficients), random) for effect in chosen]
@@ -196,7 +198,7 @@ class Design:
         found = []
         for i, effect in enumerate(chosen):
             others = [column for j, column in enumerate(seen) if j != i]
-            length = remaining(seen[i], np.column_stack(others)) if others else _length(seen[i])
+            length = remaining_length(seen[i], np.column_stack(others)) if others else _length(seen[i])
             most = min(STRONGEST, ALLOWED * length)
             if most < WEAKEST:
                 return ()
@@ -204,10 +206,10 @@ class Design:
             prior = np.array([c.prior_sd for c in effect.coefficients])
             coefficients = strength / length * prior * ways[i] * random.choice([-1.0, 1.0])
             told = effect.to_reported(coefficients, np.array(shapes[i], dtype=np.float64))
-            found.append(Hidden(effect.name, {name: float(value) for name, value in told.items()}, strength))
+            found.append(HiddenEffect(effect.name, {name: float(value) for name, value in told.items()}, strength))
         return tuple(found)
 
-    def _stranger(self, sight: Sight, kind: str, random: np.random.Generator) -> Stranger | None:
+    def _stranger(self, sight: Sensitivity, kind: str, random: np.random.Generator) -> UnknownCause | None:
         """A cause outside the catalogue of which no single effect of it leaves too little to be seen."""
         faults = tuple(possible_faults(self.model))
         for _ in range(_ATTEMPTS):
@@ -217,9 +219,9 @@ class Design:
                 return found
         return None
 
-    def stranger(self, sight: Sight, what: str, random: np.random.Generator) -> Stranger | None:
+    def stranger(self, sight: Sensitivity, what: str, random: np.random.Generator) -> UnknownCause | None:
         """A function or a fault with a strength at random; ``None`` where it shows at no size that is possible."""
-        form: Form | None = None
+        form: FunctionForm | None = None
         errors: tuple[tuple[float, ...], ...] = ()
         if what in FUNCTIONS:
             form = drawn_form(self.model.artefact.points, what, random)
@@ -230,7 +232,7 @@ class Design:
             drawn = random.standard_normal((int(number.max()) + 1, frames.shape[2]))
             errors = tuple(tuple(float(value) for value in row) for row in drawn)
         strength = float(random.uniform(WEAKEST, STRONGEST))
-        unit = Stranger(what, 1.0, strength, 0.0, "", form, errors)
+        unit = UnknownCause(what, 1.0, strength, 0.0, "", form, errors)
         column = sight.seen(self.effect_of(unit).basis(self.model.artefact.points))[:, 0]
         length = _length(column)
         if strength > _LARGEST_FOREIGN_UM * length:
@@ -239,11 +241,11 @@ class Design:
         like, left = sight.nearest(column * size)
         return replace(unit, size_um=size, left=left, like=like)
 
-    def effect_of(self, stranger: Stranger) -> Foreign:
+    def effect_of(self, stranger: UnknownCause) -> ForeignEffect:
         """Its error, of a micrometre."""
         if stranger.form is not None:
-            return OfForm(stranger.form)
-        return fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
+            return FormEffect(stranger.form)
+        return artefact_fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
 
     def recording(self, case: Case, seed: int, effects: Mapping[str, Effect]) -> Points:
         """What is recorded of a case.

@@ -10,8 +10,8 @@ import numpy as np
 from cmm_uq.base.messages import Text
 from cmm_uq.base.units import Unit
 from cmm_uq.laboratory.proving.design import Design
-from cmm_uq.laboratory.proving.foreign import possible_faults
-from cmm_uq.laboratory.proving.sight import ALLOWED, Sight, acting, remaining, unrecorded
+from cmm_uq.laboratory.proving.sensitivity import ALLOWED, Sensitivity, possible_effects, remaining_length, unrecorded
+from cmm_uq.laboratory.proving.unknown_causes import possible_faults
 from cmm_uq.machine.physics.catalogue import every
 
 DRAWN, UNRECORDED, TAKEN, TOO_SMALL, NO_TRAVEL = "drawn", "unrecorded", "taken", "too small", "no travel"
@@ -61,7 +61,10 @@ def reaches(design: Design) -> tuple[Reach, ...]:
     """Of every effect of the catalogue that the job does not name."""
     sight = design.sight(design.noise)
     named = {effect.name for effect in design.model.effects}
-    possible, drawn = {effect.name for effect in acting(design.model)}, {effect.name for effect in design.effects}
+    possible, drawn = (
+        {effect.name for effect in possible_effects(design.model)},
+        {effect.name for effect in design.effects},
+    )
     found = []
     for effect in every().values():
         if effect.name in named:
@@ -82,12 +85,12 @@ def reaches(design: Design) -> tuple[Reach, ...]:
     return tuple(found)
 
 
-def _alike(sight: Sight, name: str) -> str:
+def _alike(sight: Sensitivity, name: str) -> str:
     """The other effect that comes nearest to one, where it leaves hardly anything of it."""
     column = sight.candidates[name][0][:, 0]
     length = float(np.linalg.norm(column))
     others = [
-        (min(remaining(column, version) for version in versions), other)
+        (min(remaining_length(column, version) for version in versions), other)
         for other, versions in sight.candidates.items()
         if other != name
     ]
@@ -101,7 +104,7 @@ class FaultReach:
 
     Parameters
     ----------
-    what : one of :data:`~cmm_uq.laboratory.proving.foreign.FAULTS`.
+    what : one of :data:`~cmm_uq.laboratory.proving.unknown_causes.FAULTS`.
     shows : whether it shows at a size that is reckoned with.
     left : part of it that the nearest effect of the machine leaves, typically; 0 where nothing shows.
     like : that effect.

@@ -6,8 +6,8 @@ import pytest
 
 from cmm_uq.analysis.conformity.plan_conditions import conditions
 from cmm_uq.analysis.conformity.plans import ISO_10360_5, READY
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
 from tests.analysis.planning.plans import EVERY_KIND, setting
 
@@ -16,7 +16,7 @@ def unmet(kind: str, **wishes: object) -> list[str]:
     facts, usual = EVERY_KIND[kind]
     chosen = setting(facts, **{**usual, **wishes})
     name, placings = ready_plan(chosen)
-    return [c.what for c in conditions(READY[name], artefact_of(facts, joined(placings)), recorded=False) if not c.met]
+    return [c.what for c in conditions(READY[name], artefact_of(facts, join(placings)), recorded=False) if not c.met]
 
 
 @pytest.mark.parametrize("kind", ["ballbar", "sphere"])
@@ -53,5 +53,5 @@ def test_a_shortest_length_above_thirty_millimetres_is_said() -> None:
 
 def test_an_artefact_that_is_no_sphere_has_no_points_on_one() -> None:
     facts, usual = EVERY_KIND["ballbar"]
-    artefact = artefact_of(facts, joined(ready_plan(setting(facts, **usual))[1]))
+    artefact = artefact_of(facts, join(ready_plan(setting(facts, **usual))[1]))
     assert conditions(ISO_10360_5, artefact, recorded=True) == ()

@@ -3,8 +3,8 @@
 import numpy as np
 from scipy import linalg, sparse
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
-from cmm_uq.analysis.diagnosis.noise import Kind, shape_of
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
+from cmm_uq.analysis.diagnosis.noise import NoiseKind, shape_of
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.noise import AXES, PLACING, SLOW, Components, Sizes
 
@@ -30,18 +30,18 @@ def paired(noise_scale: Floats) -> Components:
     return Components(turn, shares, noise_scale[:, None] * waves, frequency, (AXES, PLACING, SLOW))
 
 
-def some_kinds(noise_scale: Floats) -> list[Kind]:
+def some_kinds(noise_scale: Floats) -> list[NoiseKind]:
     """One shape of each component, for observations in equal pairs."""
     components = paired(noise_scale)
     return [shape_of(components, SHAPES[name], noise_scale, p) for name, p in PROBABILITY.items()]
 
 
-def rest(c: Comparison) -> Floats:
+def rest(c: CandidateComparison) -> Floats:
     """(m, m') orthonormal basis of what the baseline does not reach."""
     return np.asarray(linalg.null_space(c.baseline.T))
 
 
-def covariance(kind: Kind) -> Floats:
+def covariance(kind: NoiseKind) -> Floats:
     """(m, m) over the variance of a reading."""
     whitening = kind.white(np.eye(kind.whitening.shape[0]))
     whole = linalg.inv(whitening.T @ whitening)

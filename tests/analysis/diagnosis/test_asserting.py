@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.diagnosis import diagnosis
-from cmm_uq.analysis.diagnosis.asserting import HOLDS_ZERO, Withheld, _holds_zero, _phase_known, group_of
+from cmm_uq.analysis.diagnosis.assertion import HOLDS_ZERO, WithheldEffect, _holds_zero, _phase_known, group_of
 from cmm_uq.analysis.diagnosis.comparison import search
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.search import Found, ModelComparison, asserted, in_place_of
-from cmm_uq.analysis.diagnosis.diagnosis import LeftOut
+from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison, SearchResult, effects_to_assert, substitute
+from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.diagnosis.words import sentence
+from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.machine.physics.effect import Nonparametric
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.diagnosis.test_invariance import diagnosed, recording
@@ -70,35 +70,35 @@ def test_what_was_never_compared_by_itself_has_none_in_its_place() -> None:
     """Two effects found together, of which one is withheld: the other alone is no combination."""
     found = combinations(((0, 1), 0.7), ((1,), 0.2), ((2,), 0.1))
     assert group_of(found, frozenset({0}), 0) == frozenset()
-    assert in_place_of(found_with(((0, 1), 0.7), ((1,), 0.3), chosen=frozenset({0})), 0, frozenset({0})) is None
+    assert substitute(found_with(((0, 1), 0.7), ((1,), 0.3), chosen=frozenset({0})), 0, frozenset({0})) is None
 
 
 def test_effects_that_a_function_could_be_are_named_with_it_one_after_the_other() -> None:
     """The most probable effects; the second by what it has where the first is found, 0.25 of 0.3."""
     found = combinations(((3,), 0.65), ((0, 1), 0.25), ((0,), 0.05), ((2,), 0.05))
-    assert asserted(found) == {0, 1}
-    assert asserted(combinations(((3,), 0.65), ((0, 1), 0.04), ((0,), 0.26), ((2,), 0.05))) == {0}
-    assert asserted(combinations(((3,), 0.78), ((0,), 0.12), ((2,), 0.1))) == {0}, (
+    assert effects_to_assert(found) == {0, 1}
+    assert effects_to_assert(combinations(((3,), 0.65), ((0, 1), 0.04), ((0,), 0.26), ((2,), 0.05))) == {0}
+    assert effects_to_assert(combinations(((3,), 0.78), ((0,), 0.12), ((2,), 0.1))) == {0}, (
         "by 0.22 with what cannot be told from it"
     )
-    assert asserted(combinations(((3,), 0.82), ((0,), 0.1), ((2,), 0.08))) == frozenset(), "improbable even so"
+    assert effects_to_assert(combinations(((3,), 0.82), ((0,), 0.1), ((2,), 0.08))) == frozenset(), "improbable even so"
 
 
 def test_effects_that_a_function_could_not_be_are_not_named_with_it() -> None:
     found = combinations(((3,), 0.65), ((0,), 0.3), ((2,), 0.05))
     strange = [replace(e, imitated_by=()) for e in found.explanations]
-    assert asserted(found) == {0}
-    assert asserted(replace(found, explanations=strange)) == frozenset()
-    assert asserted(replace(found, explanations=strange, imitated={0: frozenset({3})})) == {0}, (
+    assert effects_to_assert(found) == {0}
+    assert effects_to_assert(replace(found, explanations=strange)) == frozenset()
+    assert effects_to_assert(replace(found, explanations=strange, imitated={0: frozenset({3})})) == {0}, (
         "as this recording shows it"
     )
 
 
-def found_with(*members: tuple[tuple[int, ...], float], chosen: frozenset[int]) -> Found:
+def found_with(*members: tuple[tuple[int, ...], float], chosen: frozenset[int]) -> SearchResult:
     of = combinations(*members)
     first = SimpleNamespace(explanations=of.explanations)
     none: Any = None
-    return Found(cast("ModelComparison", first), none, of, chosen, (), none, 0.0)
+    return SearchResult(cast("ModelComparison", first), none, of, chosen, (), none, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -112,10 +112,10 @@ def test_in_place_of_an_effect_of_open_size_stands_the_next_that_cannot_be_told_
     """One fifth to be named, one half with its group, as any; the last of them is a function."""
     of = found_with(*(((i,), p) for i, p in enumerate(each)), chosen=frozenset({0}))
     monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(of, chosen=chosen))
-    other = in_place_of(of, 0, frozenset({0}))
+    other = substitute(of, 0, frozenset({0}))
     assert (None if other is None else other[1]) == instead
     assert other is None or other[0].chosen == {instead}
-    assert in_place_of(of, 0, frozenset({0, 1, 2})) is None, "each is tried once"
+    assert substitute(of, 0, frozenset({0, 1, 2})) is None, "each is tried once"
 
 
 def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,14 +123,14 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
     start = found_with(((0,), 0.45), ((1,), 0.4), ((2,), 0.1), ((3,), 0.05), chosen=frozenset({0}))
     seen = []
 
-    def open_size(found: Found, _joint: object) -> dict[int, Withheld]:
+    def open_size(found: SearchResult, _joint: object) -> dict[int, WithheldEffect]:
         seen.append(set(found.chosen))
-        return {i: Withheld(str(i), say("one"), 0.4, HOLDS_ZERO) for i in found.chosen}
+        return {i: WithheldEffect(str(i), say("one"), 0.4, HOLDS_ZERO) for i in found.chosen}
 
     monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(start, chosen=chosen))
     for name, stub in {
-        "with_periods": lambda found: (found, ()), "_of_all": lambda found, _model: found, "without_size": open_size,
-        "joint_posterior": lambda *_: None, "without": lambda found, gone: replace(found, chosen=found.chosen - gone),
+        "withhold_unresolved": lambda found: (found, ()), "_of_all": lambda found, _model: found, "effects_without_size": open_size,
+        "joint_posterior": lambda *_: None, "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
     }.items():  # fmt: skip
         monkeypatch.setattr(diagnosis, name, stub)
     found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
@@ -145,13 +145,13 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
     start = found_with(((0, 1, 2), 0.9), ((3,), 0.1), chosen=frozenset({0, 1, 2}))
     probability = {0: 0.97, 1: 0.96, 2: 0.78}
 
-    def open_size(found: Found, _joint: object) -> dict[int, Withheld]:
+    def open_size(found: SearchResult, _joint: object) -> dict[int, WithheldEffect]:
         listed = found.chosen if len(found.chosen) > 2 else ()
-        return {i: Withheld(str(i), say("one"), probability[i], HOLDS_ZERO) for i in listed}
+        return {i: WithheldEffect(str(i), say("one"), probability[i], HOLDS_ZERO) for i in listed}
 
     for name, stub in {
-        "with_periods": lambda found: (found, ()), "_of_all": lambda found, _model: found, "without_size": open_size,
-        "joint_posterior": lambda *_: None, "without": lambda found, gone: replace(found, chosen=found.chosen - gone),
+        "withhold_unresolved": lambda found: (found, ()), "_of_all": lambda found, _model: found, "effects_without_size": open_size,
+        "joint_posterior": lambda *_: None, "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
         "in_place_of": lambda *_: None,
     }.items():  # fmt: skip
         monkeypatch.setattr(diagnosis, name, stub)
@@ -172,7 +172,7 @@ def test_what_held_out_placings_do_not_bear_out_is_said_to_be_withheld(monkeypat
 def test_below_one_half_the_sentence_names_the_group() -> None:
     size = Quantity(12.0, 1.7, (8.6, 15.4), unit("µm"))
     gain = Improvement(4.0, 1.0, 4.0, 1.0, 9.0, 1.0)
-    item = LeftOut(
+    item = OmittedEffect(
         "straightness_x_z", say("Straightness"), 0.37, {"bow_um": size}, 0.8, 0.96, say("a way"), (say("scale_x"),)
     )
     assert (

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.compared import LEAST_OF_PLACING, MOST, compared_on
 from cmm_uq.analysis.diagnosis.held_out import improvement
+from cmm_uq.analysis.diagnosis.observations import LEAST_OF_PLACING, MOST, thin_out
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
@@ -54,17 +54,17 @@ def spheres(placings: int, count: int) -> tuple[MeasurementModel, Sphere]:
 
 def test_a_recording_of_a_thousand_observations_is_compared_as_it_is() -> None:
     model = many_bars(MOST)
-    assert compared_on(model, observed, 0) is model
+    assert thin_out(model, observed, 0) is model
 
 
 def test_of_many_bars_some_are_drawn_and_all_repeats_of_each() -> None:
     model = many_bars(900, 3)
-    found = compared_on(model, observed, 0)
+    found = thin_out(model, observed, 0)
     counts = np.unique(found.artefact.measurement, return_counts=True)[1]
     assert set(counts.tolist()) == {3}
     assert MOST <= counts.sum() < MOST + 3
     assert np.ptp(found.artefact.measurement) > 850  # from the whole recording
-    other = compared_on(model, observed, 1)
+    other = thin_out(model, observed, 1)
     assert set(other.artefact.measurement.tolist()) != set(found.artefact.measurement.tolist())
 
 
@@ -74,7 +74,7 @@ def test_where_some_points_cannot_be_observed_alone_the_others_are_not_used() ->
     def never(points: Points) -> Ballbar:
         raise CmmUqError("a point is missing")
 
-    found, some = compared_on(model, never, 0), compared_on(model, observed, 0)
+    found, some = thin_out(model, never, 0), thin_out(model, observed, 0)
     assert found.artefact is model.artefact
     assert np.array_equal(found.artefact.measurement[found.used], some.artefact.measurement)
 
@@ -82,7 +82,7 @@ def test_where_some_points_cannot_be_observed_alone_the_others_are_not_used() ->
 def test_a_point_ahead_of_a_surface_stays_with_its_placing() -> None:
     job = read_job(ROOT / "examples" / "plane-simulated")
     observe = partial(kind_of(job).observing("diagnosed"), job.facts.artefact)
-    found = compared_on(MeasurementModel(observe(job.points), ()), observe, 0, most=40).artefact
+    found = thin_out(MeasurementModel(observe(job.points), ()), observe, 0, most=40).artefact
     assert sorted(found.points.measurement[found.points.point == 0].tolist()) == [1, 2]
     assert len(found.measurement) == 2 * LEAST_OF_PLACING
 
@@ -90,7 +90,7 @@ def test_a_point_ahead_of_a_surface_stays_with_its_placing() -> None:
 def test_what_is_not_used_is_not_drawn() -> None:
     model = many_bars(2000)
     aside = np.arange(2000) % 2 == 0
-    found = compared_on(replace(model, used=~aside), observed, 0, most=500)
+    found = thin_out(replace(model, used=~aside), observed, 0, most=500)
     assert len(found.artefact.measurement) == 500
     assert not np.isin(found.artefact.measurement, model.artefact.measurement[aside]).any()
 
@@ -101,7 +101,7 @@ def test_points_are_drawn_evenly_from_every_placing_and_where_these_are_many_fro
 ) -> None:
     model, _ = spheres(placings, count)
     facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1)
-    found = compared_on(model, lambda points: Sphere(facts, points), 0)
+    found = thin_out(model, lambda points: Sphere(facts, points), 0)
     counts = np.unique(found.artefact.measurement, return_counts=True)[1]
     assert counts.max() == each
     assert len(found.artefact.measurement) < MOST + each
@@ -110,7 +110,7 @@ def test_points_are_drawn_evenly_from_every_placing_and_where_these_are_many_fro
 
 def test_the_estimate_from_some_agrees_with_that_from_all_within_its_uncertainty() -> None:
     model = many_bars(4000)
-    some, whole = (m.estimate().least_squares for m in (compared_on(model, observed, 0), model))
+    some, whole = (m.estimate().least_squares for m in (thin_out(model, observed, 0), model))
     u_some, u_whole = (float(np.sqrt(found.covariance[1, 1])) for found in (some, whole))
     assert abs(some.value[1] - whole.value[1]) < 4 * u_some
     assert u_some / u_whole == pytest.approx(np.sqrt(4000 / MOST), rel=0.1)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from cmm_uq.analysis.diagnosis.comparison.unknown_functions import covariates
+from cmm_uq.analysis.diagnosis.comparison.functions import covariates
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Machine, Points

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
-from cmm_uq.analysis.diagnosis.location import located, region_of
+from cmm_uq.analysis.diagnosis.location import locate, region_of
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.effect import Nonparametric
 
@@ -107,7 +107,7 @@ def test_the_curve_is_that_of_kriging(exact: bool, sign: float) -> None:
     """
     V, L = bent(np.unique(X)), 5.0 * bent(X)
     data = sign * L @ [2e-3, -1e-3, 4e-3] + (0.0 if exact else 1e-3) * np.random.default_rng(5).standard_normal(12)
-    (place,) = located(compared(data, term(bent(X))), 0.01)
+    (place,) = locate(compared(data, term(bent(X))), 0.01)
     rest = data - L @ np.linalg.lstsq(L, data, rcond=None)[0]
     v = LEAST**2 if exact else rest @ rest / 9
     solved = AMPLITUDE**2 * np.linalg.solve(AMPLITUDE**2 * L @ L.T + np.eye(12), np.column_stack([data, L @ V.T]))
@@ -136,7 +136,7 @@ def test_a_constant_of_which_hardly_anything_shows_is_no_part_of_the_curve(shown
     values = np.column_stack([np.ones(12), wave - wave.mean()])
     columns = 2.0 * values * [shown, 1.0]
     data = values @ [1e-3 * shown, 2e-3]
-    (place,) = located(compared(data, term(values, columns=columns)), 0.01)
+    (place,) = locate(compared(data, term(values, columns=columns)), 0.01)
     mean = place.curve[1].mean()
     assert abs(mean) > 0.1 if there else abs(mean) < 1e-9
 
@@ -144,7 +144,7 @@ def test_a_constant_of_which_hardly_anything_shows_is_no_part_of_the_curve(shown
 def test_a_constant_that_the_baseline_absorbs_is_no_part_of_the_curve() -> None:
     values = np.column_stack([np.ones(12), np.sin(X)])
     data = 10.0 * values @ [5e-3, 2e-3]
-    (place,) = located(compared(data, term(values), without_mean=True), 0.01)
+    (place,) = locate(compared(data, term(values), without_mean=True), 0.01)
     x, found, _ = place.curve
     assert found.mean() == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(np.diff(found), 4.0 * np.diff(np.sin(x)), rtol=0.05, atol=0.05)
@@ -164,7 +164,7 @@ def test_a_constant_that_the_baseline_absorbs_is_no_part_of_the_curve() -> None:
 def test_a_jump_lies_where_it_is_with_95_percent(evidence: list[float], region: tuple[float, float]) -> None:
     steps = [np.where(after < X, 1.0, 0.0)[:, None] for after in (2.0, 4.0, 7.0, 9.0)]
     data = 1e-3 * steps[0][:, 0]
-    (place,) = located(compared(data, term(*steps), evidence=np.array(evidence)), 0.01)
+    (place,) = locate(compared(data, term(*steps), evidence=np.array(evidence)), 0.01)
     assert place.region == region
 
 
@@ -172,11 +172,11 @@ def test_functions_that_are_significant_are_told_the_most_significant_first() ->
     data = 1e-2 * np.sin(X)
     terms = [term(bent(X), name=name) for name in ("a", "b", "c", None)]
     effect = term(bent(X), kind=EFFECT, name="d")
-    found = located(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0)), 0.05)
+    found = locate(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0)), 0.05)
     assert [place.covariate for place in found] == ["b", "a"]
     assert found[0].p_value < found[1].p_value < 0.05
-    assert located(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0), p_value=0.05), 0.05) == ()
-    assert len(located(compared(data, terms[0], p_value=0.049), 0.05)) == 1
+    assert locate(compared(data, *terms, effect, log_odds=(3.0, 9.0, 0.9, 9.0, 9.0), p_value=0.05), 0.05) == ()
+    assert len(locate(compared(data, terms[0], p_value=0.049), 0.05)) == 1
 
 
 def test_a_region_is_where_the_band_does_not_hold_zero() -> None:
@@ -189,14 +189,14 @@ def test_a_region_is_where_the_band_does_not_hold_zero() -> None:
 def test_a_function_whose_band_holds_zero_everywhere_is_no_place() -> None:
     noise = np.random.default_rng(11).standard_normal(12)
     wild = 1e-2 * (noise - bent(X) @ np.linalg.lstsq(bent(X), noise, rcond=None)[0])
-    assert located(compared(wild + 1e-6 * np.sin(X), term(bent(X))), 0.01) == ()
+    assert locate(compared(wild + 1e-6 * np.sin(X), term(bent(X))), 0.01) == ()
 
 
 def test_what_fits_as_well_and_shows_nothing_more_is_named_with_the_first() -> None:
     """Log odds of 9: within ln 20 of them 7, and not 5; neither keeps evidence beside the first."""
     data = 1e-2 * np.sin(X)
     terms = [term(bent(X), name=name) for name in "abc"]
-    (place,) = located(compared(data, *terms, log_odds=(7.0, 9.0, 5.0), beside={1: {0: 0.0, 2: 0.0}}), 0.05)
+    (place,) = locate(compared(data, *terms, log_odds=(7.0, 9.0, 5.0), beside={1: {0: 0.0, 2: 0.0}}), 0.05)
     assert (place.covariate, place.also) == ("b", ("function of a",))
 
 
@@ -205,17 +205,17 @@ def test_of_functions_that_fit_equally_well_the_one_with_the_form_of_what_was_fo
     form = Nonparametric("a", "y")
     terms = [term(bent(X), name="a", is_like=effect, form=form), term(bent(X), name="b"), effect]
     found = compared(data, *terms, log_odds=(7.0, 9.0, 9.0), beside={0: {1: 0.0}, 1: {0: 0.0}})
-    (place,) = located(found, 0.05, {2})
+    (place,) = locate(found, 0.05, {2})
     assert (place.covariate, place.along, place.scale, place.also) == ("a", "y", False, ("function of b",))
-    (place,) = located(found, 0.05)
+    (place,) = locate(found, 0.05)
     assert (place.covariate, place.also) == ("b", ("function of a",))
 
 
 def test_a_further_place_is_told_with_what_it_carries_beside_the_first() -> None:
     data = 1e-2 * np.sin(X)
     terms = [term(bent(X), name=name) for name in "ab"]
-    first, second = located(compared(data, *terms, log_odds=(20.0, 19.0), beside={0: {1: 6.0}}), 0.05)
-    (alone,) = located(compared(data, terms[1], log_odds=(6.0,)), 0.05)
+    first, second = locate(compared(data, *terms, log_odds=(20.0, 19.0), beside={0: {1: 6.0}}), 0.05)
+    (alone,) = locate(compared(data, terms[1], log_odds=(6.0,)), 0.05)
     assert (first.covariate, second.covariate) == ("a", "b")
     assert second.p_value == pytest.approx(alone.p_value)
     assert first.p_value < second.p_value

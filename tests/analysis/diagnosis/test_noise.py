@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from cmm_uq.analysis.diagnosis.noise import heavy, probable_tails
+from cmm_uq.analysis.diagnosis.noise import has_heavy_tails, probable_tails
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.noise import noise_of
@@ -32,15 +32,15 @@ def test_tails_are_heavy_where_student_s_t_is_e_to_the_fourth_times_as_likely_as
             method="bounded",
         )
         ratio = -tailed.fun - stats.norm.logpdf(z, scale=np.sqrt(np.mean(z**2))).sum()
-        decided.append((ratio, heavy(z)))
+        decided.append((ratio, has_heavy_tails(z)))
     assert all(said == (ratio > 4) for ratio, said in decided if abs(ratio - 4) > 0.3)
     assert any(said for _, said in decided) == (dof == 4)
 
 
 def test_few_residuals_and_exact_figures_have_no_tails() -> None:
-    assert not heavy(np.array([*np.zeros(13), 1.0]))
-    assert not heavy(np.zeros(40))
-    assert not heavy(np.zeros(0))
+    assert not has_heavy_tails(np.array([*np.zeros(13), 1.0]))
+    assert not has_heavy_tails(np.zeros(40))
+    assert not has_heavy_tails(np.zeros(0))
 
 
 def test_a_normal_scatter_is_not_said_to_have_heavy_tails_where_each_placing_is_fitted_by_itself() -> None:
@@ -54,7 +54,7 @@ def test_a_normal_scatter_is_not_said_to_have_heavy_tails_where_each_placing_is_
     random = np.random.default_rng(11)
     drawn = {"normal": random.standard_normal((100, 189)), "t": random.standard_t(3, (100, 189))}
     said = {
-        name: sum(heavy(studentised(linear, noise, white, readings)) for readings in each)
+        name: sum(has_heavy_tails(studentised(linear, noise, white, readings)) for readings in each)
         for name, each in drawn.items()
     }
     assert said["normal"] <= 3

@@ -8,18 +8,18 @@ from typing import cast
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.asserting import UNRESOLVED, _too_little, settled
+from cmm_uq.analysis.diagnosis.assertion import UNRESOLVED, _too_little, period_settled
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.search import Found
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
-from cmm_uq.analysis.diagnosis.periods import Mode, _peaks
+from cmm_uq.analysis.diagnosis.joint import Mode, _peaks
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.diagnosis.words import sentence
+from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.quantity import Quantity
@@ -80,10 +80,10 @@ def test_an_error_is_asserted_with_a_period_where_both_together_are_more_probabl
     share: float, *, with_period: bool
 ) -> None:
     """Of 0.77: 0.46 with a period that has six tenths of it, 0.54 with one that has seven."""
-    assert settled(searched(0.77, 0.0), 0, (Mode(LONG, share, (10.0, 20.0)),)) is with_period
+    assert period_settled(searched(0.77, 0.0), 0, (Mode(LONG, share, (10.0, 20.0)),)) is with_period
 
 
-def searched(probability: float, other: float) -> Found:
+def searched(probability: float, other: float) -> SearchResult:
     """A periodic error, a function of the same reading and nothing, of these probabilities; readings from 0 to 400 mm."""
     effect = effects(("periodic_scale_x",))[0]
     member = (Member(np.ones((3, 1)), (15.0,)),)
@@ -96,7 +96,7 @@ def searched(probability: float, other: float) -> Found:
     readings = SimpleNamespace(artefact=SimpleNamespace(points=SimpleNamespace(readings={"x": np.array([0.0, 400.0])})))
     first = SimpleNamespace(explanations=explanations, model=readings)
     combinations = Combinations(explanations, found)
-    return cast("Found", SimpleNamespace(first=first, combinations=combinations, chosen=frozenset({0})))
+    return cast("SearchResult", SimpleNamespace(first=first, combinations=combinations, chosen=frozenset({0})))
 
 
 def test_peaks_are_parted_where_the_evidence_between_them_is_a_tenth_of_the_lower() -> None:

@@ -9,9 +9,9 @@ from scipy import stats
 
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
 from cmm_uq.analysis.diagnosis.power import POWER, DrawnNoise, Power, powers, without_fault
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.noise import PlannedNoise
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
@@ -19,7 +19,7 @@ from tests.analysis.planning.plans import BALLBAR, GAUGE, setting
 
 ALPHA = 0.01
 SETTING = setting(GAUGE, length_mm=820.0, repeats=1)
-POINTS = joined(ready_plan(SETTING)[1])
+POINTS = join(ready_plan(SETTING)[1])
 
 
 @cache
@@ -74,7 +74,7 @@ def test_the_gate_opens_as_often_as_predicted() -> None:
 def test_drawn_noise_has_its_covariance() -> None:
     """The product with the covariance, against the dense one of readings and offsets shared by repeats."""
     chosen = setting(BALLBAR, repeats=2)
-    model = chosen.model(joined(ready_plan(chosen)[1]))
+    model = chosen.model(join(ready_plan(chosen)[1]))
     noise = PlannedNoise((1e-3, 1e-3, 1e-3), placing=2e-3)
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     drawn = DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.second.cases import case, write
-from cmm_uq.analysis.diagnosis import shapes
+from cmm_uq.analysis.diagnosis import noise_shapes as shapes
+from cmm_uq.analysis.diagnosis.comparison.functions import unknown_functions
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
-from cmm_uq.analysis.diagnosis.comparison.unknown_functions import unknown
-from cmm_uq.analysis.diagnosis.recorded_noise import noise_kinds
+from cmm_uq.analysis.diagnosis.noise_shapes import noise_kinds
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model import MeasurementModel
@@ -32,7 +32,7 @@ def test_few_shapes_say_of_a_jump_with_time_what_many_say(
     jumped: MeasurementModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the integral by a hundred shapes, within what is hardly worth a mention; 100 : 1 is decisive (Jeffreys)."""
-    functions = [f for f in unknown(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
+    functions = [f for f in unknown_functions(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
     odds = []
     for kept in (shapes.KEPT, 100):
         monkeypatch.setattr(shapes, "KEPT", kept)
@@ -43,7 +43,7 @@ def test_few_shapes_say_of_a_jump_with_time_what_many_say(
 
 
 def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: MeasurementModel) -> None:
-    functions = [f for f in unknown(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
+    functions = [f for f in unknown_functions(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
     normal = [kind for kind in noise_kinds(jumped, functions) if kind.name != "tails"]
     assert sum(not kind.slow.size for kind in normal) >= 2
     assert sum(bool(kind.slow.size) for kind in normal) >= 2
@@ -51,7 +51,7 @@ def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: M
 
 def test_without_a_time_there_is_no_jump_to_reckon_with(jumped: MeasurementModel) -> None:
     """The same kinds of noise, whatever functions of other covariates are candidates."""
-    functions = [replace(f, covariate_name=None) for f in unknown(jumped, jumped.estimate().about)]
+    functions = [replace(f, covariate_name=None) for f in unknown_functions(jumped, jumped.estimate().about)]
     assert [k.log_whitening for k in noise_kinds(jumped, functions)] == [
         k.log_whitening for k in noise_kinds(jumped, ())
     ]

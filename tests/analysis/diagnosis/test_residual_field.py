@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.residual_field import ResidualField, residual_field
+from cmm_uq.analysis.diagnosis.location import ResidualField, residual_field
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import unit

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.analysis.diagnosis.rivals import REMAINS, SETTLED
+from cmm_uq.analysis.diagnosis.model_average import REMAINS, SETTLED
 from cmm_uq.app.commands.analysis import analyse_observations, outcome_of
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Machine
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.diagnosis.costs import costs_data, costs_section
+from cmm_uq.certificate.diagnosis.sections import costs_data, costs_section
 from cmm_uq.certificate.document import Table
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.result import Diagnosed, Result

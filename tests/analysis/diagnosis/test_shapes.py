@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.shapes import _Density, _determined, _with_rivals, _without_rivals, drawn_shapes
+from cmm_uq.analysis.diagnosis.noise_shapes import _Density, _determined, _with_rivals, _without_rivals, drawn_shapes
 from cmm_uq.base.units import unit
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.search import Found, model_comparison
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, model_comparison
 from cmm_uq.analysis.diagnosis.power import powers, without_fault
-from cmm_uq.analysis.diagnosis.unseen import Smallest, smallest_effects
-from cmm_uq.analysis.planning.placing import along, joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.diagnosis.smallest import SmallestEffect, smallest_effects
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.certificate.document import Table
 from cmm_uq.machine.model import MeasurementModel, Noise
@@ -22,23 +22,23 @@ from tests.artefacts.simulated import diagnosed
 ALPHA = 0.01
 
 
-def searched(model: MeasurementModel) -> Found:
+def searched(model: MeasurementModel) -> SearchResult:
     """A search that finds nothing, noise not stated."""
     first = model_comparison(model, None, 0)
     assert first.p_value > ALPHA
-    return Found(first, first.comparison, None, frozenset(), (), model, 0.0)
+    return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0)
 
 
-def rows(found: Found) -> dict[str, Smallest]:
+def rows(found: SearchResult) -> dict[str, SmallestEffect]:
     """By effect."""
     return {row.effect: row for row in smallest_effects(found, ALPHA, found.model)}
 
 
 @cache
-def gauge(noise: float = 1e-3) -> tuple[Found, dict[str, Smallest]]:
+def gauge(noise: float = 1e-3) -> tuple[SearchResult, dict[str, SmallestEffect]]:
     """Seven lines of a step gauge, faces 60 mm apart, each once, nothing left out."""
     chosen = setting(GAUGE, length_mm=820.0, pitch_mm=60.0, repeats=1)
-    model = chosen.model(joined(ready_plan(chosen)[1]))
+    model = chosen.model(join(ready_plan(chosen)[1]))
     found = searched(without_fault(chosen.observed, model, Noise(noise), 1))
     return found, rows(found)
 
@@ -79,10 +79,10 @@ def test_what_the_named_effects_take_up_is_said_with_their_names() -> None:
     chosen = setting(BALLBAR, repeats=2)
     bar = ballbar(BALLBAR, chosen.plan)
     level = tuple(
-        chosen.volume.set_up(bar, along(np.array(way)), (x, y, 0.5), "level")
+        chosen.volume.set_up(bar, attitude_along(np.array(way)), (x, y, 0.5), "level")
         for way in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)) for x in (0.1, 0.5, 0.9) for y in (0.1, 0.9)
     )  # fmt: skip
-    model = MeasurementModel(chosen.observed(joined(level)), effects(("scale_x", "scale_y")), 1e-3)
+    model = MeasurementModel(chosen.observed(join(level)), effects(("scale_x", "scale_y")), 1e-3)
     row = rows(searched(without_fault(chosen.observed, model, Noise(1e-3), 2)))["artefact_sag"]
     assert not row.shown
     assert row.share < 1e-3
@@ -94,11 +94,11 @@ def bars_in_the_middle() -> MeasurementModel:
     chosen = setting(BALLBAR, repeats=2)
     bar = ballbar(BALLBAR, chosen.plan)
     placings = tuple(
-        chosen.volume.set_up(bar, along(np.array(way)), (0.5, 0.5, 0.5), "middle")
+        chosen.volume.set_up(bar, attitude_along(np.array(way)), (0.5, 0.5, 0.5), "middle")
         for way in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 0.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0),
                     (1.0, -1.0, 0.0), (1.0, 0.0, -1.0), (0.0, 1.0, -1.0))
     )  # fmt: skip
-    model = MeasurementModel(chosen.observed(joined(placings)), effects(("scale_x", "scale_y", "scale_z")), 1e-3)
+    model = MeasurementModel(chosen.observed(join(placings)), effects(("scale_x", "scale_y", "scale_z")), 1e-3)
     return without_fault(chosen.observed, model, Noise(1e-3), 2)
 
 

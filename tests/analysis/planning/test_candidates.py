@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.planning.candidates import candidates
-from cmm_uq.analysis.planning.directions import lines, words
-from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.set_up import direction_words, join, lines
 from cmm_uq.analysis.planning.setting import Start
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
@@ -27,7 +26,7 @@ def test_candidates_lie_inside_and_can_be_recorded(kind: str) -> None:
         assert np.all(placing.points.machine_xyz <= chosen.volume.box[:, 1] + 1e-6)
         if kind != "sphere":  # of a hemisphere the ball is held, not the middle of its points
             assert -450.0 - 1e-6 <= placing.middle[2] <= -150.0 + 1e-6
-    assert len(artefact_of(facts, joined(found)).noise_scale) >= len(found)
+    assert len(artefact_of(facts, join(found)).noise_scale) >= len(found)
 
 
 def test_a_bar_is_laid_only_where_a_fixture_holds_it() -> None:
@@ -63,9 +62,9 @@ def test_a_recorded_placing_is_tried_elsewhere_as_it_was_recorded() -> None:
 
 
 def test_directions_are_named_as_an_operator_says_them() -> None:
-    assert words(np.array([-1.0, 0.0, 0.0])) == "along X"
-    assert words(np.array([-1.0, 1.0, 0.0])) == "along +X −Y"
-    assert words(np.array([0.0, 1.0, 1.0])) == "along +Y +Z, inclined 45°"
+    assert direction_words(np.array([-1.0, 0.0, 0.0])) == "along X"
+    assert direction_words(np.array([-1.0, 1.0, 0.0])) == "along +X −Y"
+    assert direction_words(np.array([0.0, 1.0, 1.0])) == "along +Y +Z, inclined 45°"
 
 
 def test_the_diagonals_of_a_cube_are_those_of_its_directions() -> None:

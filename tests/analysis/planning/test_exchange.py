@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.analysis.planning.candidates import candidates
 from cmm_uq.analysis.planning.exchange import choose, score_of
-from cmm_uq.analysis.planning.information import Told, told
+from cmm_uq.analysis.planning.information import Information, set_up_information
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -20,14 +20,14 @@ from tests.analysis.planning.plans import BALLBAR, setting
 PLACES = np.linspace(-1, 1, 21)
 
 
-def quadratic() -> Told:
+def quadratic() -> Information:
     """One reading a place of a + b·x + c·x², the noise so small that priors do not count."""
     rows = 1e4 * np.column_stack([np.ones(21), PLACES, PLACES**2])
     unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in ("a", "b", "c"))
-    return Told(unknowns, rows[:, :, None] * rows[:, None, :], np.zeros((3, 3)))
+    return Information(unknowns, rows[:, :, None] * rows[:, None, :], np.zeros((3, 3)))
 
 
-def taken(known: Told, criterion: str, count: int) -> Counter[float]:
+def taken(known: Information, criterion: str, count: int) -> Counter[float]:
     score = score_of(criterion, known, [0, 1, 2])
     return Counter(np.round(PLACES[list(choose(known, known.prior, score, count, again=True).indices)], 6).tolist())
 
@@ -46,7 +46,7 @@ def test_for_the_smallest_mean_variance_the_middle_is_read_twice_as_often() -> N
 def test_no_other_three_of_twelve_placings_are_much_better(criterion: str) -> None:
     """Against every one of the 220 choices: exchange ends in a local optimum; here it is the best of all or next to it."""
     chosen = setting(BALLBAR, named=("scale_x", "squareness_xy", "squareness_yz"), candidates=12)
-    known = told(chosen, candidates(chosen))
+    known = set_up_information(chosen, candidates(chosen))
     score = score_of(criterion, known, [0, 1, 2])
     start = known.prior
     every = np.array([
@@ -58,12 +58,12 @@ def test_no_other_three_of_twelve_placings_are_much_better(criterion: str) -> No
     assert np.mean(every < found.after - 1e-9) < 0.02
 
 
-def three(*, length: bool = False) -> Told:
+def three(*, length: bool = False) -> Information:
     """Three effects, and the length of an artefact beside them."""
     unknowns = [Unknown((name, name), "", 0.0, 1.0, 1.0) for name in ("a", "b", "c")]
     more = [Unknown((ARTEFACT, "length_mm"), "mm", 400.0, 0.1, 0.1)] * length
     k = 3 + length
-    return Told((*unknowns, *more), np.zeros((0, k, k)), np.zeros((k, k)))
+    return Information((*unknowns, *more), np.zeros((0, k, k)), np.zeros((k, k)))
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_the_separation_of_a_pair_by_hand() -> None:
 
 def test_a_placing_more_never_makes_the_uncertainty_larger() -> None:
     chosen = setting(BALLBAR, candidates=40)
-    known = told(chosen, candidates(chosen))
+    known = set_up_information(chosen, candidates(chosen))
     for criterion in ("D", "A", "worst"):
         score = score_of(criterion, known, known.where(chosen.named))
         start = known.prior + known.each[:10].sum(axis=0)
@@ -130,19 +130,19 @@ def test_one_effect_alone_has_nothing_to_be_told_apart_from() -> None:
 
 def test_no_placing_is_planned_twice_while_others_are_left() -> None:
     chosen = setting(BALLBAR, candidates=30)
-    known = told(chosen, candidates(chosen))
+    known = set_up_information(chosen, candidates(chosen))
     score = score_of("A", known, known.where(chosen.named))
     indices = choose(known, known.prior, score, 20).indices
     assert len(set(indices)) == 20
     assert list(indices) == sorted(indices)
 
 
-def drawn(seed: int) -> Told:
+def drawn(seed: int) -> Information:
     """Thirty candidates, each of two readings of four effects, larger and smaller."""
     random = np.random.default_rng(seed)
     rows = random.standard_normal((30, 2, 4)) * random.uniform(0.1, 3.0, (30, 1, 1))
     unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in "abcd")
-    return Told(unknowns, rows.swapaxes(1, 2) @ rows, np.zeros((4, 4)))
+    return Information(unknowns, rows.swapaxes(1, 2) @ rows, np.zeros((4, 4)))
 
 
 @pytest.mark.parametrize("criterion", ["D", "A", "worst", "separation"])
@@ -165,7 +165,7 @@ def test_where_no_placing_alone_helps_the_one_that_tells_most_is_taken_first() -
     """Two effects, each of which shows in one placing only: neither placing alone parts them."""
     rows = np.array([[1e-3, 0.0], [0.0, 1e-3], [30.0, 0.0], [0.0, 20.0]])
     unknowns = tuple(Unknown((name, name), "", 0.0, 1.0, 1.0) for name in "ab")
-    known = Told(unknowns, rows[:, :, None] * rows[:, None, :], np.zeros((2, 2)))
+    known = Information(unknowns, rows[:, :, None] * rows[:, None, :], np.zeros((2, 2)))
     found = choose(known, known.prior, score_of("separation", known, [0, 1]), 2)
     assert found.indices == (2, 3)
     assert found.before == pytest.approx(-np.log(0.001))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.identifiability import Identifiability, identifiability
-from cmm_uq.analysis.planning.placing import Placing, along, joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.set_up import SetUp, attitude_along, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.ballbar.plan import ballbar
@@ -18,14 +18,15 @@ from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setti
 UNCALIBRATED = BALLBAR.model_copy(update={"length_mm": None, "u_um": None})
 
 
-def found(chosen: Setting, placings: tuple[Placing, ...], *rivals: str) -> Identifiability:
-    return identifiability(chosen.model(joined(placings)), effects(rivals))
+def found(chosen: Setting, placings: tuple[SetUp, ...], *rivals: str) -> Identifiability:
+    return identifiability(chosen.model(join(placings)), effects(rivals))
 
 
-def bars(chosen: Setting, *directions: tuple[float, float, float]) -> tuple[Placing, ...]:
+def bars(chosen: Setting, *directions: tuple[float, float, float]) -> tuple[SetUp, ...]:
     pattern = ballbar(chosen.artefact, chosen.plan)
     return tuple(
-        chosen.volume.set_up(pattern, along(np.array(d)), (0.5, 0.5, 0.5), f"{i}") for i, d in enumerate(directions)
+        chosen.volume.set_up(pattern, attitude_along(np.array(d)), (0.5, 0.5, 0.5), f"{i}")
+        for i, d in enumerate(directions)
     )
 
 
@@ -46,7 +47,7 @@ EXACT = BALLBAR.model_copy(update={"u_um": 1e-6})
 )
 def test_a_parameter_is_weakly_determined_while_a_tenth_of_its_prior_variance_is_left(left: float, status: str) -> None:
     """One bar of 400 mm: u = √2·σ/0.4 ppm, and with a prior variance of s² of it s²u²/(s² + u²)."""
-    (unknown, _) = setting(EXACT, named=("scale_x",)).model(joined(bars(setting(EXACT), (1, 0, 0)))).unknowns
+    (unknown, _) = setting(EXACT, named=("scale_x",)).model(join(bars(setting(EXACT), (1, 0, 0)))).unknowns
     prior = unknown.prior_sd
     u = prior * np.sqrt(left / (1 - left))
     chosen = setting(EXACT, named=("scale_x",), sigma=0.4e-3 * u / np.sqrt(2), repeats=1)
@@ -172,7 +173,7 @@ def test_expected_uncertainties_are_those_of_drawn_recordings(kind: str) -> None
     facts, wishes = EVERY_KIND[kind]
     named = ("squareness_xy", "squareness_zx") if kind == "bryan" else ("scale_x", "squareness_xy", "squareness_zx")
     chosen = setting(facts, named, repeats=1, **wishes)
-    points = joined(ready_plan(chosen)[1])
+    points = join(ready_plan(chosen)[1])
     expected = np.array([p.u for p in found(chosen, ready_plan(chosen)[1]).parameters if p.unknown.key[0] in named])
     acting = MeasurementModel(artefact_of(facts, points), effects(named))
     random = np.random.default_rng(4)

@@ -7,10 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.information import Told, certified, gram, scales, shared, told, whole
-from cmm_uq.analysis.planning.placing import along, joined
-from cmm_uq.analysis.planning.ready import ready_plan
-from cmm_uq.analysis.planning.separation import left_of
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.information import (
+    Information,
+    certified,
+    gram,
+    left_of,
+    recording_information,
+    scales,
+    set_up_information,
+    shared,
+)
+from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import effects
@@ -25,15 +33,17 @@ def test_the_sum_over_placings_is_the_whole(kind: str) -> None:
     facts, wishes = EVERY_KIND[kind]
     chosen = setting(facts, SIX, **wishes)
     _, placings = ready_plan(chosen)
-    chosen = chosen.sized(joined(placings))
-    known = told(chosen, placings, RIVALS)
-    together = whole(chosen, joined(placings), RIVALS)
+    chosen = chosen.sized(join(placings))
+    known = set_up_information(chosen, placings, RIVALS)
+    together = recording_information(chosen, join(placings), RIVALS)
     np.testing.assert_allclose(known.each.sum(axis=0), together, rtol=1e-6, atol=1e-6 * np.abs(together).max())
 
 
 def test_repeats_add_as_often_as_they_are_made() -> None:
     facts, _ = EVERY_KIND["ballbar"]
-    once, thrice = (told(setting(facts, repeats=n), ready_plan(setting(facts, repeats=n))[1]) for n in (1, 3))
+    once, thrice = (
+        set_up_information(setting(facts, repeats=n), ready_plan(setting(facts, repeats=n))[1]) for n in (1, 3)
+    )
     np.testing.assert_allclose(thrice.each, 3 * once.each, rtol=1e-9)
 
 
@@ -42,10 +52,10 @@ def test_a_short_line_of_a_long_gauge_keeps_the_certificate_of_the_whole() -> No
     facts, _ = EVERY_KIND["step_gauge"]
     chosen = setting(facts, length_mm=1000.0)
     _, placings = ready_plan(chosen)
-    sized = chosen.sized(joined(placings))
+    sized = chosen.sized(join(placings))
     longest = max(float(p.points.columns["reference_mm"].max()) for p in placings)
-    assert [u.prior_mean for u in told(sized, placings[4:5]).unknowns if u.known] == [longest]
-    assert next(u.prior_mean for u in told(chosen, placings[4:5]).unknowns if u.known) < longest
+    assert [u.prior_mean for u in set_up_information(sized, placings[4:5]).unknowns if u.known] == [longest]
+    assert next(u.prior_mean for u in set_up_information(chosen, placings[4:5]).unknowns if u.known) < longest
 
 
 SCALE = Unknown(("scale_x", "ppm"), "ppm", 0.0, 50.0, 50.0)
@@ -55,8 +65,10 @@ BAR = Unknown((ARTEFACT, "length_mm"), "mm", 400.0, 5e-4, 0.1, known=True)
 def test_the_information_of_one_bar_by_hand() -> None:
     """A bar of 400 mm along X, 1 µm: ±0.4 µm for one ppm, and 1 µm for one of length, both over √2 µm."""
     chosen = setting(EVERY_KIND["ballbar"][0], named=("scale_x",), repeats=1)
-    placing = chosen.volume.set_up(ballbar(chosen.artefact, chosen.plan), along(np.eye(3)[0]), (0.5, 0.5, 0.5), "X")
-    model = chosen.model(joined((placing,)))
+    placing = chosen.volume.set_up(
+        ballbar(chosen.artefact, chosen.plan), attitude_along(np.eye(3)[0]), (0.5, 0.5, 0.5), "X"
+    )
+    model = chosen.model(join((placing,)))
     scale = model.unknowns[0].prior_sd
     assert scales(model.unknowns).tolist() == [scale, 0.1]
     found = gram(model, np.array([0.0, 400.0]))
@@ -66,7 +78,7 @@ def test_the_information_of_one_bar_by_hand() -> None:
 
 def test_information_needs_the_noise() -> None:
     chosen = setting(EVERY_KIND["ballbar"][0], named=("scale_x",), repeats=1)
-    model = replace(chosen.model(joined(ready_plan(chosen)[1])), sigma=None)
+    model = replace(chosen.model(join(ready_plan(chosen)[1])), sigma=None)
     with pytest.raises(ValueError, match="needs the noise"):
         gram(model, np.array([0.0, 400.0]))
 
@@ -74,7 +86,7 @@ def test_information_needs_the_noise() -> None:
 def test_freedoms_that_all_placings_share_leave_what_projecting_them_out_leaves() -> None:
     facts, wishes = EVERY_KIND["bryan"]
     chosen = setting(facts, ("squareness_xy", "squareness_zx"), **wishes)
-    model = chosen.model(joined(ready_plan(chosen)[1]))
+    model = chosen.model(join(ready_plan(chosen)[1]))
     known = shared(model)
     k, rows = len(model.unknowns), len(known.prior)
     assert rows > k
@@ -97,7 +109,7 @@ def test_a_certificate_is_worth_the_square_of_its_unit_over_its_uncertainty() ->
 
 def test_effects_and_what_must_be_fitted_besides_are_told_apart_by_name() -> None:
     squareness = Unknown(("squareness_xy", "arcsec"), "arcsec", 0.0, 10.0, 10.0)
-    known = Told((SCALE, squareness, BAR), np.zeros((1, 4, 4)), np.zeros((4, 4)))
+    known = Information((SCALE, squareness, BAR), np.zeros((1, 4, 4)), np.zeros((4, 4)))
     assert known.where(effects(("squareness_xy",))) == [1]
     assert known.where(effects(("scale_x", "squareness_xy"))) == [0, 1]
     assert known.nuisance == [2, 3]

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.planning.expected import expected
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.expected import expected_uncertainty
 from cmm_uq.analysis.planning.identifiability import identifiability
-from cmm_uq.analysis.planning.information import gram, told, whole
+from cmm_uq.analysis.planning.information import gram, recording_information, set_up_information
 from cmm_uq.analysis.planning.noise import PlannedNoise
-from cmm_uq.analysis.planning.placing import along, joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.plan import ballbar
@@ -30,7 +30,7 @@ UNCERTIFIED = artefact_facts(kind="ballbar", length_mm=400.0)
 
 
 def model_of(chosen: Setting) -> MeasurementModel:
-    return chosen.model(joined(ready_plan(chosen)[1]))
+    return chosen.model(join(ready_plan(chosen)[1]))
 
 
 def by_hand(model: MeasurementModel, covariance: Floats) -> Floats:
@@ -52,7 +52,7 @@ def test_set_up_offsets_of_a_bar_by_hand() -> None:
     model = model_of(setting(BALLBAR, repeats=3))
     measurement = model.artefact.measurement
     covariance = 2 * SIGMA**2 * np.eye(len(measurement)) + 2 * OFFSET**2 * (measurement[:, None] == measurement)
-    np.testing.assert_allclose(expected(model, OFFSETS).u, by_hand(model, covariance), rtol=1e-7)
+    np.testing.assert_allclose(expected_uncertainty(model, OFFSETS).u, by_hand(model, covariance), rtol=1e-7)
 
 
 def test_noise_that_grows_along_a_gauge_by_hand() -> None:
@@ -66,11 +66,11 @@ def test_noise_that_grows_along_a_gauge_by_hand() -> None:
     face = list(zip(points.measurement[rows], points.point[rows], strict=True))
     shared = np.array([[one == other for other in face] for one in face], dtype=np.float64)
     covariance = np.diag(SIGMA**2 + (GROWTH * away / away.max()) ** 2) + OFFSET**2 * shared
-    found = expected(model, replace(OFFSETS, growth=GROWTH))
+    found = expected_uncertainty(model, replace(OFFSETS, growth=GROWTH))
     np.testing.assert_allclose(found.u, by_hand(model, covariance), rtol=1e-7)
     # the longest length of the noise may be another one than that of the plan
     half = replace(OFFSETS, growth=2 * GROWTH, longest=2 * float(away.max()))
-    np.testing.assert_allclose(expected(model, half).u, found.u, rtol=1e-9)
+    np.testing.assert_allclose(expected_uncertainty(model, half).u, found.u, rtol=1e-9)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in EVERY_KIND if kind not in ("shift", "plane")])
@@ -99,13 +99,15 @@ def test_estimates_of_simulated_recordings_scatter_as_expected() -> None:
         xyz = model.simulate(np.zeros(len(SIX)), sizes, OFFSETS.drawn, random)
         acting = chosen.model(model.artefact.points.at(xyz))
         found[i] = acting.estimate().least_squares.value[: len(SIX)]
-    ratio = found.std(axis=0, ddof=1) / expected(model, OFFSETS).u[: len(SIX)]
+    ratio = found.std(axis=0, ddof=1) / expected_uncertainty(model, OFFSETS).u[: len(SIX)]
     low, high = np.sqrt(np.array(stats.chi2.interval(0.999, recordings - 1)) / (recordings - 1))
     assert low < ratio.min()
     assert ratio.max() < high
     # white noise would have promised a third of it: √(1/3 + 2.25) over √(1/3)
-    white = expected(model, OFFSETS.white).u[: len(SIX)]
-    np.testing.assert_allclose(expected(model, OFFSETS).u[: len(SIX)] / white, np.sqrt(1 + 3 * 2.25), rtol=1e-9)
+    white = expected_uncertainty(model, OFFSETS.white).u[: len(SIX)]
+    np.testing.assert_allclose(
+        expected_uncertainty(model, OFFSETS).u[: len(SIX)] / white, np.sqrt(1 + 3 * 2.25), rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("repeats", [1, 3])
@@ -116,9 +118,9 @@ def test_an_unknown_offset_is_averaged_over_its_prior_in_closed_form(repeats: in
     """
     model = model_of(setting(UNCERTIFIED, ("squareness_xy", "squareness_yz", "squareness_zx"), repeats=repeats))
     a = repeats**-0.5
-    once = expected(model, PlannedNoise(READING)).u / a
+    once = expected_uncertainty(model, PlannedNoise(READING)).u / a
     np.testing.assert_allclose(
-        expected(model, PlannedNoise(READING, placing=None)).u, once * np.sqrt(a * (1 + a)), rtol=5e-3
+        expected_uncertainty(model, PlannedNoise(READING, placing=None)).u, once * np.sqrt(a * (1 + a)), rtol=5e-3
     )
 
 
@@ -127,13 +129,13 @@ def test_information_of_placings_with_offsets_adds_up_to_that_of_the_whole() -> 
         facts, wishes = EVERY_KIND[kind]
         chosen = setting(facts, **wishes)
         _, placings = ready_plan(chosen)
-        points = joined(placings)
+        points = join(placings)
         chosen = chosen.sized(points)
         model = chosen.model(points)
         values = np.array([unknown.prior_mean for unknown in model.unknowns])
         chosen = replace(chosen, noise=replace(OFFSETS, growth=GROWTH).over(model, values))
-        together = whole(chosen, points)
-        each = told(chosen, placings).each.sum(axis=0)
+        together = recording_information(chosen, points)
+        each = set_up_information(chosen, placings).each.sum(axis=0)
         np.testing.assert_allclose(each, together, rtol=1e-6, atol=1e-6 * np.abs(together).max())
 
 
@@ -151,10 +153,10 @@ def test_axes_that_read_worse_leave_what_lies_along_them_worse() -> None:
     """A bar along Z alone shows the noise of Z: three times as much of it, three times the uncertainty."""
     chosen = setting(artefact_facts(kind="ballbar", length_mm=400.0, u_um=0.0), ("scale_x", "scale_z"), repeats=2)
     bar = ballbar(chosen.artefact, chosen.plan)
-    placings = [chosen.volume.set_up(bar, along(np.eye(3)[i]), (0.5, 0.5, 0.5), say("bar")) for i in (0, 2)]
-    model = chosen.model(joined(placings))
-    white = expected(model, PlannedNoise(READING)).u
-    found = expected(model, PlannedNoise((SIGMA, SIGMA, 3 * SIGMA))).u
+    placings = [chosen.volume.set_up(bar, attitude_along(np.eye(3)[i]), (0.5, 0.5, 0.5), say("bar")) for i in (0, 2)]
+    model = chosen.model(join(placings))
+    white = expected_uncertainty(model, PlannedNoise(READING)).u
+    found = expected_uncertainty(model, PlannedNoise((SIGMA, SIGMA, 3 * SIGMA))).u
     np.testing.assert_allclose(found[:2] / white[:2], [1.0, 3.0], rtol=1e-6)
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.triangle.placings import placed_triangle
@@ -30,7 +30,7 @@ def test_every_artefact_has_a_plan_inside_the_volume_that_can_be_recorded(kind: 
         assert np.all(placing.points.machine_xyz >= box[:, 0] - 1e-6)
         assert np.all(placing.points.machine_xyz <= box[:, 1] + 1e-6)
     if kind != "shift":
-        assert len(artefact_of(facts, joined(placings)).noise_scale) > 0
+        assert len(artefact_of(facts, join(placings)).noise_scale) > 0
 
 
 def test_the_twenty_positions_point_as_in_the_recording_that_followed_the_standard() -> None:

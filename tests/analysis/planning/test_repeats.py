@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.expected import compare_repeats, repeat_points
 from cmm_uq.analysis.planning.noise import PlannedNoise
-from cmm_uq.analysis.planning.placing import joined
-from cmm_uq.analysis.planning.ready import ready_plan
-from cmm_uq.analysis.planning.repeats import repeated, worth_of_repeats
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_facts
 from tests.analysis.planning.plans import setting
 
@@ -29,7 +29,7 @@ def ratio_of(offset: float) -> PlannedNoise:
 def test_repeats_lower_the_noise_alone_and_placings_all_of_it(offset: float, minutes: float, seconds: float) -> None:
     chosen = setting(BAR, NAMED, minutes_per_placing=minutes, seconds_per_point=seconds)
     chosen = replace(chosen, noise=ratio_of(offset))
-    found = worth_of_repeats(chosen, ready_plan(chosen)[1])
+    found = compare_repeats(chosen, ready_plan(chosen)[1])
     assert found is not None
     first, n = found.rows[0], 20
     better = []
@@ -60,7 +60,7 @@ def test_large_offsets_make_repeats_worthless_sooner() -> None:
     chosen = setting(BAR, NAMED)
     enough = []
     for offset in (0.0, 1.0, 5.0):
-        found = worth_of_repeats(replace(chosen, noise=ratio_of(offset)), ready_plan(chosen)[1])
+        found = compare_repeats(replace(chosen, noise=ratio_of(offset)), ready_plan(chosen)[1])
         assert found is not None
         enough.append(found.enough)
     assert enough == [None, 4, 1]
@@ -68,13 +68,13 @@ def test_large_offsets_make_repeats_worthless_sooner() -> None:
 
 def test_white_noise_and_a_kind_without_effects_have_no_such_table() -> None:
     chosen = setting(BAR, NAMED)
-    assert worth_of_repeats(chosen, ready_plan(chosen)[1]) is None
+    assert compare_repeats(chosen, ready_plan(chosen)[1]) is None
 
 
 def test_a_placing_repeated_is_the_plan_with_as_many_repeats() -> None:
     once, four = (setting(BAR, NAMED, repeats=n) for n in (2, 4))
-    points, wanted = (joined(ready_plan(chosen)[1][:1]) for chosen in (once, four))
-    found = repeated(points, 4)
+    points, wanted = (join(ready_plan(chosen)[1][:1]) for chosen in (once, four))
+    found = repeat_points(points, 4)
     np.testing.assert_array_equal(found.repeat, wanted.repeat)
     np.testing.assert_array_equal(found.point, wanted.point)
     np.testing.assert_allclose(found.xyz, wanted.xyz)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.analysis.planning.separation import cosines, imitators, left_of, visible
+from cmm_uq.analysis.planning.information import cosines, imitators, left_of, visible
 
 
 @given(seed=st.integers(0, 10_000), base=st.integers(0, 4))

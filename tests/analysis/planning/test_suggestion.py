@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.advice import ODDS, NextPlan, Wanted, suggestions
-from cmm_uq.analysis.planning.placing import Placing, along, joined
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.advice import ODDS, DetectionGoal, NextPlan, suggestions
+from cmm_uq.analysis.planning.candidates import ready_plan
+from cmm_uq.analysis.planning.set_up import SetUp, attitude_along, join
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.artefacts import artefact_of, kind_named
@@ -27,11 +27,11 @@ SIGMA = 1e-3
 
 
 def diagnosed(
-    facts: ArtefactFacts, placings: tuple[Placing, ...], true: str, size: float, group: tuple[str, ...],
+    facts: ArtefactFacts, placings: tuple[SetUp, ...], true: str, size: float, group: tuple[str, ...],
     named: tuple[str, ...] = SIX, odds: Mapping[str, float] | None = None,
 ) -> Any:  # fmt: skip
     """What a plan reads of a diagnosis: a recording with one effect, the group that it could be, odds of the others to it."""
-    points = joined(placings)
+    points = join(placings)
     acting = MeasurementModel(artefact_of(facts, points), effects((true,)))
     sizes = np.array([s.nominal for s in acting.artefact.sizes])
     xyz = acting.simulate(np.array([size]), sizes, Noise(SIGMA), np.random.default_rng(3))
@@ -47,7 +47,7 @@ def diagnosed(
     return SimpleNamespace(after=after, indistinguishable=(group,) if group else (), found=found, noise=noise)
 
 
-def planned(found: Any, facts: ArtefactFacts, wanted: tuple[Wanted, ...] = ()) -> NextPlan | None:
+def planned(found: Any, facts: ArtefactFacts, wanted: tuple[DetectionGoal, ...] = ()) -> NextPlan | None:
     """By what the artefact's kind offers."""
     kind = kind_named(facts.kind)
     assert kind is not None
@@ -98,7 +98,7 @@ def in_one_plane(size: float, odds: Mapping[str, float] | None = None) -> Any:
     chosen = setting(KNOWN, repeats=2)
     bar = ballbar(KNOWN, chosen.plan)
     placings = tuple(
-        chosen.volume.set_up(bar, along(np.array([np.cos(t), 0.0, np.sin(t)])), (x, 0.3, z), "in the plane")
+        chosen.volume.set_up(bar, attitude_along(np.array([np.cos(t), 0.0, np.sin(t)])), (x, 0.3, z), "in the plane")
         for t in (0.0, 0.5, 1.0, 1.5, 2.0, 2.6) for x in (0.2, 0.8) for z in (0.3, 0.6)
     )  # fmt: skip
     return diagnosed(KNOWN, placings, PAIR[0], size, PAIR, ("scale_z", "squareness_zx"), odds)
@@ -193,7 +193,7 @@ def test_what_is_to_be_shown_is_as_uncertain_as_a_fit_to_all_of_it_says() -> Non
     found = in_one_plane(2.0)
     found.indistinguishable = ()
     found.after = MeasurementModel(found.after.artefact, effects(("scale_z", "squareness_zx", "scale_x")), SIGMA)
-    plan = planned(found, KNOWN, (Wanted("rotation_x_z", 0.02, 5.0),))
+    plan = planned(found, KNOWN, (DetectionGoal("rotation_x_z", 0.02, 5.0),))
     assert plan is not None
     (shown,) = plan.shown
     assert plan.reached

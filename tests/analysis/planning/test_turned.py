@@ -10,10 +10,10 @@ from scipy.spatial.distance import pdist
 
 from cmm_uq.analysis.planning import suggestion
 from cmm_uq.analysis.planning.advice import NextPlan
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.suggestion import next_plan
-from cmm_uq.analysis.planning.turned import turned_placings
+from cmm_uq.analysis.planning.volume import turned_set_ups
 from cmm_uq.artefacts import kind_named
 from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.base.messages import say
@@ -53,7 +53,7 @@ class OwnSquareness(Effect):
 def test_a_bar_changes_ends_and_stays_where_it_is() -> None:
     chosen = setting(BALLBAR)
     placing = ready_plan(chosen)[1][0]
-    (turned,) = turned_placings([placing], chosen.volume)
+    (turned,) = turned_set_ups([placing], chosen.volume)
     first, second = placing.points.xyz[:2]
     np.testing.assert_allclose(turned.points.xyz[:2], [second, first], atol=1e-9)
     assert turned.title.endswith("ends exchanged")
@@ -62,7 +62,7 @@ def test_a_bar_changes_ends_and_stays_where_it_is() -> None:
 def test_a_plate_turns_by_quarters_about_its_normal_and_over() -> None:
     chosen = setting(PLATE, pitch_mm=90.0)
     placing = ready_plan(chosen)[1][0]
-    found = list(turned_placings([placing], chosen.volume))
+    found = list(turned_set_ups([placing], chosen.volume))
     assert len(found) == 4
     for turned in found:
         np.testing.assert_allclose(pdist(turned.points.xyz), pdist(placing.points.xyz), atol=1e-8)
@@ -74,7 +74,7 @@ def test_a_plate_turns_by_quarters_about_its_normal_and_over() -> None:
 def test_a_turn_that_no_fixture_holds_or_no_room_allows_is_left_out() -> None:
     upright = setting(BALLBAR, fixtures=FixtureFacts(directions=[[0.0, 1.0, 0.0]]))
     along_x = upright.volume.set_up(ballbar(BALLBAR, upright.plan), np.eye(3), (0.5, 0.5, 0.5), say("along X"))
-    assert not list(turned_placings([along_x], upright.volume))
+    assert not list(turned_set_ups([along_x], upright.volume))
 
 
 def parted(monkeypatch: pytest.MonkeyPatch) -> NextPlan | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.placing import along
+from cmm_uq.analysis.planning.set_up import attitude_along
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.base.errors import CmmUqError
@@ -40,14 +40,14 @@ def test_a_bar_longer_than_the_volume_is_refused_with_its_axis() -> None:
     volume = Volume.of(MACHINE, PlanFacts(volume_mm={"z": [-300.0, 0.0]}))
     bar = ballbar(BALLBAR, PlanFacts())
     with pytest.raises(CmmUqError, match=r"400 mm long along Z .*, of which the volume has 280 mm"):
-        volume.set_up(bar, along(np.array([0.0, 0.0, 1.0])), (0.5, 0.5, 0.5), "along Z")
+        volume.set_up(bar, attitude_along(np.array([0.0, 0.0, 1.0])), (0.5, 0.5, 0.5), "along Z")
 
 
 def test_places_run_from_edge_to_edge() -> None:
     volume = Volume.of(MACHINE, PlanFacts(margin_mm=0.0))
     bar = ballbar(BALLBAR, PlanFacts(repeats=1))
-    low = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (0.0, 0.0, 0.0), "low").points.machine_xyz
-    high = volume.set_up(bar, along(np.array([1.0, 0.0, 0.0])), (1.0, 1.0, 1.0), "high").points.machine_xyz
+    low = volume.set_up(bar, attitude_along(np.array([1.0, 0.0, 0.0])), (0.0, 0.0, 0.0), "low").points.machine_xyz
+    high = volume.set_up(bar, attitude_along(np.array([1.0, 0.0, 0.0])), (1.0, 1.0, 1.0), "high").points.machine_xyz
     np.testing.assert_allclose(low.min(axis=0), TRAVEL[:, 0], atol=1e-9)
     np.testing.assert_allclose(high.max(axis=0), TRAVEL[:, 1], atol=1e-9)
 
@@ -62,12 +62,12 @@ def test_fixtures_hold_a_bar_either_way_along_their_directions() -> None:
 def test_heights_bound_the_middle_of_the_artefact() -> None:
     volume = Volume.of(MACHINE, PlanFacts.model_validate({"fixtures": {"heights_mm": [-500.0, -400.0]}}))
     bar = ballbar(BALLBAR, PlanFacts())
-    level = along(np.array([1.0, 0.0, 0.0]))
+    level = attitude_along(np.array([1.0, 0.0, 0.0]))
     assert volume.set_up(bar, level, (0.5, 0.5, 1.0), "high").middle[2] == pytest.approx(-400.0)
     assert volume.set_up(bar, level, (0.5, 0.5, 0.0), "low").middle[2] == pytest.approx(-500.0)
     low = Volume.of(MACHINE, PlanFacts.model_validate({"fixtures": {"heights_mm": [-590.0, -580.0]}}))
     with pytest.raises(CmmUqError, match="heights_mm"):
-        low.set_up(bar, along(np.array([0.0, 0.0, 1.0])), (0.5, 0.5, 0.5), "along Z")
+        low.set_up(bar, attitude_along(np.array([0.0, 0.0, 1.0])), (0.5, 0.5, 0.5), "along Z")
 
 
 def test_a_margin_that_leaves_nothing_is_refused() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.screening.columns import column_findings
-from cmm_uq.analysis.screening.screened import screen
+from cmm_uq.analysis.screening.screening import screen
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from tests.recordings import bar_facts, screened, with_columns

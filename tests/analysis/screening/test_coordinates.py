@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.screening.screened import Screened
+from cmm_uq.analysis.screening.screening import ScreenedRecording
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.errors import CmmUqError
@@ -34,7 +34,7 @@ def recording(example: str) -> tuple[Points, ArtefactFacts]:
     return job.points, job.facts.artefact
 
 
-def screen_of(example: str, spoil: Spoil | None = None, **columns: Floats) -> Screened:
+def screen_of(example: str, spoil: Spoil | None = None, **columns: Floats) -> ScreenedRecording:
     points, facts = recording(example)
     xyz = points.xyz.copy()
     if spoil is not None:
@@ -43,7 +43,7 @@ def screen_of(example: str, spoil: Spoil | None = None, **columns: Floats) -> Sc
     return screened(spoilt, facts, needed=set(), set_aside=[], where="recording.csv")
 
 
-def damage(found: Screened) -> list[str]:
+def damage(found: ScreenedRecording) -> list[str]:
     """Kinds found, but for the copy that the real recording holds (position 18 of the thesis)."""
     return [f.kind for f in found.findings if f.measurements != (14, 18)]
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.screening.copies import copied_measurements, counted_with
+from cmm_uq.analysis.screening.screening import copied_measurements, counted_with
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.job import Job

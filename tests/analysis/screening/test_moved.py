@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cmm_uq.analysis.screening.moved import moved_stretches, recurring_points, words_of_point
-from cmm_uq.analysis.screening.screened import Finding
+from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.analysis.screening.outliers import moved_stretches, point_words, recurring_points
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
@@ -66,7 +66,7 @@ def test_a_point_is_told_once_where_it_is_off_in_most_readings_of_several_set_up
     rows = np.flatnonzero(points.point == 3)
     ((*found,),) = recurring_points(points, np.append(rows[1:], np.flatnonzero(points.point == 5)[0]))
     assert found == rows[1:].tolist()
-    told = words_of_point(points, rows[1:], [5.0, 9.0])
+    told = point_words(points, rows[1:], [5.0, 9.0])
     assert told.startswith("point 3 is 5.0 to 9.0 of its standard deviations off")
     assert f"in {len(rows) - 1} of its {len(rows)} readings" in told
 

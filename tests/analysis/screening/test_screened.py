@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.screening.screened import gross_outliers, impossible_values, repeated_figures, screen
+from cmm_uq.analysis.screening.screening import gross_outliers, impossible_values, repeated_figures, screen
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.errors import CmmUqError

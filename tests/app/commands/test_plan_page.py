@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.ready import ready_plan
+from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.app.commands.plans.page import plan_document
 from cmm_uq.app.commands.plans.plan import plan_results
 from cmm_uq.app.commands.plans.planning import Plan, make_plan

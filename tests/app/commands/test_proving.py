@@ -15,16 +15,15 @@ import pytest
 
 import cmm_uq
 from cmm_uq.app.api import outcomes as api
-from cmm_uq.app.commands.prove import UNFINISHED
-from cmm_uq.app.commands.proving import Asked, design_of, prove_job, true_values
+from cmm_uq.app.commands.prove import UNFINISHED, ProofOptions, design_of, prove_job, true_values
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.proof.page import proof_document
-from cmm_uq.certificate.proof.proof import Proof
 from cmm_uq.certificate.proof.results import KEYS, RATE, proof_outcome, proof_results
-from cmm_uq.laboratory.proving.running import RECORDS, TRUTH
+from cmm_uq.certificate.proof.words import DiagnosisProof
+from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.machine.physics.catalogue import every
 from tests.app.cli.process import run
 from tests.certificate.saying import strangers
@@ -38,7 +37,7 @@ CASES = 2
 class Ran:
     """A proof on two cases, and the folder in which truth and answers were kept."""
 
-    proof: Proof
+    proof: DiagnosisProof
     kept: Path
     told: tuple[str, ...]
 
@@ -53,7 +52,7 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
         assert not (folder / RECORDS).read_bytes()
         told.append(digest)
 
-    proof, kept = prove_job(read_job(JOB), Asked(CASES, 2), folder=folder, sealed=sealed)
+    proof, kept = prove_job(read_job(JOB), ProofOptions(CASES, 2), folder=folder, sealed=sealed)
     assert kept is not None
     kept.close()
     return Ran(proof, folder, tuple(told))
@@ -74,7 +73,7 @@ def test_the_truth_is_on_the_disk_and_told_before_anything_is_said_of_it(ran: Ra
 
 
 def test_one_process_says_what_two_do(ran: Ran) -> None:
-    alone, _ = prove_job(read_job(JOB), Asked(CASES, 1))
+    alone, _ = prove_job(read_job(JOB), ProofOptions(CASES, 1))
     assert alone.truth == ran.proof.truth
     assert alone.answers == ran.proof.answers
     assert sorted((ran.kept / RECORDS).read_bytes().splitlines()) == sorted(alone.answers.splitlines())

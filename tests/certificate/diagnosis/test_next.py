@@ -8,9 +8,9 @@ from typing import cast
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.planning.advice import NextPlan, Parting, Shown
+from cmm_uq.analysis.planning.advice import DetectionChange, NextPlan, Separation
 from cmm_uq.artefacts import artefact_facts, artefact_of
-from cmm_uq.certificate.diagnosis.next import next_data, next_sentence
+from cmm_uq.certificate.diagnosis.sections import next_data, next_sentence
 from cmm_uq.certificate.result import Diagnosed
 from cmm_uq.machine.physics.catalogue import every
 from tests.artefacts.constructions import plate
@@ -20,7 +20,9 @@ def test_a_fault_of_the_artefact_is_as_large_as_that_artefact_allows() -> None:
     """Three times its certificate's 0.5 µm at most, where the same deformation of the machine could be far more."""
     artefact = artefact_of(artefact_facts(kind="plate", u_um=0.5), plate())
     names = [fault.name for fault in artefact.own_faults() if fault.reported[0].name == fault.coefficients[0].name]
-    plan = NextPlan((), 1, 5, (), tuple(Shown(name, np.inf, 0.5) for name in names), reached=True, box=np.zeros((3, 2)))
+    plan = NextPlan(
+        (), 1, 5, (), tuple(DetectionChange(name, np.inf, 0.5) for name in names), reached=True, box=np.zeros((3, 2))
+    )
     data = next_data(plan, artefact)
     assert data is not None
     unbound, differs = every(), 0
@@ -44,7 +46,7 @@ def test_a_fault_of_the_artefact_is_as_large_as_that_artefact_allows() -> None:
     ],
 )
 def test_set_ups_that_would_part_nothing_are_no_advice(odds: tuple[float, ...], expected: str) -> None:
-    pairs = tuple(Parting(("scale_x", "scale_y"), 1.0, each) for each in odds)
+    pairs = tuple(Separation(("scale_x", "scale_y"), 1.0, each) for each in odds)
     plan = NextPlan((), 3, 5, pairs, (), reached=False, box=np.zeros((3, 2)))
     artefact = artefact_of(artefact_facts(kind="plate"), plate())
     before = SimpleNamespace(artefact=artefact)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import cmm_uq
-from cmm_uq.analysis.diagnosis.rivals import Remaining, Rival
+from cmm_uq.analysis.diagnosis.model_average import ModelAverage, Rival
 from cmm_uq.app.commands.diagnosing import diagnose_job
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
@@ -187,12 +187,12 @@ def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(exp
         rival(0.56, "squareness_xy"), rival(0.3, unknown=True), rival(0.09, "squareness_xy", "scale_curvature_x"),
         rival(0.04, "straightness_x_y"),
     )  # fmt: skip
-    open_ = replace(explained, diagnosis=replace(d, remaining=Remaining(several)))
+    open_ = replace(explained, diagnosis=replace(d, remaining=ModelAverage(several)))
     told = rows(open_)["How sure"]
     assert "Otherwise: error along Y as a function of X 30\u00a0%." in told
     assert "Otherwise" not in rows(explained)["How sure"]
     assert overview_of(open_).verdict == "Explained: more than one cause is possible"
-    alone = replace(explained, diagnosis=replace(d, indistinguishable=(), remaining=Remaining()))
+    alone = replace(explained, diagnosis=replace(d, indistinguishable=(), remaining=ModelAverage()))
     assert overview_of(alone).verdict == "Explained: the cause is found"
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from cmm_uq.laboratory.proving.running import Kept, answered
+from cmm_uq.laboratory.proving.answers import AnswersFolder, answer_tasks
 
 TASKS, TRUTH, PROGRAM = dict.fromkeys(range(12)), b'{"run":1}\n', "tests.laboratory.schedule.echo"
 
 
 def main(folder: Path, seconds: float) -> None:
-    kept = Kept(folder, TRUTH)
+    kept = AnswersFolder(folder, TRUTH)
     todo = {i: task for i, task in TASKS.items() if i not in kept.records}
-    answered(PROGRAM, seconds, todo, 2, keep=kept.keep)
+    answer_tasks(PROGRAM, seconds, todo, 2, keep=kept.keep)
     kept.close()
 
 

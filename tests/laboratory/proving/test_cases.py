@@ -16,10 +16,20 @@ from cmm_uq.app.commands.prove_case import model_on
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.proving.cases import CYCLE, KINDS, NOTHING, OUTSIDE, OWN, STRONGEST, WEAKEST, Case
+from cmm_uq.laboratory.proving.cases import (
+    CYCLE,
+    KINDS,
+    NOTHING,
+    OUTSIDE,
+    OWN,
+    STRONGEST,
+    WEAKEST,
+    Case,
+    sha256_of,
+    truth_file,
+)
 from cmm_uq.laboratory.proving.design import Design
-from cmm_uq.laboratory.proving.foreign import fault, nodes
-from cmm_uq.laboratory.proving.sealed import sha256_of, truth_file
+from cmm_uq.laboratory.proving.unknown_causes import artefact_fault, nodes
 from cmm_uq.machine.model import Noise
 from cmm_uq.machine.physics.catalogue import every
 from tests.conftest import ROOT
@@ -138,7 +148,7 @@ def test_the_hash_changes_with_any_truth() -> None:
 
 def displaced(name: str, what: str, errors: tuple[tuple[float, ...], ...]) -> Floats:
     one = design(name)
-    return -fault(one.model, one.values, what, one.cte_per_k, errors).basis(one.model.artefact.points)[:, :, 0]
+    return -artefact_fault(one.model, one.values, what, one.cte_per_k, errors).basis(one.model.artefact.points)[:, :, 0]
 
 
 def test_an_error_of_a_node_turns_with_the_artefact() -> None:

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from cmm_uq.laboratory.proving.intervals import Rate, cases_to_decide, clopper_pearson, tenths
-from cmm_uq.laboratory.proving.smallest import found_by_strength
+from cmm_uq.laboratory.proving.rates import Rate, cases_to_decide, clopper_pearson, detection_curve, tenths
 
 
 @pytest.mark.parametrize(("count", "of", "low", "high"), [
@@ -65,7 +64,7 @@ def test_the_strength_found_in_nine_of_ten_is_that_of_many_draws() -> None:
     strength = random.uniform(3, 15, 900)
     found = random.random(900) < 1 / (1 + np.exp(-1.2 * (strength - 6.5)))
     wanted = 6.5 + np.log(9) / 1.2
-    many, few = (found_by_strength(strength[:n].tolist(), found[:n].tolist()) for n in (900, 100))
+    many, few = (detection_curve(strength[:n].tolist(), found[:n].tolist()) for n in (900, 100))
     assert many is not None
     assert few is not None
     assert many.often == pytest.approx(wanted, abs=0.6)
@@ -75,10 +74,10 @@ def test_the_strength_found_in_nine_of_ten_is_that_of_many_draws() -> None:
 
 def test_where_all_or_none_is_found_only_one_end_is_known() -> None:
     strength = np.linspace(3, 15, 40).tolist()
-    every, none = found_by_strength(strength, [True] * 40), found_by_strength(strength, [False] * 40)
+    every, none = detection_curve(strength, [True] * 40), detection_curve(strength, [False] * 40)
     assert every is not None
     assert none is not None
     assert every.interval[1] < 6
     assert none.interval[0] > 12
     assert none.interval[1] == np.inf
-    assert found_by_strength([5.0] * 7, [True] * 7) is None
+    assert detection_curve([5.0] * 7, [True] * 7) is None

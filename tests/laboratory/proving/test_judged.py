@@ -7,28 +7,31 @@ from typing import Any
 import pytest
 
 from cmm_uq.jobs.prove import ProveFacts
-from cmm_uq.laboratory.proving.accepted import MET, MISSED, OPEN, accepted
-from cmm_uq.laboratory.proving.cases import ARTEFACT, NOTHING, ONE, OUTSIDE, TWO, Case, Hidden, Stranger
-from cmm_uq.laboratory.proving.judged import (
+from cmm_uq.laboratory.proving.cases import ARTEFACT, NOTHING, ONE, OUTSIDE, TWO, Case, HiddenEffect, UnknownCause
+from cmm_uq.laboratory.proving.judgement import (
+    MET,
+    MISSED,
     NAMED,
     NAMED_BESIDE,
     NAMED_GROUPED,
     NAMED_MISSED,
+    OPEN,
     STATED,
-    Judged,
+    JudgedCase,
     Judgement,
+    acceptance_figures,
     judge,
 )
 from cmm_uq.machine.model import Noise
 
 TRUE = {"scale_x.ppm": 3.0}
 HOLDS, FAILS = {"scale_x.ppm": [3.1, 2.0, 4.0]}, {"scale_x.ppm": [6.0, 5.0, 7.0]}
-BOW = Hidden("straightness_x_y", {"bow_um": 10.0}, 8.0)
-WAVE = Hidden("periodic_scale_x", {"amplitude_um": 4.0, "period_mm": 50.0, "phase_rad": 3.1}, 5.0)
+BOW = HiddenEffect("straightness_x_y", {"bow_um": 10.0}, 8.0)
+WAVE = HiddenEffect("periodic_scale_x", {"amplitude_um": 4.0, "period_mm": 50.0, "phase_rad": 3.1}, 5.0)
 
 
-def case(kind: str, *hidden: Hidden, noise: str = "own", number: int = 0) -> Case:
-    stranger = Stranger("step", 5.0, 9.0, 6.0, "rotation_x_z") if kind in (OUTSIDE, ARTEFACT) else None
+def case(kind: str, *hidden: HiddenEffect, noise: str = "own", number: int = 0) -> Case:
+    stranger = UnknownCause("step", 5.0, 9.0, 6.0, "rotation_x_z") if kind in (OUTSIDE, ARTEFACT) else None
     return Case(number, kind, noise, Noise(), (), hidden, stranger)
 
 
@@ -41,7 +44,7 @@ def said(
     }  # fmt: skip
 
 
-def judged(one: Case, answer: dict[str, Any]) -> Judged:
+def judged(one: Case, answer: dict[str, Any]) -> JudgedCase:
     return judge(one, answer, TRUE, lambda name: name == "artefact_sag")
 
 
@@ -153,13 +156,13 @@ def test_a_limit_is_kept_or_missed_where_the_whole_interval_says_so(
     count: int, of: int, standing: str, kept: bool
 ) -> None:
     """Two percent: the upper end of 0 of n is 1 − 0.025^(1/n), below it from 183 on; the lower one of 5 of 60 is 2.8 %."""
-    one, _ = accepted(alarms(count, of), ProveFacts())
+    one, _ = acceptance_figures(alarms(count, of), ProveFacts())
     assert (one.key, one.standing, one.kept) == ("false_alarms", standing, kept)
 
 
 def test_further_figures_are_asked_for_where_they_are_stated() -> None:
     facts = ProveFacts(wrong_names_pct=20.0, found_pct=90.0)
-    keys = {one.key: (one.low, one.high, one.rate.count) for one in accepted(whole(), facts)}
+    keys = {one.key: (one.low, one.high, one.rate.count) for one in acceptance_figures(whole(), facts)}
     assert keys["wrong_names"] == (0.0, 0.2, 2)
     assert keys["found"] == (0.9, 1.0, 3)
     assert keys["coverage"][:2] == (0.93, 0.97)

@@ -11,15 +11,15 @@ from typing import Any
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.laboratory.proving.running import RECORDS, Kept, Record, answered
-from cmm_uq.laboratory.proving.sealed import canonical
+from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, answer_tasks
+from cmm_uq.laboratory.proving.cases import canonical_json
 from tests.conftest import ROOT
 from tests.laboratory.proving.interrupted import PROGRAM, TASKS, TRUTH, main
 
 
 def answers(tasks: dict[int, Any], workers: int) -> dict[int, Record]:
     found: dict[int, Record] = {}
-    answered(PROGRAM, 0.0, tasks, workers, keep=lambda record: found.update({record["number"]: record}))
+    answer_tasks(PROGRAM, 0.0, tasks, workers, keep=lambda record: found.update({record["number"]: record}))
     return found
 
 
@@ -38,35 +38,35 @@ def test_a_run_that_was_killed_goes_on_with_every_answer_that_it_had(tmp_path: P
     main(folder, 0.0)
     after = records.read_bytes()
     assert after.startswith(before[: before.rindex(b"\n") + 1])
-    assert sorted(after.splitlines()) == sorted(canonical(record).strip() for record in answers(TASKS, 1).values())
+    assert sorted(after.splitlines()) == sorted(canonical_json(record).strip() for record in answers(TASKS, 1).values())
 
 
 def test_a_torn_line_is_dropped_and_asked_again(tmp_path: Path) -> None:
-    whole = canonical({"number": 0, "square": 0})
-    Kept(tmp_path, TRUTH).close()
+    whole = canonical_json({"number": 0, "square": 0})
+    AnswersFolder(tmp_path, TRUTH).close()
     (tmp_path / RECORDS).write_bytes(whole + b'{"number":1,"squ')
-    kept = Kept(tmp_path, TRUTH)
+    kept = AnswersFolder(tmp_path, TRUTH)
     assert list(kept.records) == [0]
     kept.keep({"number": 2, "square": 4})
     kept.close()
-    assert (tmp_path / RECORDS).read_bytes() == whole + canonical({"number": 2, "square": 4})
+    assert (tmp_path / RECORDS).read_bytes() == whole + canonical_json({"number": 2, "square": 4})
 
 
 def test_another_truth_is_refused_and_what_was_kept_stays(tmp_path: Path) -> None:
-    kept = Kept(tmp_path, TRUTH)
+    kept = AnswersFolder(tmp_path, TRUTH)
     kept.keep({"number": 0})
     kept.close()
     with pytest.raises(CmmUqError, match="another truth"):
-        Kept(tmp_path, b'{"run":2}\n')
-    assert (tmp_path / RECORDS).read_bytes() == canonical({"number": 0})
+        AnswersFolder(tmp_path, b'{"run":2}\n')
+    assert (tmp_path / RECORDS).read_bytes() == canonical_json({"number": 0})
 
 
 def test_two_at_once_are_refused(tmp_path: Path) -> None:
-    kept = Kept(tmp_path, TRUTH)
+    kept = AnswersFolder(tmp_path, TRUTH)
     with pytest.raises(CmmUqError, match="at work"):
-        Kept(tmp_path, TRUTH)
+        AnswersFolder(tmp_path, TRUTH)
     kept.close()
-    Kept(tmp_path, TRUTH).remove()
+    AnswersFolder(tmp_path, TRUTH).remove()
     assert not tmp_path.exists()
 
 

@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.planning.candidates import Elsewhere, Everywhere, Shape, along_lines
-from cmm_uq.analysis.planning.directions import words
-from cmm_uq.analysis.planning.patterns import length_of
-from cmm_uq.analysis.planning.placing import Pattern, Placing, along
-from cmm_uq.analysis.planning.ready import MIDDLE, check_allowed
+from cmm_uq.analysis.planning.candidates import (
+    MIDDLE,
+    PatternFor,
+    RelocatedCandidates,
+    VolumeCandidates,
+    along_lines,
+    check_allowed,
+)
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.screening import shape as screening
 from cmm_uq.base.files.table import Uncertainty
@@ -83,13 +87,13 @@ class TrackerLength(Artefact):
         return np.asarray(steps / np.linalg.norm(steps, axis=1, keepdims=True))
 
 
-def shape_of(facts: TrackerFacts, points: Points) -> screening.Shape | None:
+def shape_of(facts: TrackerFacts, points: Points) -> screening.ArtefactShape | None:
     """Pairs of points as far apart as the tracker says."""
     rows = screening.rows_by(points.group)
     if COLUMN not in points.columns or any(sorted(points.point[pair]) != [1, 2] for pair in rows):
         return None
     reference = points.columns[COLUMN][:, None]
-    return screening.Shape(rows, _misfit, np.nan, float(reference.max()), True, (COLUMN,), reference)
+    return screening.ArtefactShape(rows, _misfit, np.nan, float(reference.max()), True, (COLUMN,), reference)
 
 
 def _misfit(xyz: Floats, reference: Floats, _: float) -> Floats:
@@ -103,19 +107,19 @@ def pattern(length: float, repeats: int) -> Pattern:
     return one.repeated(repeats)
 
 
-def tracker_lines(setting: Setting) -> tuple[Placing, ...]:
+def tracker_lines(setting: Setting) -> tuple[SetUp, ...]:
     """Three axes, six face diagonals and four space diagonals through the middle of the volume."""
-    length, repeats, found = length_of(setting.artefact, setting.plan), setting.plan.repeats, []
+    length, repeats, found = planned_length(setting.artefact, setting.plan), setting.plan.repeats, []
     signs = [(x, y, z) for x in (0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) > (0, 0, 0)]
     for direction in np.array(signs, dtype=np.float64):
         check_allowed(setting, direction)
-        attitude = along(direction)
-        found.append(setting.volume.set_up(pattern(length, repeats), attitude, MIDDLE, words(direction)))
+        attitude = attitude_along(direction)
+        found.append(setting.volume.set_up(pattern(length, repeats), attitude, MIDDLE, direction_words(direction)))
     return tuple(found)
 
 
-def _shape(setting: Setting) -> Shape:
-    return lambda attitude: pattern(length_of(setting.artefact, setting.plan), setting.plan.repeats)
+def _shape(setting: Setting) -> PatternFor:
+    return lambda attitude: pattern(planned_length(setting.artefact, setting.plan), setting.plan.repeats)
 
 
 def sections(result: Result) -> list[Section]:
@@ -135,7 +139,7 @@ def sections(result: Result) -> list[Section]:
     return [Section(say("Distances by laser tracker"), (Table(say("Distances"), columns, rows),))]
 
 
-_PLACES = Everywhere(along_lines, _shape, Elsewhere(along_lines))
+_PLACES = VolumeCandidates(along_lines, _shape, RelocatedCandidates(along_lines))
 
 KIND = Kind(
     name="tracker_length",

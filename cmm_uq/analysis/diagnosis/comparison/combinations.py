@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.prior import ALIKE, EFFECTS, Prior, with_two
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.analysis.diagnosis.comparison.prior import ALIKE, EFFECTS, CombinationPrior, with_two_more
 from cmm_uq.base.points import Floats, Ints
 
 MOST = 12
@@ -134,7 +134,9 @@ class Combinations:
         return odds
 
 
-def explore(comparison: Comparison, before: Combinations | None = None, changed: Key = frozenset()) -> Combinations:
+def explore(
+    comparison: CandidateComparison, before: Combinations | None = None, changed: Key = frozenset()
+) -> Combinations:
     """Follow the most probable combinations, level by level, then every exchange of one explanation of the best.
 
     Parameters
@@ -146,19 +148,19 @@ def explore(comparison: Comparison, before: Combinations | None = None, changed:
     found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
     # there may be more than were looked for; unknown functions may stand for several of them
     while len(found.counts) - 1 <= min(found.most_members, MOST - 2):
-        found = _explored(comparison, found, frozenset(), with_two(found.counts))
+        found = _explored(comparison, found, frozenset(), with_two_more(found.counts))
     return found
 
 
-def _counts(comparison: Comparison) -> tuple[float, ...]:
+def _counts(comparison: CandidateComparison) -> tuple[float, ...]:
     """Probability of none, one, two … known effects: of one more at least than are everywhere."""
     counts: tuple[float, ...] = EFFECTS
-    while len(counts) - 1 <= len(everywhere(comparison)):
-        counts = with_two(counts)
+    while len(counts) - 1 <= len(effects_of_every_machine(comparison)):
+        counts = with_two_more(counts)
     return counts
 
 
-def everywhere(comparison: Comparison) -> list[int]:
+def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
     """Effects that every machine has to some degree and this recording shows."""
     return [
         i for i in sorted(comparison.visible)
@@ -167,7 +169,7 @@ def everywhere(comparison: Comparison) -> list[int]:
 
 
 def _explored(
-    comparison: Comparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
+    comparison: CandidateComparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
 ) -> Combinations:
     """The same with so many known effects at the most."""
     known = (
@@ -178,16 +180,16 @@ def _explored(
     search = _Search(comparison, known, counts)
     search.climb(frozenset())
     # one of many coefficients can explain all of these at once, and then none of them is worth adding by itself
-    if together := search.with_more((), everywhere(comparison)):
+    if together := search.with_more((), effects_of_every_machine(comparison)):
         search.settle(together)
-        search.climb(keyed(together))
+        search.climb(key_of(together))
     exchanged: set[Key] = set()
     while (best := search.best()) not in exchanged:
         exchanged.add(best)
         for i in best:
             fewer = tuple(v for v in search.settled[best].versions if v.explanation != i)
             search.settle(fewer)
-            search.expand(keyed(fewer))
+            search.expand(key_of(fewer))
             for pair in search.pairs_like(i):
                 if not best & frozenset(pair):
                     search.settle(search.with_more(fewer, pair))
@@ -195,7 +197,7 @@ def _explored(
     return Combinations(comparison.explanations, search.settled, counts)
 
 
-def keyed(versions: Iterable[Version]) -> Key:
+def key_of(versions: Iterable[Version]) -> Key:
     """Which explanations these are versions of."""
     return frozenset(v.explanation for v in versions)
 
@@ -203,10 +205,12 @@ def keyed(versions: Iterable[Version]) -> Key:
 class _Search:
     """Combinations settled so far, and those that wait for it with an estimate of their posterior."""
 
-    def __init__(self, comparison: Comparison, known: Mapping[Key, Combination], counts: tuple[float, ...]) -> None:
+    def __init__(
+        self, comparison: CandidateComparison, known: Mapping[Key, Combination], counts: tuple[float, ...]
+    ) -> None:
         self.comparison = comparison
         self.known = known
-        self.prior = Prior(comparison.explanations, counts, comparison.visible)
+        self.prior = CombinationPrior(comparison.explanations, counts, comparison.visible)
         self.candidates = {i for i, e in enumerate(comparison.explanations) if e.kind in (EFFECT, UNKNOWN)}
         self.settled: dict[Key, Combination] = {}
         self._expanded: set[Key] = set()
@@ -307,7 +311,7 @@ class _Search:
 
     def settle(self, versions: tuple[Version, ...]) -> None:
         """Find the best sizes of a combination, and its evidence."""
-        key = keyed(versions)
+        key = key_of(versions)
         if key in self.known and key not in self.settled:
             self.settled[key] = self.known[key]
         if key not in self.settled:
@@ -329,7 +333,9 @@ class _Search:
         return any(self.comparison.explanations[i].kind == UNKNOWN for i in key)
 
 
-def log_evidence_together(comparison: Comparison, versions: Sequence[Version]) -> tuple[float, tuple[Version, ...]]:
+def log_evidence_together(
+    comparison: CandidateComparison, versions: Sequence[Version]
+) -> tuple[float, tuple[Version, ...]]:
     """Log evidence of explanations that hold together, and the best version of each.
 
     Exact for one; for several, the sizes and versions of each are summed with those of the others held at their best.

@@ -18,21 +18,28 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, special
 
-from cmm_uq.analysis.diagnosis.comparison.drawn import drawn, standing_of, widths
-from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
-from cmm_uq.analysis.diagnosis.comparison.given import Beside, Given
-from cmm_uq.analysis.diagnosis.comparison.precision import Precision, precisions
-from cmm_uq.analysis.diagnosis.comparison.quick import (
-    corrected,
+from cmm_uq.analysis.diagnosis.comparison.algebra import (
+    Precision,
     eigen,
     interpolated,
     log_sum,
     log_sum_in,
     log_sum_of_powers,
+    precisions,
     squared,
+    woodbury,
 )
-from cmm_uq.analysis.diagnosis.comparison.stack import AMPLITUDES, Group, Version, stacked
-from cmm_uq.analysis.diagnosis.noise import OFTEN, Kind, probable_tails
+from cmm_uq.analysis.diagnosis.comparison.conditional import (
+    AMPLITUDES,
+    ConditionedData,
+    Conditioning,
+    MemberGroup,
+    Version,
+    stack_members,
+)
+from cmm_uq.analysis.diagnosis.comparison.draws import draw_noise, order_and_side, tail_widths
+from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
+from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind, probable_tails
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.display import Display
 
@@ -53,7 +60,7 @@ _BLOCK, _COLUMNS = 150_000, 500
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class CandidateComparison:
     """Explanations against "nothing is missing".
 
     Parameters
@@ -72,7 +79,7 @@ class Comparison:
 
     observed: Floats
     baseline: Floats
-    kinds: Sequence[Kind]
+    kinds: Sequence[NoiseKind]
     sigma: Floats
     log_sigma: Floats
     explanations: Sequence[Explanation]
@@ -102,7 +109,7 @@ class Comparison:
 
     @cached_property
     def _standing(self) -> tuple[Ints, Floats]:
-        return standing_of(self.left, self._reached)
+        return order_and_side(self.left, self._reached)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -110,8 +117,8 @@ class Comparison:
         return int(len(self.observed) - self._reached.shape[1])
 
     @cached_property
-    def _stack(self) -> tuple[Floats, tuple[Group, ...]]:
-        return stacked(self.explanations, self.rest, self.noise_scale, self.least_noise, self.degrees_of_freedom)
+    def _stack(self) -> tuple[Floats, tuple[MemberGroup, ...]]:
+        return stack_members(self.explanations, self.rest, self.noise_scale, self.least_noise, self.degrees_of_freedom)
 
     @cached_property
     def _where(self) -> dict[tuple[int, int], slice]:
@@ -128,7 +135,7 @@ class Comparison:
         return frozenset(i for i, _ in self._where)
 
     def noise(
-        self, kind: Kind, random: np.random.Generator, sigma: Floats, heavy: NDArray[np.bool_] | None = None
+        self, kind: NoiseKind, random: np.random.Generator, sigma: Floats, heavy: NDArray[np.bool_] | None = None
     ) -> Floats:
         """What the baseline leaves (m, draws), mm, of noise of one kind.
 
@@ -141,8 +148,8 @@ class Comparison:
         """
         fine = kind.unrounded if self.display else None
         # of a stream of its own: the others stay as they are
-        wider = None if heavy is None else widths(random.spawn(1)[0], heavy, len(self.left))
-        found = drawn(fine or kind, random, len(sigma), self.noise_scale, self._standing, wider)
+        wider = None if heavy is None else tail_widths(random.spawn(1)[0], heavy, len(self.left))
+        found = draw_noise(fine or kind, random, len(sigma), self.noise_scale, self._standing, wider)
         if self.certified.size:
             found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
         if not (self.display and fine):
@@ -224,7 +231,7 @@ class Comparison:
         """Of a kind of noise, by its index."""
         return self._noises[kind]
 
-    def only(self, kinds: Sequence[int]) -> Comparison:
+    def only(self, kinds: Sequence[int]) -> CandidateComparison:
         """The same under some of the kinds of noise."""
         found = self.under([self.kinds[k] for k in kinds], self.left)
         index = list(kinds)
@@ -232,7 +239,7 @@ class Comparison:
         found.__dict__["_blocks"] = [blocks[index] for blocks in self._blocks]
         return found
 
-    def under(self, kinds: Sequence[Kind], left: Floats) -> Comparison:
+    def under(self, kinds: Sequence[NoiseKind], left: Floats) -> CandidateComparison:
         """The same candidates for what the baseline leaves (m,) of other observations, under other kinds of noise."""
         found = replace(self, observed=left, kinds=kinds)
         shared = {name: getattr(self, name) for name in ("_reached", "_stack", "_where", "_table", "visible")}
@@ -270,7 +277,7 @@ class Comparison:
             found[:, columns] = self.noise(self.kinds[g], random, self.sigma[size[columns]], heavy)
         return found
 
-    def heavy_tails(self, kind: Kind) -> float:
+    def heavy_tails(self, kind: NoiseKind) -> float:
         """Probability of heavy tails beside what a kind of noise is otherwise."""
         if kind.name == "tails":
             return 0.0
@@ -298,7 +305,7 @@ class Comparison:
         known = self._beside(left, given)
         return self._of_given(known), self._total(known, among)
 
-    def _total(self, known: Beside, among: Container[int] | None = None) -> Floats:
+    def _total(self, known: ConditionedData, among: Container[int] | None = None) -> Floats:
         """Log evidence (c, b) of each explanation, its versions and sizes summed."""
         total = np.full((len(self.explanations), known.squares.shape[1]), -np.inf)
         for group, each in self._each(known, among, sizes=False):
@@ -383,7 +390,7 @@ class Comparison:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
         return self._of_given(self._beside(left, given))
 
-    def _of_given(self, known: Beside) -> Floats:
+    def _of_given(self, known: ConditionedData) -> Floats:
         """Log evidence (b,) of what data are beside."""
         return log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
 
@@ -395,13 +402,13 @@ class Comparison:
 
     def each(
         self, data: Floats | None, given: Sequence[Version], among: Container[int] | None = None
-    ) -> Iterator[tuple[Group, Floats]]:
+    ) -> Iterator[tuple[MemberGroup, Floats]]:
         """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
         yield from self._each(self._beside(data, given), among)
 
     def _each(
-        self, known: Beside, among: Container[int] | None, *, sizes: bool = True
-    ) -> Iterator[tuple[Group, Floats]]:
+        self, known: ConditionedData, among: Container[int] | None, *, sizes: bool = True
+    ) -> Iterator[tuple[MemberGroup, Floats]]:
         """Log evidence (M, a, b) of members at every size, or (M, 1, b) of all sizes together, by groups."""
         groups, b = self._stack[1], known.squares.shape[1]
         parts = [group.part(among) for group in groups]
@@ -424,7 +431,7 @@ class Comparison:
                 )  # fmt: skip
             yield some, total
 
-    def _seen(self, known: Beside, group: Group, *, kept: bool) -> Floats:
+    def _seen(self, known: ConditionedData, group: MemberGroup, *, kept: bool) -> Floats:
         """Inner products (k, M, r, b + g) of members with data and what is given; ``kept``: of those that are kept."""
         kinds = len(known.squares)
         if kept:
@@ -439,7 +446,9 @@ class Comparison:
             found = found.transpose(1, 0, 2)
         return found.reshape(kinds, len(group.start), group.r, -1)
 
-    def _of_wide(self, known: Beside, group: Group, blocks: Floats, part: slice, seen: Floats) -> Floats | None:
+    def _of_wide(
+        self, known: ConditionedData, group: MemberGroup, blocks: Floats, part: slice, seen: Floats
+    ) -> Floats | None:
         """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``.
 
         The principal axes of the members by themselves, which are kept, are corrected for what is given.
@@ -452,7 +461,7 @@ class Comparison:
         strengths, turn = (axes[:, part] for axes in self._axes[group.r])
         variance = (group.amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
-        gains = corrected(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
+        gains = woodbury(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
         if gains is None:
             return None
         explained, log = gains
@@ -460,7 +469,7 @@ class Comparison:
         found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
         return log_sum_in(found, 0)[..., None]
 
-    def _under(self, known: Beside, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
+    def _under(self, known: ConditionedData, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
         """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
 
         Parameters
@@ -526,7 +535,7 @@ class Comparison:
         """Principal axes of the members of wide groups, by the number of their columns."""
         return {}
 
-    def _beside(self, data: Floats | None, given: Sequence[Version]) -> Beside:
+    def _beside(self, data: Floats | None, given: Sequence[Version]) -> ConditionedData:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
         if data is not None:
             return self._weigh(data, given)
@@ -540,19 +549,19 @@ class Comparison:
         return kept[key]
 
     @cached_property
-    def _besides(self) -> dict[frozenset[Version], Beside]:
+    def _besides(self) -> dict[frozenset[Version], ConditionedData]:
         """The recording beside what was given last: a search comes back to it within some steps."""
         return {}
 
-    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> Beside:
+    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> ConditionedData:
         own = data is None
         plain, weighed = (self.left[:, None], self._left_weighed) if data is None else (data, self._by_noise(data))
         log = np.array([noise.log for noise in self._noises])
         return self._given.beside(given, plain, weighed, log, own=own)
 
     @cached_property
-    def _given(self) -> Given:
-        return Given(self._stack[0], self._where, self._by_noise)
+    def _given(self) -> Conditioning:
+        return Conditioning(self._stack[0], self._where, self._by_noise)
 
     @cached_property
     def _left_with_all(self) -> Floats:

@@ -112,7 +112,7 @@ def effect_of(explanation: Explanation) -> Effect:
     return every()[explanation.name] if explanation.effect is None else explanation.effect
 
 
-def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
+def known_effects(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
     """Every effect of the catalogue that could act here and is not named in the model already.
 
     Parameters
@@ -123,7 +123,7 @@ def known(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> li
     """
     points = model.artefact.points.at(model.where(values))
     found = []
-    for effect in considered(model.artefact):
+    for effect in possible_effects(model.artefact):
         if effect.name in named or not effect.shown_in(points):
             continue
         if any(column not in points.columns for column in effect.columns):
@@ -155,7 +155,7 @@ def _reach(points: Points) -> float:
     return max(float(np.ptp(points.xyz[points.measurement == m], axis=0).max()) for m in np.unique(points.measurement))
 
 
-def considered(artefact: Artefact) -> Iterator[Effect]:
+def possible_effects(artefact: Artefact) -> Iterator[Effect]:
     """Every effect of the catalogue, and those faults of artefacts that this one can have."""
     for effect in every().values():
         if not effect.of_artefact:
@@ -183,26 +183,28 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
 
 
-def finer(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
+def refine(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
     """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
     effect = explanation.effect
     if effect is None:
         return explanation
     points = model.artefact.points.at(model.where(values))
     shaped = [i for i, member in enumerate(explanation.members) if member.shape]
-    even = dict(zip(shaped, evenly(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True))
+    even = dict(
+        zip(shaped, even_scale(effect, np.array([explanation.members[i].shape[0] for i in shaped])), strict=True)
+    )
     step = float(np.median(np.diff(np.sort(list(even.values())))))
     kept = list(explanation.members)
     for i in members:
         kept[i] = replace(kept[i], weight=kept[i].weight / len(_DIVIDED))
         for part in _DIVIDED:
             if part:
-                shape = (float(unevenly(effect, np.array(even[i] + part * step))),)
+                shape = (float(from_even_scale(effect, np.array(even[i] + part * step))),)
                 kept.append(Member(_seen(model, effect, points, shape, values), shape, kept[i].weight))
     return replace(explanation, members=tuple(kept))
 
 
-def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -> Explanation:
+def with_shorter_periods(model: MeasurementModel, values: Floats, explanation: Explanation) -> Explanation:
     """A periodic effect with the periods below those that are searched: between positions at equal distances they fit as well.
 
     Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
@@ -222,17 +224,17 @@ def shorter(model: MeasurementModel, values: Floats, explanation: Explanation) -
     return replace(explanation, members=(*explanation.members, *more))
 
 
-def evenly(effect: Effect, shape: Floats) -> Floats:
+def even_scale(effect: Effect, shape: Floats) -> Floats:
     """An effect's nonlinear parameter on the scale on which it is tried evenly: frequency for a period, else its logarithm."""
     return 1 / shape if effect.shape[0].period_along else np.log(shape)
 
 
-def unevenly(effect: Effect, value: Floats) -> Floats:
-    """What :func:`evenly` was given."""
+def from_even_scale(effect: Effect, value: Floats) -> Floats:
+    """What :func:`even_scale` was given."""
     return 1 / value if effect.shape[0].period_along else np.exp(value)
 
 
-def several(singles: Sequence[Explanation]) -> list[Explanation]:
+def effects_together(singles: Sequence[Explanation]) -> list[Explanation]:
     """All known effects of the machine at once, each as large as the others in the observations.
 
     It names none of them, but lets the lack-of-fit test see those that are visible together only.

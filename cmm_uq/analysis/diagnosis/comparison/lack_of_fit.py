@@ -1,20 +1,76 @@
-"""Whether anything is missing: the evidence of something over nothing, and how often nothing shows as much."""
+"""Whether anything is missing: the evidence of something over nothing, and how often nothing shows as much.
+
+Log odds under noise that may have heavy tails, of many data, each with tails of its own.
+
+Under Student's t an outlier counts little, and no explanation gains by bending towards one. Where tails are probable, draws of
+"nothing is missing" have outliers; odds under a normal distribution rise with these, and a test by them loses power. With one
+part of the probability the noise of each data is therefore the kind that is most probable for them, its independent part of
+Student's t in place of normal.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import comb
 
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.heavy_tails import tailed
 from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.analysis.diagnosis.noise import tail_precision, with_tails
 from cmm_uq.base.points import Floats
+
+_STEPS = 50
+"""Of reweighting: whatever weights it ends with, the evidence is not overstated."""
+
+_TINY = 1e-300
+
+_LEAST = 0.05
+"""Part of the evidence of nothing below which tails are left out: log odds would change by no more."""
+
+
+def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tuple[int, CandidateComparison]]:
+    """Columns of data for which heavy tails matter, each with its own comparison under them.
+
+    Parameters
+    ----------
+    normal : the candidates under kinds of noise that are normal.
+    data : (m, b) mm, of which the baseline has been taken.
+    """
+    often = normal.often_heavy
+    evidence = normal.of_nothing(data)
+    likeliest, total = evidence.argmax(axis=0), np.logaddexp.reduce(evidence, axis=0)
+    for g in np.unique(likeliest):
+        columns, kind = np.flatnonzero(likeliest == g), normal.kinds[g]
+        residuals = _residuals(normal, int(g), data[:, columns])
+        for j, residual in zip(columns.tolist(), residuals.T, strict=True):
+            # as probable as tails on all kinds: those on the others stand to the others as these do to this one
+            share = kind.probability * float(np.exp(total[j] - evidence[g, j]))
+            own = normal.under([with_tails(kind, residual, often * share)], data[:, j])
+            if own.log_evidence_of(())[0] > total[j] + np.log(_LEAST * (1 - often)):
+                yield j, own
+
+
+def _residuals(normal: CandidateComparison, g: int, data: Floats) -> Floats:
+    """Residuals (m, b) of Student's t over its standard deviation, under one kind of noise, its size as fits best.
+
+    Each step is least squares of pseudo-values, which never overshoots (Huber 1981, Robust Statistics, section 7.8).
+    """
+    noise, count = normal.precision(g), max(normal.degrees_of_freedom, 1)
+    white = noise.whitening @ data
+    fit, most = noise.explained(white), float(tail_precision(np.zeros(1))[0])
+    size = np.sqrt(np.sum((white - fit) ** 2, axis=0) / count)
+    for _ in range(_STEPS):
+        rest = white - fit
+        precision = tail_precision(rest / np.maximum(size, _TINY))
+        size = np.sqrt(np.sum(precision * rest**2, axis=0) / count)
+        fit = noise.explained(fit + precision / most * rest)
+    return np.asarray((white - fit) / np.maximum(size, _TINY), dtype=np.float64)
+
 
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
 """Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
@@ -44,7 +100,7 @@ def log_prior(candidates: Sequence[Explanation]) -> Floats:
     return np.log([SHARES[e.kind] * e.weight / total[e.kind] for e in candidates])
 
 
-def lack_of_fit(comparison: Comparison, seed: int, alpha: float | None = None) -> tuple[float, Floats, Floats]:
+def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None = None) -> tuple[float, Floats, Floats]:
     """Probability, under nothing, of as much evidence for something.
 
     Also what is drawn under nothing: the statistic, and the largest log evidence of a nonparametric term.
@@ -66,7 +122,7 @@ def lack_of_fit(comparison: Comparison, seed: int, alpha: float | None = None) -
     return p_value, statistic[1:], maxima
 
 
-def _nearer(comparison: Comparison, draws: Floats, random: np.random.Generator, alpha: float) -> float:
+def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Generator, alpha: float) -> float:
     """The same probability by odds that reckon with heavy tails, from as many draws as say on which side of the rate it is.
 
     However many there are, as many make the tail, so that ever less of it is extrapolated.
@@ -86,7 +142,7 @@ def _nearer(comparison: Comparison, draws: Floats, random: np.random.Generator, 
         found = np.append(found, robust_statistic_of(normal, more, least))
 
 
-def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
+def statistic_of(comparison: CandidateComparison, data: Floats) -> tuple[Floats, Floats]:
     """Log odds (b,) of something for data (m', b): one explanation, or the best known effect with any other.
 
     Also the log evidence (c, b) of each explanation over nothing.
@@ -95,7 +151,7 @@ def statistic_of(comparison: Comparison, data: Floats) -> tuple[Floats, Floats]:
     return found.log_odds(), found.something - found.nothing
 
 
-def robust_statistic_of(normal: Comparison, data: Floats, least: float) -> Floats:
+def robust_statistic_of(normal: CandidateComparison, data: Floats, least: float) -> Floats:
     """Log odds (b,) as :func:`statistic_of` has them, the noise of each data having heavy tails as that is probable.
 
     Parameters
@@ -109,7 +165,7 @@ def robust_statistic_of(normal: Comparison, data: Floats, least: float) -> Float
     if not often or not len(high):
         return found.log_odds()
     found.share(1 - often)
-    for at, own in tailed(normal, data[:, high]):
+    for at, own in under_heavy_tails(normal, data[:, high]):
         j = int(high[at])
         found.add(j, _Evidence.of(own, data[:, [j]], None if found.lead is None else [found.lead[j]]))
     return found.log_odds()
@@ -138,7 +194,7 @@ class _Evidence:
 
     @classmethod
     def of(
-        cls, comparison: Comparison, data: Floats, lead: list[Version] | None = None
+        cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None
     ) -> _Evidence:  # fmt: skip
         """Of data (m', b), beside a leading effect or the best."""
         nothing, something = comparison.log_evidence(data)

@@ -12,8 +12,8 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 from scipy import special
 
+from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.stack import AMPLITUDES
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.catalogue import every
 
@@ -39,12 +39,12 @@ _NARROWER = float(np.log(AMPLITUDES / 3))
 """By how much each further one is more probable at its size: three of the sizes that are tried lie so near the first."""
 
 
-def with_two(counts: tuple[float, ...]) -> tuple[float, ...]:
+def with_two_more(counts: tuple[float, ...]) -> tuple[float, ...]:
     """Probabilities of none, one, two … known effects, continued by two more."""
     return (*counts, counts[-1] * FURTHER, counts[-1] * FURTHER**2)
 
 
-class Prior:
+class CombinationPrior:
     """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights.
 
     Parameters

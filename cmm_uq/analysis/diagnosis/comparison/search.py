@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import (
     EFFECT,
     UNKNOWN,
     Explanation,
     Member,
-    finer,
-    known,
-    several,
-    shorter,
+    effects_together,
+    known_effects,
+    refine,
+    with_shorter_periods,
 )
+from cmm_uq.analysis.diagnosis.comparison.functions import unknown_functions
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fit, log_prior
-from cmm_uq.analysis.diagnosis.comparison.stack import AMPLITUDES, Version
-from cmm_uq.analysis.diagnosis.comparison.unknown_functions import unknown
 from cmm_uq.analysis.diagnosis.noise import sigma_grid
-from cmm_uq.analysis.diagnosis.recorded_noise import noise_kinds
+from cmm_uq.analysis.diagnosis.noise_shapes import noise_kinds
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import SMALL_LEAN
@@ -86,7 +86,7 @@ class ModelComparison:
 
     model: MeasurementModel
     values: Floats
-    comparison: Comparison
+    comparison: CandidateComparison
     log_odds: Floats
     probability: Floats
     p_value: float
@@ -100,7 +100,7 @@ class ModelComparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SearchResult:
     """What a search ends with.
 
     Parameters
@@ -117,7 +117,7 @@ class Found:
     """
 
     first: ModelComparison
-    last: Comparison
+    last: CandidateComparison
     combinations: Combinations | None
     chosen: Key
     versions: tuple[Version, ...]
@@ -132,7 +132,7 @@ class Found:
         return tuple(self.first.explanations[i].name for i in sorted(self.chosen))
 
 
-def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed: int) -> Found:
+def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed: int) -> SearchResult:
     """Find what a model leaves out.
 
     Squarenesses that are found so large that the model bends are modelled, and everything is compared again about them: else
@@ -168,10 +168,10 @@ def _without(model: MeasurementModel, whole: MeasurementModel) -> Floats:
     return np.array([own.get(unknown.key, 0.0) for unknown in whole.unknowns])
 
 
-def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> Found:
+def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> SearchResult:
     first = model_comparison(model, stated, seed, alpha)
     if first.p_value >= alpha:
-        return Found(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
+        return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
     combinations = explore(first.comparison)
     if shaped := _shaped(combinations):
         explanations = [
@@ -180,11 +180,11 @@ def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: i
         first = replace(first, comparison=replace(first.comparison, explanations=explanations))
         combinations = explore(first.comparison, combinations, frozenset(shaped))
     combinations = replace(combinations, imitated=_imitated(first.comparison, combinations))
-    chosen = asserted(combinations)
+    chosen = effects_to_assert(combinations)
     return _of(first, combinations, chosen, stated)
 
 
-def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> Found:
+def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> SearchResult:
     """What a search ends with where these effects are found."""
     versions = combinations.versions(chosen)
     found = first.model if not chosen else with_effects(first, versions, chosen)
@@ -193,10 +193,10 @@ def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated:
         i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
     )
     beside = combinations.unknown_beside(chosen)
-    return Found(first, last, combinations, chosen, versions, found, beside, rough, stated)
+    return SearchResult(first, last, combinations, chosen, versions, found, beside, rough, stated)
 
 
-def without(found: Found, gone: Key) -> Found:
+def withhold(found: SearchResult, gone: Key) -> SearchResult:
     """The same search with some of the effects not asserted: what they stood for stays unexplained."""
     chosen = found.chosen - gone
     combinations = found.combinations
@@ -210,7 +210,7 @@ def without(found: Found, gone: Key) -> Found:
     )
 
 
-def in_place_of(found: Found, index: int, tried: Key) -> tuple[Found, int] | None:
+def substitute(found: SearchResult, index: int, tried: Key) -> tuple[SearchResult, int] | None:
     """The same search with the next most probable in the place of an effect, and which that is; ``None`` where none may be.
 
     It is one that these data cannot tell from it, is probable enough to be named, and has with all such one half, as any.
@@ -228,13 +228,13 @@ def in_place_of(found: Found, index: int, tried: Key) -> tuple[Found, int] | Non
         chosen = found.chosen - {index} | {other}
         if chosen not in combinations.of_effects or found.first.explanations[other].shaped:
             continue
-        if combinations.of(other) >= _MECHANISM and with_rivals(combinations, chosen, other) >= ASSERTED:
+        if combinations.of(other) >= _MECHANISM and probability_with_rivals(combinations, chosen, other) >= ASSERTED:
             instead = _of(found.first, combinations, chosen, found.stated)
             return replace(instead, unexplained=max(instead.unexplained, found.unexplained)), other
     return None
 
 
-def _rough(comparison: Comparison, versions: Sequence[Version], index: int) -> float:
+def _rough(comparison: CandidateComparison, versions: Sequence[Version], index: int) -> float:
     """Probability that an effect, beside the others, has another form than its own."""
     members = comparison.explanations[index].members
     evidence = np.full(len(members), -np.inf)
@@ -264,13 +264,13 @@ def _refined(first: ModelComparison, combinations: Combinations, index: int) -> 
     gains = _gains(first, explanation, others)
     shows = bool(gains.max() > _SHOWN)
     if shows:
-        explanation = shorter(first.model, first.values, explanation)
+        explanation = with_shorter_periods(first.model, first.values, explanation)
         gains = _gains(first, explanation, others)
     below = gains.max() - gains
     shaped = np.array([bool(member.shape) for member in explanation.members])
     between = _BETWEEN * max(float(gains.max()), 0.0) + 1.0
     fits = [int(i) for i in np.argsort(below) if shaped[i] and below[i] < between][: None if shows else _FEW]
-    refined = finer(first.model, first.values, explanation, fits)
+    refined = refine(first.model, first.values, explanation, fits)
     # what does not fit at all keeps its weight, and costs nothing: columns of zeros are invisible
     lost = set(np.flatnonzero(shaped & (below > max(_IMPROBABLE, between))).tolist())
     weight = sum(explanation.members[i].weight for i in lost)
@@ -291,12 +291,16 @@ def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Ve
     return np.asarray(evidence - comparison.log_evidence_of(given)[0], dtype=np.float64)
 
 
-def asserted(combinations: Combinations) -> Key:
+def effects_to_assert(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = combinations.most_probable
     if not chosen:
         return _in_place_of_functions(combinations)
-    doubtful = [i for i in chosen if combinations.of(i) < ASSERTED and with_rivals(combinations, chosen, i) < ASSERTED]
+    doubtful = [
+        i
+        for i in chosen
+        if combinations.of(i) < ASSERTED and probability_with_rivals(combinations, chosen, i) < ASSERTED
+    ]
     return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
 
 
@@ -318,7 +322,7 @@ def _in_place_of_functions(combinations: Combinations) -> Key:
     return found
 
 
-def _imitated(comparison: Comparison, combinations: Combinations) -> dict[int, Key]:
+def _imitated(comparison: CandidateComparison, combinations: Combinations) -> dict[int, Key]:
     """Of each effect that may be asserted, the probable functions that leave next to nothing of it."""
     probable = [i for i in range(len(combinations.explanations)) if combinations.of(i) > _PROBABLE]
     kinds = {kind: [i for i in probable if combinations.explanations[i].kind == kind] for kind in (EFFECT, UNKNOWN)}
@@ -356,7 +360,7 @@ def _less_than_function(combinations: Combinations, index: int) -> bool:
     return any(combinations.of(j) > combinations.of(index) for j in combinations.imitating(index))
 
 
-def with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
+def probability_with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
     """Probability of an effect or one that these data cannot tell from it."""
     return combinations.of_any(rivals_of(combinations, chosen, index) | {index})
 
@@ -377,10 +381,10 @@ def model_comparison(
     alpha : false-alarm rate near which the p-value is found more closely.
     """
     values = model.estimate().about
-    singles = known(model, values, tuple(effect.name for effect in model.effects))
+    singles = known_effects(model, values, tuple(effect.name for effect in model.effects))
     known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
-    functions = [function for function in unknown(model, values) if function.term not in known_as]
-    candidates = singles + several(singles) + functions
+    functions = [function for function in unknown_functions(model, values) if function.term not in known_as]
+    candidates = singles + effects_together(singles) + functions
     comparison = comparison_of(model, stated, candidates)
     nothing, something = comparison.log_evidence()
     log_odds = something[:, 0] - nothing[0]
@@ -391,7 +395,9 @@ def model_comparison(
     return ModelComparison(model, values, comparison, log_odds, probability, p_value, null, maxima)
 
 
-def comparison_of(model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]) -> Comparison:
+def comparison_of(
+    model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]
+) -> CandidateComparison:
     """Candidates, possibly none, against what a model leaves."""
     estimate = model.estimate()
     linear = estimate.linear
@@ -399,7 +405,7 @@ def comparison_of(model: MeasurementModel, stated: float | None, candidates: Seq
     sigma, log_sigma = sigma_grid(stated, sigma_left, model.least_noise)
     held = _held(model)
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
-    return Comparison(
+    return CandidateComparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.freedoms.dense()]) / linear.noise_scale[:, None],
         noise_kinds(model, candidates), sigma, log_sigma, candidates, linear.noise_scale,
         max(stated or sigma_left / _MISFIT, model.least_noise), _certified(model, max(sigma_left, model.least_noise)),

@@ -271,8 +271,8 @@ def _tables(kind: Kind, begin: Beginning, given: Tables, id: str, origin: Origin
 
 def _drawn(job: Job, kind: Kind, begin: Beginning) -> Points:
     """Readings at the kind's set-ups: noise alone, of a machine without errors."""
-    from cmm_uq.analysis.planning.placing import joined
-    from cmm_uq.analysis.planning.ready import ready_plan
+    from cmm_uq.analysis.planning.candidates import ready_plan
+    from cmm_uq.analysis.planning.set_up import join as joined
     from cmm_uq.analysis.planning.setting import Setting
 
     if begin.points is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import POWER, SIZES
-from cmm_uq.analysis.planning.repeats import Repeated
+from cmm_uq.analysis.planning.expected import RepeatsRow
 from cmm_uq.app.commands.plans.planning import RECORDED, Plan
 from cmm_uq.app.commands.plans.words import (
     CRITERIA,
@@ -156,7 +156,7 @@ def _pair(one: float, other: float, form: str) -> Text:
     return say("{one} ({other})", one=number(one, form), other=number(other, form))
 
 
-def _figure(unknown: Unknown, row: Repeated, i: int) -> Text:
+def _figure(unknown: Unknown, row: RepeatsRow, i: int) -> Text:
     if not np.isfinite(row.u[i]):
         return DASH
     unit = MICROMETRE if unknown.unit == "mm" else 1.0
@@ -171,7 +171,7 @@ def worth_data(plan: Plan) -> dict[str, Any] | None:
     return {"from_repeats": plan.worth.enough, "rows": [_row_data(plan.worth.unknowns, row) for row in plan.worth.rows]}
 
 
-def _row_data(unknowns: Sequence[Unknown], row: Repeated) -> dict[str, Any]:
+def _row_data(unknowns: Sequence[Unknown], row: RepeatsRow) -> dict[str, Any]:
     more = {"readings": row.readings_more, "minutes": row.minutes_more, "u": _by_name(unknowns, row.u_more)}
     return {
         "repeats": row.repeats, "readings": row.readings, "minutes": row.minutes, "u": _by_name(unknowns, row.u),

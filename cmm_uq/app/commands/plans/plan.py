@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.analysis.planning.identifiability import Identifiability
-from cmm_uq.analysis.planning.placing import joined
+from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
 from cmm_uq.app.commands.plans.page import noise_data, placing_rows, to_measure_words, worth_data
 from cmm_uq.app.commands.plans.planning import Outlook, Plan
@@ -96,7 +96,7 @@ def recording_to_be(plan: Plan) -> bytes:
     from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
     wishes = plan.setting.plan
-    points = joined(
+    points = join(
         plan.to_measure, seconds_per_point=wishes.seconds_per_point, minutes_per_placing=wishes.minutes_per_placing,
         first=plan.first,
     )  # fmt: skip

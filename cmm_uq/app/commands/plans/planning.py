@@ -12,14 +12,13 @@ from cmm_uq.analysis.conformity.plans import READY, Condition
 from cmm_uq.analysis.conformity.standards import standard_named
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import DrawnNoise, Power, powers, without_fault
-from cmm_uq.analysis.planning.candidates import candidates, thinned
+from cmm_uq.analysis.planning.candidates import candidates, ready_plan, thinned
 from cmm_uq.analysis.planning.exchange import choose, score_of
+from cmm_uq.analysis.planning.expected import RepeatsComparison, compare_repeats
 from cmm_uq.analysis.planning.identifiability import Identifiability, identifiability
-from cmm_uq.analysis.planning.information import told, whole
+from cmm_uq.analysis.planning.information import recording_information, set_up_information
 from cmm_uq.analysis.planning.noise import PlannedNoise, white_noise
-from cmm_uq.analysis.planning.placing import Placing, appended, joined, split
-from cmm_uq.analysis.planning.ready import ready_plan
-from cmm_uq.analysis.planning.repeats import Worth, worth_of_repeats
+from cmm_uq.analysis.planning.set_up import SetUp, append, join, split
 from cmm_uq.analysis.planning.setting import Setting, Start
 from cmm_uq.app.commands.model import OVERFLOW_FIX, refuse_planned, refuse_unfit
 from cmm_uq.artefacts import kind_of
@@ -63,8 +62,8 @@ def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded
 
 
 def completing(
-    job: Job, setting: Setting, recorded: Points, after: Callable[[Sequence[Placing]], Points]
-) -> tuple[Placing, ...]:  # fmt: skip
+    job: Job, setting: Setting, recorded: Points, after: Callable[[Sequence[SetUp]], Points]
+) -> tuple[SetUp, ...]:  # fmt: skip
     """Placings of the usual ready plan of which each supplies something that the standards' tests still lack.
 
     Parameters
@@ -85,7 +84,7 @@ def completing(
         _, possible = ready_plan(setting)
     except CmmUqError:
         return ()
-    added: list[Placing] = []
+    added: list[SetUp] = []
     for placing in possible:
         left = lacking(after([*added, placing]))
         if left < least:
@@ -122,7 +121,7 @@ class Outlook:
         and for placings that give way to others by a criterion which does not part effects.
     """
 
-    placings: tuple[Placing, ...]
+    placings: tuple[SetUp, ...]
     points: Points
     identifiability: Identifiability | None
     powers: tuple[Power, ...]
@@ -155,7 +154,7 @@ class Plan:
     scores: tuple[float, float] | None
     conditions: tuple[Condition, ...]
     free: tuple[Text, ...] = ()
-    worth: Worth | None = None
+    worth: RepeatsComparison | None = None
 
     @property
     def outlook(self) -> Outlook:
@@ -173,7 +172,7 @@ class Plan:
         return int(self.job.points.measurement.max()) + 1 if self.name == RECORDED else 1
 
     @property
-    def to_measure(self) -> tuple[Placing, ...]:
+    def to_measure(self) -> tuple[SetUp, ...]:
         """Placings that are still to be measured."""
         return self.outlook.placings[self.measured :]
 
@@ -183,7 +182,7 @@ class Plan:
         return tuple(minutes(self.setting, placing) for placing in self.to_measure)
 
 
-def minutes(setting: Setting, placing: Placing) -> float:
+def minutes(setting: Setting, placing: SetUp) -> float:
     """Time that a placing takes, min."""
     return setting.plan.minutes_per_placing + setting.plan.seconds_per_point * len(placing.points) / 60
 
@@ -228,7 +227,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     final = start if better is None else better
     recorded = len(start.points) if name == RECORDED else 0
     met = of_standards(job, setting, name, final.points, recorded) + _in_time(setting, name, placings)
-    worth = None if name == RECORDED else worth_of_repeats(setting, final.placings)
+    worth = None if name == RECORDED else compare_repeats(setting, final.placings)
     return Plan(job, setting, name, start, better, kept, scores, met, worth=worth)
 
 
@@ -252,7 +251,7 @@ def _part(tell: Progress, low: float, high: float) -> Callable[[int, int], None]
     return lambda count, total: tell(f"{what} {count} of {total}", low + (high - low) * count / total)
 
 
-def _start(job: Job, setting: Setting) -> tuple[Text, tuple[Placing, ...], Points]:
+def _start(job: Job, setting: Setting) -> tuple[Text, tuple[SetUp, ...], Points]:
     if len(job.points):
         points = job.points.select(~np.isin(job.points.measurement, job.facts.recording.measurements_aside))
         return RECORDED, split(points, lambda n: say("recorded as measurement {n}", n=n)), points
@@ -267,26 +266,26 @@ def _start(job: Job, setting: Setting) -> tuple[Text, tuple[Placing, ...], Point
     return name, placings, _joined(setting, placings)
 
 
-def _joined(setting: Setting, placings: Sequence[Placing]) -> Points:
+def _joined(setting: Setting, placings: Sequence[SetUp]) -> Points:
     plan = setting.plan
-    return joined(
+    return join(
         placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
         columns=plan.columns,
     )  # fmt: skip
 
 
-def _after(setting: Setting, recorded: Points, added: Sequence[Placing]) -> Points:
+def _after(setting: Setting, recorded: Points, added: Sequence[SetUp]) -> Points:
     """A recording and further placings, what else was recorded being at its mean there."""
     points = _joined(setting, added)
     places = split(replace(points, columns={
         name: points.columns.get(name, np.full(len(points), float(values.mean())))
         for name, values in recorded.columns.items()
     }))  # fmt: skip
-    return appended(recorded, places)
+    return append(recorded, places)
 
 
 def _outlook(
-    setting: Setting, placings: tuple[Placing, ...], points: Points, rivals: tuple[Effect, ...], power: bool, seed: int,
+    setting: Setting, placings: tuple[SetUp, ...], points: Points, rivals: tuple[Effect, ...], power: bool, seed: int,
     tell: Callable[[int, int], None],
 ) -> Outlook:  # fmt: skip
     model = setting.model(points)
@@ -313,7 +312,7 @@ def _drawn(model: MeasurementModel, noise: PlannedNoise) -> DrawnNoise:
 
 def _searched(
     setting: Setting, start: Outlook, rivals: tuple[Effect, ...], name: str
-) -> tuple[tuple[Placing, ...] | None, int, tuple[float, float] | None]:
+) -> tuple[tuple[SetUp, ...] | None, int, tuple[float, float] | None]:
     """All placings of the better plan, how many of them were there before, and the criterion before and after."""
     plan = setting.plan
     if plan.criterion is None:
@@ -321,8 +320,8 @@ def _searched(
     keep = plan.more is not None or name == RECORDED
     kept = start.placings if keep else ()
     possible = _possible(setting, start, name)
-    known = told(setting, possible, rivals)
-    existing = known.prior + whole(setting, start.points, rivals)
+    known = set_up_information(setting, possible, rivals)
+    existing = known.prior + recording_information(setting, start.points, rivals)
     wanted = known.where(rivals) if plan.criterion == "separation" else known.where(setting.named)
     wanted = _seen(wanted, known.each.sum(axis=0) + existing)
     if not wanted:
@@ -342,13 +341,13 @@ def _seen(rows: list[int], information: Floats) -> list[int]:
     return [i for i in rows if size[i] > 1e-12 * size.max()]
 
 
-def _possible(setting: Setting, start: Outlook, name: str) -> tuple[Placing, ...]:
+def _possible(setting: Setting, start: Outlook, name: str) -> tuple[SetUp, ...]:
     """Candidates, of a recording those of its first placing."""
     artefact = setting.model(start.points).artefact
     return candidates(setting, Start(artefact, start.placings[0] if name == RECORDED else None))
 
 
-def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept: Sequence[Placing]) -> int:
+def _affordable(setting: Setting, count: int, possible: Sequence[SetUp], kept: Sequence[SetUp]) -> int:
     """At most as many as there is time for beside those that are kept."""
     budget = setting.plan.budget_min
     if budget is None:
@@ -362,7 +361,7 @@ def _affordable(setting: Setting, count: int, possible: Sequence[Placing], kept:
     return min(count, int(left / each))
 
 
-def _in_time(setting: Setting, name: str, placings: Sequence[Placing]) -> tuple[Condition, ...]:
+def _in_time(setting: Setting, name: str, placings: Sequence[SetUp]) -> tuple[Condition, ...]:
     budget = setting.plan.budget_min
     if budget is None or name == RECORDED:
         return ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cmm_uq.analysis.planning.identifiability import Determined, Identifiability
+from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
 from cmm_uq.app.commands.plans.planning import RECORDED, Plan
 from cmm_uq.base.messages import DASH, Message, Text, Verbatim, listed, number, say
 from cmm_uq.base.units import MICROMETRE, unit
@@ -71,21 +71,21 @@ def _family(members: Sequence[Text]) -> Text:
     return Message(first.pattern, {**first.arguments, name: merged})
 
 
-def expected(parameter: Determined) -> Text:
+def expected(parameter: Determination) -> Text:
     """Expected standard uncertainty, in the unit of :func:`unit_of`."""
     return _in_its_unit(parameter, parameter.u)
 
 
-def expected_white(parameter: Determined) -> Text:
+def expected_white(parameter: Determination) -> Text:
     """The same, if the noise were white."""
     return _in_its_unit(parameter, parameter.u_white)
 
 
-def _in_its_unit(parameter: Determined, u: float | None) -> Text:
+def _in_its_unit(parameter: Determination, u: float | None) -> Text:
     return DASH if u is None else number(u / (MICROMETRE if parameter.unknown.unit == "mm" else 1.0), ".2g")
 
 
-def unit_of(parameter: Determined) -> Text:
+def unit_of(parameter: Determination) -> Text:
     """Unit of an expected uncertainty: sizes of the artefact in micrometres."""
     return parameter_unit(parameter.unknown)
 
@@ -108,7 +108,7 @@ def _size_words(name: str) -> Text:
     return Verbatim(plain.replace("_", " "))
 
 
-def named(parameter: Determined) -> Text:
+def named(parameter: Determination) -> Text:
     """A parameter in words."""
     return parameter_name(parameter.unknown)
 

@@ -9,16 +9,11 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.analysis.diagnosis.comparison.combinations import (
-    Combination,
-    Combinations,
-    explore,
-    log_evidence_together,
-)
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations, explore, log_evidence_together
+from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
-from cmm_uq.analysis.diagnosis.comparison.stack import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.noise import sigma_grid
 from cmm_uq.base.points import Floats
 from tests.analysis.diagnosis.dense_noise import covariance, rest, some_kinds
@@ -32,18 +27,20 @@ def rivals(random: np.random.Generator, effects: int = 8) -> list[Explanation]:
     return [*known, strange]
 
 
-def comparison(observed: Floats, explanations: list[Explanation]) -> Comparison:
+def comparison(observed: Floats, explanations: list[Explanation]) -> CandidateComparison:
     noise = some_kinds(np.full(M, np.sqrt(2)))
     sigma, log_sigma = sigma_grid(0.01, 0.02)
-    return Comparison(observed, np.ones((M, 1)), noise, sigma, log_sigma, explanations, np.full(M, np.sqrt(2)), 0.01)
+    return CandidateComparison(
+        observed, np.ones((M, 1)), noise, sigma, log_sigma, explanations, np.full(M, np.sqrt(2)), 0.01
+    )
 
 
-def amplitudes(c: Comparison, member: Member) -> Floats:
+def amplitudes(c: CandidateComparison, member: Member) -> Floats:
     F = rest(c).T @ (member.columns / c.noise_scale[:, None])
     return np.geomspace(1 / c.least_noise, min(0.4 / np.sqrt(np.sum(F**2) / len(F)), 1 / c.least_noise), AMPLITUDES)
 
 
-def direct(c: Comparison, chosen: tuple[int, ...]) -> float:
+def direct(c: CandidateComparison, chosen: tuple[int, ...]) -> float:
     """Sum over noise and the sizes of all explanations together, each a multivariate normal density."""
     members = [c.explanations[i].members[0] for i in chosen]
     grids = [amplitudes(c, member) for member in members]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.diagnosis.comparison.drawn import DEGREES, drawn, standing_of, widths
+from cmm_uq.analysis.diagnosis.comparison.draws import DEGREES, draw_noise, order_and_side, tail_widths
 from cmm_uq.artefacts.error_maps.noise import kinds_along
 from cmm_uq.base.points import Floats
 
@@ -27,7 +27,7 @@ def test_readings_that_follow_each_other_are_drawn_with_their_correlation(phi: f
     kind = kinds_along(chain, 0.5, (phi,))[1]
     left = np.random.default_rng(8).standard_normal(12)
     random: Any = Unit()
-    root = drawn(kind, random, 12, np.ones(12), standing_of(left, np.zeros((12, 0))))
+    root = draw_noise(kind, random, 12, np.ones(12), order_and_side(left, np.zeros((12, 0))))
     apart = np.abs(np.arange(6)[:, None] - np.arange(6))
     wanted = np.kron(np.eye(2), phi**apart)
     np.testing.assert_allclose(root @ root.T, wanted, atol=1e-12)
@@ -40,7 +40,7 @@ def test_exchanged_and_mirrored_readings_have_the_same_noise() -> None:
 
     def of(values: Floats) -> Floats:
         random = np.random.default_rng(1)
-        return drawn(kind, random, 5, np.ones(8), standing_of(values, np.zeros((8, 0))))
+        return draw_noise(kind, random, 5, np.ones(8), order_and_side(values, np.zeros((8, 0))))
 
     np.testing.assert_allclose(of((side * left)[order]), (side[:, None] * of(left))[order], atol=1e-12)
 
@@ -49,7 +49,7 @@ def test_heavy_draws_are_of_student_s_t_with_the_variance_of_the_others() -> Non
     """Each draw has one number of degrees of freedom, so that every column is of scipy's t, over its standard deviation."""
     random = np.random.default_rng(10)
     heavy = np.arange(60) % 3 != 0
-    wider = widths(random, heavy, 4000)
+    wider = tail_widths(random, heavy, 4000)
     assert np.all(wider[:, ~heavy] == 1)
     found = wider * random.standard_normal(wider.shape)
     by_degrees = [

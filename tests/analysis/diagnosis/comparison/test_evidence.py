@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
-from cmm_uq.analysis.diagnosis.noise import TAILS, probable_tails, shape_of, sigma_grid, tails
-from cmm_uq.analysis.diagnosis.shapes import drawn_shapes, kinds
+from cmm_uq.analysis.diagnosis.noise import TAILS, heavy_tails, probable_tails, shape_of, sigma_grid
+from cmm_uq.analysis.diagnosis.noise_shapes import drawn_shapes, representative_kinds
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model.display import Display
@@ -23,7 +23,7 @@ from cmm_uq.maths.inference.noise import Sizes, slow_variances
 from tests.analysis.diagnosis.dense_noise import PROBABILITY, covariance, paired, rest, some_kinds
 
 
-def comparison(seed: int = 1) -> Comparison:
+def comparison(seed: int = 1) -> CandidateComparison:
     random = np.random.default_rng(seed)
     m = 14
     rivals = [
@@ -33,10 +33,10 @@ def comparison(seed: int = 1) -> Comparison:
     noise = some_kinds(np.full(m, 1.4))
     sigma, log_sigma = sigma_grid(None, 0.08)
     observed, baseline = 0.05 * random.standard_normal(m), random.standard_normal((m, 2))
-    return Comparison(observed, baseline, noise, sigma, log_sigma, rivals, np.full(m, 1.4), 0.01)
+    return CandidateComparison(observed, baseline, noise, sigma, log_sigma, rivals, np.full(m, 1.4), 0.01)
 
 
-def direct(c: Comparison, members: tuple[Member, ...] | None) -> float:
+def direct(c: CandidateComparison, members: tuple[Member, ...] | None) -> float:
     """Sum over noise, amplitude and version of the density of what the baseline leaves."""
     total, Q = [], rest(c)
     for kind in c.kinds:
@@ -48,7 +48,7 @@ def direct(c: Comparison, members: tuple[Member, ...] | None) -> float:
     return float(special.logsumexp(total)) + 0.5 * Q.shape[1] * np.log(2 * np.pi)
 
 
-def _signals(c: Comparison, members: tuple[Member, ...] | None) -> list[tuple[Floats, float]]:
+def _signals(c: CandidateComparison, members: tuple[Member, ...] | None) -> list[tuple[Floats, float]]:
     """Covariances of the signal over the variance of the noise, with their probabilities."""
     Q, signals = rest(c), []
     if members is None:
@@ -87,7 +87,7 @@ def test_the_evidence_of_many_recordings_is_that_of_each_by_itself(stated: float
             np.testing.assert_allclose(something[:, i], each[:, 0], rtol=1e-11)
 
 
-def singles(c: Comparison, member: Member) -> dict[float, float]:
+def singles(c: CandidateComparison, member: Member) -> dict[float, float]:
     """Log evidence of one version at each size that is tried, by its size, the choice between them included."""
     Q, found = rest(c), {}
     y, n = Q.T @ c.observed, Q.shape[1]
@@ -103,7 +103,7 @@ def singles(c: Comparison, member: Member) -> dict[float, float]:
     return found
 
 
-def _amplitudes(c: Comparison, member: Member) -> list[float]:
+def _amplitudes(c: CandidateComparison, member: Member) -> list[float]:
     F = rest(c).T @ (member.columns / c.noise_scale[:, None])
     largest = 1 / c.least_noise
     return list(np.geomspace(largest, min(0.4 / np.sqrt(np.sum(F**2) / len(F)), largest), 7))
@@ -144,7 +144,7 @@ def test_what_was_found_beside_something_is_what_is_found_of_one_explanation_alo
             assert found[i][1] == version
 
 
-def wide(columns: int) -> Comparison:
+def wide(columns: int) -> CandidateComparison:
     """Two narrow explanations and a wide one in fifty observations."""
     random, m = np.random.default_rng(8), 50
     several = [
@@ -153,7 +153,7 @@ def wide(columns: int) -> Comparison:
     ]
     noise, (sigma, log_sigma) = some_kinds(np.full(m, 1.4)), sigma_grid(None, 0.08)
     observed, baseline = 0.08 * random.standard_normal(m), random.standard_normal((m, 2))
-    return Comparison(observed, baseline, noise, sigma, log_sigma, several, np.full(m, 1.4), 0.01)
+    return CandidateComparison(observed, baseline, noise, sigma, log_sigma, several, np.full(m, 1.4), 0.01)
 
 
 @pytest.mark.parametrize("columns", [5, 36])
@@ -202,7 +202,7 @@ def test_a_baseline_takes_as_many_observations_as_its_columns_differ() -> None:
 def test_what_the_baseline_absorbs_has_no_evidence() -> None:
     c = comparison()
     own = Explanation("baseline again", EFFECT, (Member(c.baseline[:, :1] * c.noise_scale[:, None]),))
-    _, something = Comparison(
+    _, something = CandidateComparison(
         c.observed, c.baseline, c.kinds, c.sigma, c.log_sigma, [own, *c.explanations], c.noise_scale, c.least_noise
     ).log_evidence()
     assert something[0, 0] == -np.inf
@@ -254,7 +254,7 @@ def test_nothing_is_rounded_as_the_recording_was() -> None:
     kind = shape_of(fine, Sizes(np.ones((1, 3)), *np.zeros((3, 1)), np.ones(1)), scale, 1.0)
     xyz = np.repeat([[2e-3, 300.0, 300.0]], 8, axis=0)
     rows, along = np.arange(8)[:, None], np.repeat([[[1.0, 0.0, 0.0]]], 8, axis=0)
-    c = Comparison(np.zeros(8), np.zeros((8, 0)), [kind], *sigma_grid(None, 1e-3), [], scale, 1e-4,
+    c = CandidateComparison(np.zeros(8), np.zeros((8, 0)), [kind], *sigma_grid(None, 1e-3), [], scale, 1e-4,
                    display=Display(step, xyz, rows, along))  # fmt: skip
     found = c.noise(kind, np.random.default_rng(1), np.full(5, 1e-5))
     assert found == pytest.approx(np.full((8, 5), -2e-3), abs=1e-9)
@@ -271,7 +271,7 @@ def test_a_stated_noise_is_mostly_believed() -> None:
 def test_the_evidence_of_heavy_tails_is_below_that_of_student_s_t_and_meets_it_at_the_tangent() -> None:
     random = np.random.default_rng(9)
     residual = 3e-3 * random.standard_t(4, 40)
-    kind = tails(residual)
+    kind = heavy_tails(residual)
     scale = np.sqrt(np.diag(covariance(kind)))
     sigma = 1.4826 * np.median(np.abs(residual))
     for data, tangent in ((residual, True), (3e-3 * random.standard_t(4, 40), False)):
@@ -315,7 +315,7 @@ def test_the_shapes_that_are_kept_stand_for_all(slow: float) -> None:
     linear = LinearModel(observed, design, unknowns, np.zeros((m, 0)), scale, None)
     estimate = solve(linear)
     rival = np.sign(np.sin(np.arange(m) * 0.9))[:, None]
-    kept = kinds(linear, components, estimate, 1e-3 * rival, estimate.residuals)
+    kept = representative_kinds(linear, components, estimate, 1e-3 * rival, estimate.residuals)
     shapes = drawn_shapes(components)
     every = [
         shape_of(components, components.sizes(shapes[[i]]), scale, (1 - TAILS) / len(shapes))
@@ -325,7 +325,7 @@ def test_the_shapes_that_are_kept_stand_for_all(slow: float) -> None:
     for some in (kept, [*every, kept[-1]]):
         grid = sigma_grid(None, estimate.sigma)
         explanation = Explanation("rival", EFFECT, (Member(1e-3 * rival),))
-        c = Comparison(observed, design, some, *grid, [explanation], scale, 1e-4)
+        c = CandidateComparison(observed, design, some, *grid, [explanation], scale, 1e-4)
         nothing, something = c.log_evidence()
         odds.append(float(something[0, 0] - nothing[0]))
         total.append(float(nothing[0]))
@@ -369,7 +369,7 @@ def test_as_many_recordings_of_nothing_have_heavy_tails_as_that_is_probable(monk
     c = comparison(12)
     draws = {}
     for share in (0.0, 0.4):
-        monkeypatch.setattr(Comparison, "heavy_tails", lambda *_, share=share: share)
+        monkeypatch.setattr(CandidateComparison, "heavy_tails", lambda *_, share=share: share)
         draws[share] = c.nothing(np.random.default_rng(1), 2000)
     changed = np.any(draws[0.0] != draws[0.4], axis=0)
     assert stats.binomtest(int(changed.sum()), 2000, 0.4).pvalue > 1e-4

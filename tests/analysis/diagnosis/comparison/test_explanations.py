@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation, known
+from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation, known_effects
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.plugins import BrokenPluginError
@@ -33,7 +33,7 @@ class Torn(Effect):
 def candidates(points: Points, named: tuple[str, ...] = ()) -> dict[str, Explanation]:
     model = MeasurementModel(Ballbar(bar_facts(), points), ())
     values = np.array([size.nominal for size in model.artefact.sizes])
-    return {explanation.name: explanation for explanation in known(model, values, named)}
+    return {explanation.name: explanation for explanation in known_effects(model, values, named)}
 
 
 def test_what_needs_a_column_that_is_not_recorded_is_no_candidate(ballbar_points: Points) -> None:
@@ -70,7 +70,7 @@ def test_scales_and_squarenesses_belong_together_where_the_artefact_is_longer_th
     six = {name for name, effect in EVERY.items() if effect.everywhere and not effect.of_artefact}
     assert {name for name, each in candidates(ballbar_points).items() if each.together} == six
     model = MeasurementModel(artefact_of(artefact_facts(kind="sphere"), spheres()), ())
-    found = known(model, np.array([size.nominal for size in model.artefact.sizes]), ())
+    found = known_effects(model, np.array([size.nominal for size in model.artefact.sizes]), ())
     assert six <= {each.name for each in found}
     assert not [each.name for each in found if each.together]
 

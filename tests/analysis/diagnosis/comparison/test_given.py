@@ -7,15 +7,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.given import Beside, Given
-from cmm_uq.analysis.diagnosis.comparison.stack import Version
+from cmm_uq.analysis.diagnosis.comparison.conditional import ConditionedData, Conditioning, Version
 from cmm_uq.base.points import Floats
 
 KINDS, ROWS = 3, 210
 WIDTHS = (1, 2, 34, 31)
 
 
-def _members() -> tuple[Given, Floats, Floats]:
+def _members() -> tuple[Conditioning, Floats, Floats]:
     """Members of these widths, the recording (m, 1), and precisions (k, m, m)."""
     random = np.random.default_rng(4)
     root = random.standard_normal((KINDS, ROWS, ROWS))
@@ -23,10 +22,10 @@ def _members() -> tuple[Given, Floats, Floats]:
     ends = np.cumsum([0, *WIDTHS]).tolist()
     where = {(i, 0): slice(*ends) for i, ends in enumerate(pairwise(ends))}
     stack = random.standard_normal((ROWS, ends[-1]))
-    return Given(stack, where, lambda columns: precision @ columns), random.standard_normal((ROWS, 1)), precision
+    return Conditioning(stack, where, lambda columns: precision @ columns), random.standard_normal((ROWS, 1)), precision
 
 
-def _beside(given: Given, left: Floats, precision: Floats, versions: list[Version]) -> Beside:
+def _beside(given: Conditioning, left: Floats, precision: Floats, versions: list[Version]) -> ConditionedData:
     return given.beside(versions, left, precision @ left, np.zeros(KINDS), own=True)
 
 

@@ -8,25 +8,25 @@ import numpy as np
 import pytest
 from scipy import optimize, special, stats
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.heavy_tails import tailed
-from cmm_uq.analysis.diagnosis.noise import OFTEN, Kind, sigma_grid, with_tails
+from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import under_heavy_tails
+from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind, sigma_grid, with_tails
 from cmm_uq.base.points import Floats
 from tests.analysis.diagnosis.dense_noise import covariance, rest, some_kinds
 
 ROWS = 14
 
 
-def normal_kinds(explanations: int = 2) -> Comparison:
+def normal_kinds(explanations: int = 2) -> CandidateComparison:
     random = np.random.default_rng(21)
     found = [Explanation(str(i), EFFECT, (Member(random.standard_normal((ROWS, 1 + i))),)) for i in range(explanations)]
     observed, baseline = 0.05 * random.standard_normal(ROWS), random.standard_normal((ROWS, 2))
     kinds = some_kinds(np.full(ROWS, 1.4))
-    return Comparison(observed, baseline, kinds, *sigma_grid(None, 0.25), found, np.full(ROWS, 1.4), 0.01)
+    return CandidateComparison(observed, baseline, kinds, *sigma_grid(None, 0.25), found, np.full(ROWS, 1.4), 0.01)
 
 
-def with_outliers(c: Comparison, count: int) -> Floats:
+def with_outliers(c: CandidateComparison, count: int) -> Floats:
     """What the baseline leaves of white noise (m, count) with one reading off by twenty of its standard deviations."""
     random = np.random.default_rng(22)
     data = 0.05 * random.standard_normal((ROWS, count))
@@ -34,7 +34,7 @@ def with_outliers(c: Comparison, count: int) -> Floats:
     return c.rest(data)
 
 
-def of_nothing(c: Comparison, data: Floats, kinds: list[Kind]) -> Floats:
+def of_nothing(c: CandidateComparison, data: Floats, kinds: list[NoiseKind]) -> Floats:
     """Log density (k, b) of data under kinds of noise, σ integrated, written out."""
     Q = rest(c)
     found = np.empty((len(kinds), data.shape[1]))
@@ -67,7 +67,7 @@ def test_tails_touch_where_students_t_fits_best() -> None:
     c = replace(normal_kinds(), kinds=some_kinds(np.full(ROWS, 1.4))[:1])
     data = with_outliers(c, 5)
     white, base = (c.kinds[0].white(columns) for columns in (data, c.baseline))
-    found = dict(tailed(c, data))
+    found = dict(under_heavy_tails(c, data))
     assert sorted(found) == list(range(5))
     for j, own in found.items():
         fit = optimize.minimize(
@@ -84,7 +84,7 @@ def test_tails_are_as_probable_beside_the_likeliest_kind_as_beside_all() -> None
     c = normal_kinds()
     data = with_outliers(c, 8)
     plain = of_nothing(c, data, list(c.kinds))
-    for j, own in tailed(c, data):
+    for j, own in under_heavy_tails(c, data):
         (kind,) = own.kinds
         likeliest = int(plain[:, j].argmax())
         part = np.exp(plain[likeliest, j] - special.logsumexp(plain[:, j]))
@@ -97,7 +97,7 @@ def test_tails_are_left_out_where_they_are_twenty_times_less_probable() -> None:
     c = normal_kinds()
     even = 0.05 * stats.norm.ppf((np.arange(ROWS) + 0.5) / ROWS)
     data = np.column_stack([c.rest(np.random.default_rng(24).permutation(even)[:, None]), with_outliers(c, 1)])
-    assert [j for j, _ in tailed(replace(c, kinds=c.kinds[:1], often_heavy=0.01), data)] == [1]
+    assert [j for j, _ in under_heavy_tails(replace(c, kinds=c.kinds[:1], often_heavy=0.01), data)] == [1]
 
 
 def test_of_some_kinds_the_evidence_is_that_of_a_comparison_of_these_alone() -> None:

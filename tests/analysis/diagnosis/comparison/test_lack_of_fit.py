@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from cmm_uq.analysis.diagnosis.comparison.evidence import Comparison
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, Explanation, Member
-from cmm_uq.analysis.diagnosis.comparison.heavy_tails import tailed
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import (
     DRAWS,
     lack_of_fit,
     log_prior,
     robust_statistic_of,
     statistic_of,
+    under_heavy_tails,
 )
 from cmm_uq.analysis.diagnosis.noise import sigma_grid
 from cmm_uq.base.points import Floats
@@ -25,7 +25,7 @@ from tests.analysis.diagnosis.dense_noise import some_kinds
 ROWS = 14
 
 
-def one_effect(p: float, often: float = 0.0, lever: float = 0.0) -> Comparison:
+def one_effect(p: float, often: float = 0.0, lever: float = 0.0) -> CandidateComparison:
     """White noise of 0.05 mm and one effect of one column, of a size at which the F test has this p-value.
 
     The first reading sees ``lever`` mm more of the effect.
@@ -42,7 +42,7 @@ def one_effect(p: float, often: float = 0.0, lever: float = 0.0) -> Comparison:
     observed = noise + along * seen / np.linalg.norm(seen)
     (white, *_) = some_kinds(np.ones(ROWS))
     explanation = Explanation("one", EFFECT, (Member(column),))
-    return Comparison(observed[:, 0], baseline, [white], *sigma_grid(None, 0.05), [explanation], np.ones(ROWS), 1e-3,
+    return CandidateComparison(observed[:, 0], baseline, [white], *sigma_grid(None, 0.05), [explanation], np.ones(ROWS), 1e-3,
                       often_heavy=often)  # fmt: skip
 
 
@@ -62,7 +62,7 @@ def test_far_from_the_false_alarm_rate_a_probability_stays_as_200_draws_have_it(
         assert lack_of_fit(c, 1, 0.01)[0] == first[0]
 
 
-def outliers(c: Comparison, off: float) -> Floats:
+def outliers(c: CandidateComparison, off: float) -> Floats:
     """What the baseline leaves of normal noise (m, m), each with another reading off, mm."""
     noise = 0.05 * np.random.default_rng(33).standard_normal((ROWS, 1))
     return c.rest(noise + off * np.eye(ROWS))
@@ -73,7 +73,7 @@ def test_log_odds_with_tails_are_those_of_the_evidence_of_both_kinds_of_noise() 
     data = np.column_stack([c.left, outliers(c, 0.4)])
     found = robust_statistic_of(c, data, -np.inf)
     plain, something = c.log_evidence(data)
-    own = dict(tailed(c, data))
+    own = dict(under_heavy_tails(c, data))
     assert len(own) > ROWS / 2
     prior = log_prior(c.explanations)[0]
     for j, log_odds in enumerate(found):

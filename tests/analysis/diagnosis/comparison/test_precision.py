@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.diagnosis.comparison.precision import precisions
+from cmm_uq.analysis.diagnosis.comparison.algebra import precisions
 from tests.analysis.diagnosis.dense_noise import covariance, some_kinds
 
 ROWS = 14

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.quick import (
-    corrected,
+from cmm_uq.analysis.diagnosis.comparison.algebra import (
     eigen,
     interpolated,
     log_sum,
     log_sum_of_powers,
     squared,
+    woodbury,
 )
 
 
@@ -66,7 +66,7 @@ def test_columns_beside_others_explain_what_the_whole_covariance_says() -> None:
     inverse = np.eye(40) - rows.T @ rows
     seen = turn.T @ columns.T @ np.column_stack([inverse @ data, rows.T])
     square = amplitudes[:, None] ** 2
-    found = corrected(square / (1 + square * strengths), seen)
+    found = woodbury(square / (1 + square * strengths), seen)
     assert found is not None
     for i, a in enumerate(amplitudes):
         whole = np.linalg.inv(inverse) + a**2 * columns @ columns.T
@@ -81,7 +81,7 @@ def test_what_is_given_and_takes_the_columns_themselves_leaves_no_digits() -> No
     rows = np.linalg.solve(np.linalg.cholesky(np.eye(9) + 1e10 * columns.T @ columns), 1e5 * columns.T)
     strengths, turn = np.linalg.eigh(columns.T @ columns)
     seen = turn.T @ columns.T @ np.column_stack([np.ones(40), rows.T])
-    assert corrected(1e10 / (1 + 1e10 * strengths)[None], seen) is None
+    assert woodbury(1e10 / (1 + 1e10 * strengths)[None], seen) is None
 
 
 @pytest.mark.parametrize("r", [1, 2, 5])

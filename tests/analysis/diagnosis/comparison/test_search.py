@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combination, Combinations
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
-from cmm_uq.analysis.diagnosis.comparison.search import asserted, with_rivals
+from cmm_uq.analysis.diagnosis.comparison.search import effects_to_assert, probability_with_rivals
 from cmm_uq.machine.physics.effect import Nonparametric
 
 BOW, TURN, SQUARE, FUNCTION = range(4)
@@ -27,7 +27,7 @@ def combinations(probability: Mapping[tuple[int, ...], float]) -> Combinations:
 
 
 def found(probability: Mapping[tuple[int, ...], float]) -> set[int]:
-    return set(asserted(combinations(probability)))
+    return set(effects_to_assert(combinations(probability)))
 
 
 def test_the_most_probable_set_is_asserted() -> None:
@@ -55,4 +55,4 @@ def test_not_beside_one_that_stands_in_their_place() -> None:
 
 def test_an_effect_or_its_rival_counts_once_where_both_hold() -> None:
     some = combinations({(BOW,): 0.5, (TURN,): 0.2, (BOW, TURN): 0.2, (SQUARE,): 0.005, (): 0.095})
-    assert with_rivals(some, frozenset({BOW}), BOW) == pytest.approx(0.9)
+    assert probability_with_rivals(some, frozenset({BOW}), BOW) == pytest.approx(0.9)

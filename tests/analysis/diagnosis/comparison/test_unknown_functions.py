@@ -8,14 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
-from cmm_uq.analysis.diagnosis.comparison.unknown_functions import (
-    UNKNOWN_SD,
-    _functions,
-    _one_sided,
-    directions,
-    unknown,
-)
+from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN_SD, Explanation
+from cmm_uq.analysis.diagnosis.comparison.functions import _functions, _one_sided, directions, unknown_functions
 from cmm_uq.app.commands.diagnosing import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.points import Floats
@@ -35,7 +29,7 @@ def reached(explanation: Explanation, what: Floats) -> float:
 @pytest.fixture(scope="module")
 def of_sphere() -> tuple[dict[str, Explanation], Floats]:
     model, _ = screened_model(read_job(EXAMPLES / "sphere-simulated"))
-    found = unknown(model, model.estimate().least_squares.value)
+    found = unknown_functions(model, model.estimate().least_squares.value)
     return {e.name: e for e in found}, directions(model)
 
 
@@ -63,7 +57,7 @@ def test_a_scale_may_depend_on_a_column_about_the_middle_of_the_volume() -> None
     model, _ = screened_model(replace(job, points=replace(job.points, columns={**job.points.columns, "load_kg": load})))
     values = model.estimate().least_squares.value
     points = model.artefact.points.at(model.placed(values))
-    found = {e.name: e for e in unknown(model, values)}
+    found = {e.name: e for e in unknown_functions(model, values)}
     middle = 0.5 * (points.carriages.min(axis=0) + points.carriages.max(axis=0))
     u = (load - load.mean()) / np.ptp(load)
     what = model.seen(((1 + u - u**2)[:, None] * (points.carriages - middle))[:, :, None], values)[:, 0]
@@ -75,7 +69,7 @@ def test_no_jump_parts_readings_of_one_place() -> None:
     model, _ = screened_model(read_job(EXAMPLES / "plane-simulated"))
     values = model.estimate().least_squares.value
     along_y = model.artefact.points.at(model.where(values)).readings["y"]
-    found = {e.name: e for e in unknown(model, values)}["error along Z as a function of Y"]
+    found = {e.name: e for e in unknown_functions(model, values)}["error along Z as a function of Y"]
     jumps = [member.values[:, 0] for member in found.members if len(np.unique(member.values)) == 2]
     assert len(jumps) == len(np.unique(np.round(along_y))) - 1
     for high in (jump > 0 for jump in jumps):
@@ -89,7 +83,7 @@ def test_a_jump_is_sought_between_every_two_readings_in_time() -> None:
     model, _ = screened_model(replace(job, points=replace(job.points, columns={**job.points.columns, "time_s": time})))
     values = model.estimate().least_squares.value
     points = model.artefact.points.at(model.placed(values))
-    scale = {e.name: e for e in unknown(model, values)}["scale of X as a function of time"]
+    scale = {e.name: e for e in unknown_functions(model, values)}["scale of X as a function of time"]
     along_x = points.readings["x"][:, None, None] * np.array([1.0, 0.0, 0.0])[:, None]
     for after in np.unique(time)[1:]:
         what = model.seen(along_x * np.where(time >= after, 1.0, -1.0)[:, None, None], values)[:, 0]

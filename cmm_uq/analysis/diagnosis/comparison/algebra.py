@@ -1,0 +1,201 @@
+"""Sums, tables, eigenvalues and precisions of many small arrays in few steps: a search asks for thousands of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cmm_uq.analysis.diagnosis.noise import NoiseKind
+from cmm_uq.base.points import Floats
+
+_LEAST_PIVOT = 1e-3
+"""Of a factor of one less what is taken: six digits of sixteen are lost there."""
+
+_LEAST_BASE = 1e-300
+"""Of a sum of squares that rounding took below it."""
+
+
+def log_sum(log: Floats, axis: int) -> Floats:
+    """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
+
+    A search asks for thousands of small ones, and what scipy does beside these steps takes thrice their time.
+    """
+    largest = log.max(axis=axis, keepdims=True)
+    most = log == largest
+    count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
+    others = np.exp(np.where(most, -np.inf, log) - largest).sum(axis=axis, keepdims=True)
+    return np.asarray((np.log1p(others / count) + np.log(count) + largest).squeeze(axis), dtype=np.float64)
+
+
+def interpolated(at: Floats, nodes: Floats, values: Floats) -> Floats:
+    """What ``np.interp`` gives for nodes (n,) at equal distances, which need no search; ``at`` is overwritten."""
+    last = len(nodes) - 1
+    at -= nodes[0]
+    at *= last / (nodes[-1] - nodes[0])
+    np.clip(at, 0, last, out=at)
+    before = np.minimum(at.astype(np.int64), last - 1)
+    at -= before
+    at *= np.diff(values)[before]
+    at += values[before]
+    return at
+
+
+def log_sum_in(log: Floats, axis: int | tuple[int, ...]) -> Floats:
+    """Logarithm of sums of what has these logarithms, which are overwritten; of each sum one is finite."""
+    largest = log.max(axis=axis, keepdims=True)
+    log -= largest
+    np.exp(log, out=log)
+    return np.asarray(np.log(log.sum(axis=axis)) + largest.squeeze(axis), dtype=np.float64)
+
+
+def log_sum_of_powers(base: Floats, degrees: int, axis: int | tuple[int, ...]) -> Floats:
+    """Logarithm of sums of bases, not negative but by rounding, to the power of −degrees/2; the bases are overwritten."""
+    least = base.min(axis=axis, keepdims=True)
+    if least.min() < _LEAST_BASE:
+        np.maximum(base, _LEAST_BASE, out=base)
+        np.maximum(least, _LEAST_BASE, out=least)
+    total = _raised(np.divide(least, base, out=base), degrees).sum(axis=axis)
+    return np.asarray(np.log(total) - 0.5 * degrees * np.log(least.squeeze(axis)), dtype=np.float64)
+
+
+def _raised(parts: Floats, degrees: int) -> Floats:
+    """Numbers from nought to one, which are overwritten, to the power of degrees/2, by multiplications."""
+    power, found = degrees // 2, np.sqrt(parts) if degrees % 2 else None
+    while power:
+        if power % 2:
+            found = parts.copy() if found is None else np.multiply(found, parts, out=found)
+        power //= 2
+        if power:
+            parts *= parts
+    return np.ones_like(parts) if found is None else found
+
+
+def eigen(blocks: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (…, r) of symmetric matrices and their eigenvectors (…, r, r); of two columns, which abound, by a rotation.
+
+    The rotation is Jacobi's (Golub, Van Loan 2013, Matrix Computations, section 8.5.2), as exact as what is iterated.
+    """
+    if blocks.shape[-1] != 2:
+        strengths, turn = np.linalg.eigh(blocks)
+        return np.asarray(strengths), np.asarray(turn)
+    first, second, twice = blocks[..., 0, 0], blocks[..., 1, 1], blocks[..., 0, 1] + blocks[..., 1, 0]
+    apart = second - first
+    length = np.abs(apart) + np.hypot(apart, twice)
+    tangent = np.where(apart < 0, -twice, twice) / np.maximum(length, 1e-300)
+    cosine = 1 / np.sqrt(1 + tangent**2)
+    sine, shift = tangent * cosine, 0.5 * tangent * twice
+    turn = np.stack([np.stack([cosine, sine], axis=-1), np.stack([-sine, cosine], axis=-1)], axis=-2)
+    return np.stack([first - shift, second + shift], axis=-1), turn
+
+
+def woodbury(gain: Floats, seen: Floats) -> tuple[Floats, Floats] | None:
+    """What columns explain beside others, from what they explain by themselves (Woodbury's identity).
+
+    Parameters
+    ----------
+    gain : (…, a, r) a²/(1 + a²λ) along each principal axis, of strength λ, for coefficients of standard deviation a.
+    seen : (…, r, 1 + g) what is seen along the axes of the data, and of rows of what is given (see ``Beside``).
+
+    Returns
+    -------
+    The sum of squares (…, a) that is explained, and what is given's part (…, a) of half the logarithm of the determinant.
+    ``None`` where digits would be lost, because what is given takes nearly all of the columns.
+    """
+    g = seen.shape[-1] - 1
+    pairs = (seen[..., :, None] * seen[..., None, :]).reshape(*seen.shape[:-1], -1)
+    whole = (gain @ pairs).reshape(*gain.shape[:-1], g + 1, g + 1)
+    left, across = np.eye(g) - whole[..., 1:, 1:], whole[..., 1:, :1]
+    try:
+        pivots = np.einsum("...ii->...i", np.linalg.cholesky(left))
+    except np.linalg.LinAlgError:
+        return None
+    if pivots.size and pivots.min() < _LEAST_PIVOT:
+        return None
+    explained = whole[..., 0, 0] + (across * np.linalg.solve(left, across)).sum(axis=(-2, -1))
+    return explained, np.log(pivots).sum(axis=-1)
+
+
+def log_diagonal(triangular: NDArray[np.floating[Any]]) -> float:
+    """Logarithm of the determinant's amount of a triangular matrix (n, n)."""
+    return float(np.log(np.abs(np.diag(triangular))).sum())
+
+
+def squared(rows: Floats) -> Floats:
+    """Products (…, r, r) of rows (…, r, g) with each other; of one or two, which abound, without a call for each matrix."""
+    if rows.shape[-2] > 2:
+        return np.asarray(rows @ rows.swapaxes(-1, -2))
+    found = np.empty((*rows.shape[:-1], rows.shape[-2]))
+    for i in range(rows.shape[-2]):
+        for j in range(i + 1):
+            found[..., i, j] = found[..., j, i] = np.einsum("...g,...g->...", rows[..., i, :], rows[..., j, :])
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Precision:
+    """Of one kind of noise, what the baseline reaches projected out.
+
+    The precision of what is left is WᵀW − rowsᵀ·rows, with the whitening W (m, m); ``log``, the log probability less that of
+    the determinant. ``basis`` (m, g) see :meth:`explained`.
+    """
+
+    whitening: sparse.csr_array
+    rows: Floats
+    log: float
+    basis: Floats
+
+    def __call__(self, columns: Floats) -> Floats:
+        """Precision times columns (m, b)."""
+        if self._diagonal is None:
+            whole = self._transposed @ (self.whitening @ columns)
+        else:
+            whole = self._diagonal * (self._diagonal * columns)
+        return np.asarray(whole - self.rows.T @ (self.rows @ columns), dtype=np.float64)
+
+    def explained(self, white: Floats) -> Floats:
+        """Of whitened observations (m, b), what the baseline takes, and what noise in common explains of the rest."""
+        return np.asarray(self.basis @ (self.basis.T @ white), dtype=np.float64)
+
+    @cached_property
+    def _diagonal(self) -> Floats | None:
+        """Of the whitening (m, 1), where it mixes no observations."""
+        each = np.arange(self.whitening.shape[0])
+        if self.whitening.nnz != len(each) or not np.array_equal(self.whitening.indices, each):
+            return None
+        return self.whitening.diagonal()[:, None]
+
+    @cached_property
+    def _transposed(self) -> sparse.csc_array:
+        return self.whitening.T
+
+
+def precisions(kinds: Sequence[NoiseKind], reached: Floats, certified: Floats) -> list[Precision]:
+    """Of each kind of noise.
+
+    Parameters
+    ----------
+    kinds : of noise.
+    reached : (m, q) orthonormal basis of what the baseline reaches.
+    certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
+    """
+    found = []
+    for kind in kinds:
+        Q, R = np.linalg.qr(kind.white(reached))
+        log = float(np.log(kind.probability)) + kind.log_factor + kind.log_whitening - log_diagonal(R)
+        rows, basis = kind.whitening.T @ Q, Q
+        shared = [columns for columns in (certified, kind.slow) if columns.size]
+        if shared:
+            white = kind.white(np.hstack(shared))
+            white -= Q @ (Q.T @ white)
+            factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
+            log -= log_diagonal(factor)
+            own = np.linalg.solve(factor, white.T)
+            rows, basis = np.hstack([rows, kind.whitening.T @ own.T]), np.hstack([Q, own.T])
+        found.append(Precision(kind.whitening, np.asarray(rows.T, dtype=np.float64), log, basis))
+    return found

@@ -1,0 +1,357 @@
+"""Columns of all candidates side by side, and data conditional on some of them under each kind of noise.
+
+Data beside explanations that the evidence is conditional on, under each kind of noise.
+
+A search gives the same few members again and again, in other company and at other sizes. What follows from a member alone is
+therefore kept: its columns weighed by each kind of noise, and their inner products with the columns of all candidates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
+from cmm_uq.base.points import Floats, Ints
+
+AMPLITUDES = 7
+_SMALLEST = 0.4
+"""Smallest rms of an explanation that is considered, over the noise."""
+
+_ABSORBED = 1e-5
+"""Part of its length below which a column is the baseline's own."""
+
+
+@dataclass(frozen=True)
+class Version:
+    """One version of an explanation at one size.
+
+    Parameters
+    ----------
+    explanation, member : which.
+    amplitude : standard deviation of its coefficients, in units of the noise.
+    """
+
+    explanation: int
+    member: int
+    amplitude: float
+
+
+@dataclass(frozen=True, eq=False)
+class MemberGroup:
+    """Members with the same number of columns, r.
+
+    ``explanation``, ``member`` (M,) say which; ``weight`` (M,) is the log probability of each within its explanation;
+    ``start`` (M,) the first of its columns in the stack; ``amplitudes`` (M, a) the sizes to try.
+    """
+
+    explanation: Ints
+    member: Ints
+    weight: Floats
+    start: Ints
+    amplitudes: Floats
+    r: int
+
+    @property
+    def where(self) -> slice:
+        """Of their columns in the stack, one after the other."""
+        return slice(int(self.start[0]), int(self.start[-1]) + self.r)
+
+    def columns(self, stack: Floats) -> Floats:
+        """Their columns (m, M·r), one after the other."""
+        return stack[:, self.where]
+
+    @cached_property
+    def first(self) -> Ints:
+        """Where each explanation's members begin; they follow one another."""
+        others = self.explanation[1:] != self.explanation[:-1]
+        return np.flatnonzero(np.concatenate([[True], others]))
+
+    def part(self, among: Container[int] | None) -> slice:
+        """Members from the first to the last of some explanations; all by default."""
+        if among is None:
+            return slice(None)
+        chosen = [part for i, part in self._parts if i in among]
+        return slice(chosen[0].start, chosen[-1].stop) if chosen else slice(0, 0)
+
+    @cached_property
+    def _parts(self) -> list[tuple[int, slice]]:
+        """Each explanation with its members."""
+        begin = self.first.tolist()
+        owners = self.explanation[self.first].tolist()
+        return [(i, slice(*ends)) for i, *ends in zip(owners, begin, [*begin[1:], len(self.explanation)], strict=True)]
+
+    def only(self, part: slice) -> MemberGroup:
+        """The group of some members."""
+        if part == slice(None):
+            return self
+        return MemberGroup(
+            self.explanation[part],
+            self.member[part],
+            self.weight[part],
+            self.start[part],
+            self.amplitudes[part],
+            self.r,
+        )
+
+
+def stack_members(
+    explanations: Sequence[Explanation],
+    rest: Callable[[Floats], Floats],
+    noise_scale: Floats,
+    least_noise: float,
+    degrees_of_freedom: int,
+) -> tuple[Floats, tuple[MemberGroup, ...]]:
+    """Columns (m, K) that the baseline leaves of all members, over the noise scale (m,), and their groups.
+
+    Parameters
+    ----------
+    rest : what the baseline leaves of columns (m, b).
+    least_noise : mm; with it the largest coefficients are as large as physics allows.
+    degrees_of_freedom : how many observations are left.
+    """
+    found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
+    whole = [
+        (owner, j, np.log(member.weight / total), member.columns)
+        for owner, explanation in enumerate(explanations)
+        for total in [sum(member.weight for member in explanation.members)]
+        for j, member in enumerate(explanation.members)
+    ]
+    if not whole:
+        return np.zeros((len(noise_scale), 0)), ()
+    every = np.hstack([columns for *_, columns in whole]) / noise_scale[:, None]
+    left = rest(every)
+    ends = np.cumsum([columns.shape[1] for *_, columns in whole])
+    starts_of = np.append(0, ends[:-1])
+    lengths, of_whole = (np.sqrt(np.add.reduceat(np.sum(each**2, axis=0), starts_of)) for each in (left, every))
+    seen = lengths > _ABSORBED * of_whole
+    for k in np.flatnonzero(seen).tolist():
+        owner, j, log, columns = whole[k]
+        own = left[:, starts_of[k] : ends[k]]
+        found.setdefault(columns.shape[1], []).append((owner, j, log, own, float(lengths[k])))
+    groups, stack, start = [], [np.zeros((len(noise_scale), 0))], 0
+    for r in sorted(found):
+        chosen = found[r]
+        rms = np.array([length for *_, length in chosen]) / np.sqrt(max(degrees_of_freedom, 1))
+        largest = 1 / least_noise
+        smallest = np.minimum(_SMALLEST / rms, largest)
+        amplitudes = largest * (smallest / largest)[:, None] ** np.linspace(0, 1, AMPLITUDES)
+        explanation, member = (np.array([item[k] for item in chosen], dtype=np.int64) for k in (0, 1))
+        weight = np.array([item[2] for item in chosen])
+        starts = start + r * np.arange(len(chosen))
+        groups.append(MemberGroup(explanation, member, weight, starts, amplitudes, r))
+        stack += [left for *_, left, _ in chosen]
+        start += r * len(chosen)
+    return np.hstack(stack), tuple(groups)
+
+
+_WIDE = 30
+"""Columns of a version from which on its principal axes are kept where it is given."""
+
+_KEPT = 12_000_000
+"""Numbers that are kept of the inner products of what was given last."""
+
+_FEW = 3
+"""Observations over columns that are given, from which on it pays to make inner products of those that are kept."""
+
+Member = tuple[int, int]
+"""An explanation and its member."""
+
+Basis = tuple[Member, bool]
+"""A member, and whether it is seen along its principal axes in place of its columns."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionedData:
+    """Data beside what is given, under each of k kinds of noise.
+
+    With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
+
+    Parameters
+    ----------
+    weighed : (k, m, b) N⁻¹·data.
+    rows : (k, g, m) of what is given.
+    seen : (k, g, b) rows·data.
+    squares : (k, b) dataᵀ·Σ⁻¹·data.
+    log : (k,) probability of the noise less that of its determinant.
+    made_of : of the recording's own data beside few columns, how ``seen_by`` follows from what the members that are given
+        are by themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
+    """
+
+    weighed: Floats
+    rows: Floats
+    seen: Floats
+    squares: Floats
+    log: Floats
+    made_of: tuple[tuple[Basis, Floats], ...] | None = None
+
+    @property
+    def width(self) -> int:
+        """How many columns of ``seen_by`` each kind of noise has, b + g."""
+        return int(self.weighed.shape[2] + self.rows.shape[1])
+
+    @cached_property
+    def seen_by(self) -> Floats:
+        """Of each kind Σ⁻¹·data and the rows, side by side (m, k·(b + g)): needed where no inner products are kept."""
+        if not self.rows.shape[1]:
+            return _flat(self.weighed)
+        turned = self.rows.swapaxes(1, 2)
+        return _flat(np.concatenate([self.weighed - turned @ self.seen, turned], axis=2))
+
+
+@dataclass(frozen=True, eq=False)
+class Conditioning:
+    """Members that were given, and what is kept of them.
+
+    Parameters
+    ----------
+    stack : (m, K) columns of all members.
+    where : columns of the stack of each.
+    by_noise : precision times columns (m, b), by kind of noise (k, m, b).
+    """
+
+    stack: Floats
+    where: dict[Member, slice]
+    by_noise: Callable[[Floats], Floats]
+
+    def beside(
+        self, given: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool
+    ) -> ConditionedData:  # fmt: skip
+        """Data beside explanations at their sizes.
+
+        Parameters
+        ----------
+        plain, weighed : data (m, b), and (k, m, b) times the precision of each kind of noise.
+        log : (k,) of the noise.
+        own : whether the data are the recording's, so that inner products with them are kept.
+        """
+        squares = np.einsum("mb,kmb->kb", plain, weighed)
+        if not given:
+            none = np.zeros((len(weighed), 0, len(plain)))
+            return ConditionedData(weighed, none, none @ plain, squares, log, () if own else None)
+        order, rows, mixing, logs = self._rows(given)
+        seen = rows @ plain
+        made_of = None
+        if own and _FEW * mixing.shape[2] <= len(plain):
+            mixed = mixing.swapaxes(1, 2)
+            factor = np.concatenate([-(mixed @ seen), mixed], axis=2)
+            columns = [self.columns(version).shape[1] for version in order]
+            first = max(columns) >= _WIDE  # and then along its principal axes
+            bases = [((v.explanation, v.member), first and i == 0) for i, v in enumerate(order)]
+            made_of = tuple(zip(bases, np.split(factor, np.cumsum(columns)[:-1], axis=1), strict=True))
+        return ConditionedData(weighed, rows, seen, squares - np.sum(seen**2, axis=1), log - logs, made_of)
+
+    def columns(self, version: Version) -> Floats:
+        """Of a version (m, r), for coefficients of one."""
+        return self.stack[:, self.where[version.explanation, version.member]]
+
+    def _rows(self, given: Sequence[Version]) -> tuple[list[Version], Floats, Floats, Floats]:
+        """Rows (k, g, m) of what is given (see :class:`ConditionedData`).
+
+        The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
+        needs another length only; to what it leaves the others are added by Cholesky's factors.
+
+        Returns
+        -------
+        The versions in this order; the rows; as factors (k, g, r) of the members' weighed columns or principal axes; half
+        the logarithm (k,) of the determinant.
+        """
+        order = list(given)
+        widest = max(order, key=lambda version: self.columns(version).shape[1])
+        wide = self.columns(widest).shape[1]
+        if wide < _WIDE:
+            return order, *self._joined(order)
+        order.remove(widest)
+        strengths, axes = self._principal_axes(widest)
+        ratio = widest.amplitude**2 * strengths
+        lengths = widest.amplitude / np.sqrt(1 + ratio)
+        rows, logs = lengths[:, :, None] * axes, 0.5 * np.log1p(ratio).sum(axis=1)
+        mixing = lengths[:, :, None] * np.eye(wide)
+        if not order:
+            return [widest], rows, mixing, logs
+        more, mixed, own = self._joined(order, rows)
+        whole = np.concatenate([mixing, np.zeros((*mixing.shape[:2], mixed.shape[2] - wide))], axis=2)
+        mixed[:, :, :wide] = mixed[:, :, :wide] @ mixing
+        return (
+            [widest, *order],
+            np.concatenate([rows, more], axis=1),
+            np.concatenate([whole, mixed], axis=1),
+            logs + own,
+        )
+
+    def _joined(self, given: Sequence[Version], rows: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+        """Rows (k, g, m) of versions beside rows (k, h, m), what they are made of (k, g, h + g), and half the logarithm."""
+        taken = np.hstack([version.amplitude * self.columns(version) for version in given])
+        weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in given], axis=2)
+        before = np.zeros((len(weighed), 0, taken.shape[1]))
+        if rows is not None:
+            before = rows @ taken
+            weighed = weighed - rows.swapaxes(1, 2) @ before
+        factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
+        inverse = np.linalg.inv(factor)
+        sizes = np.concatenate([np.full(self.columns(v).shape[1], v.amplitude) for v in given])
+        mixing = np.concatenate([-inverse @ before.swapaxes(1, 2), inverse * sizes], axis=2)
+        logs = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        return inverse @ weighed.swapaxes(1, 2), mixing, logs
+
+    def products(self, basis: Basis) -> Floats:
+        """Inner products (k, K, r) of all columns with a member's weighed ones, or these along its principal axes."""
+        kept = self._products
+        if basis not in kept:
+            member, turned = basis
+            version = Version(*member, 1.0)
+            weighed = self._principal_axes(version)[1].swapaxes(1, 2) if turned else self._weighed_columns(version)
+            found = self.with_all(weighed)
+            while kept and sum(each.size for each in kept.values()) + found.size > _KEPT:
+                del kept[next(iter(kept))]
+        else:
+            found = kept.pop(basis)
+        kept[basis] = found  # what was asked for last is at the end
+        return found
+
+    def with_all(self, columns: Floats) -> Floats:
+        """Inner products (k, K, r) of the stack's columns with others (k, m, r)."""
+        kinds, _, r = columns.shape
+        each = self.stack.T @ _flat(columns)
+        return np.ascontiguousarray(each.reshape(-1, kinds, r).transpose(1, 0, 2))
+
+    def kept(self, known: ConditionedData) -> bool:
+        """Whether the inner products of all that is given are kept."""
+        return known.made_of is not None and all(basis in self._products for basis, _ in known.made_of)
+
+    @cached_property
+    def _products(self) -> dict[Basis, Floats]:
+        return {}
+
+    def _principal_axes(self, version: Version) -> tuple[Floats, Floats]:
+        """Eigenvalues (k, r) of a version's inner products by kind of noise, and its weighed columns along them (k, r, m)."""
+        key = version.explanation, version.member
+        if key not in self._axes:
+            weighed = self._weighed_columns(version)
+            strengths, turn = np.linalg.eigh(self.columns(version).T @ weighed)
+            self._axes[key] = np.maximum(strengths, 0.0), turn.swapaxes(1, 2) @ weighed.swapaxes(1, 2)
+        return self._axes[key]
+
+    @cached_property
+    def _axes(self) -> dict[Member, tuple[Floats, Floats]]:
+        """Principal axes of wide members that were ever given."""
+        return {}
+
+    def _weighed_columns(self, version: Version) -> Floats:
+        key = version.explanation, version.member
+        if key not in self._weighed:
+            self._weighed[key] = self.by_noise(self.columns(version))
+        return self._weighed[key]
+
+    @cached_property
+    def _weighed(self) -> dict[Member, Floats]:
+        """Precision times the columns of members that were ever given (k, m, r)."""
+        return {}
+
+
+def _flat(columns: Floats) -> Floats:
+    """Columns (k, m, b) of all kinds of noise side by side (m, k·b)."""
+    return np.ascontiguousarray(columns.transpose(1, 0, 2)).reshape(columns.shape[1], -1)

@@ -1,0 +1,86 @@
+"""Noise drawn so that nothing but the recording's values decides it: no order of rows, no numbering, no direction of an axis.
+
+What is drawn first is white, in the order of what the baseline leaves of the observations and along it; the symmetric root of
+the covariance turns it into noise. Rows that are exchanged, numbered anew or mirrored then have the same noise as before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cmm_uq.analysis.diagnosis.noise import NoiseKind
+from cmm_uq.base.points import Floats, Ints
+
+_ORTHOGONAL = 1e-9
+"""Of the largest square of a row's length, what products of rows that are at right angles come to."""
+
+DEGREES = (3.0, 4.0)
+"""Of freedom, of Student's t where noise has heavy tails: the fewest that have a variance, and those of the noise's model."""
+
+_DIGITS = 7
+"""Of what is left, over its root mean square, that rounding spares."""
+
+
+def draw_noise(
+    kind: NoiseKind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats],
+    wider: Floats | None = None,
+) -> Floats:  # fmt: skip
+    """Noise (m, draws) of one kind, over the noise scale, a reading's standard deviation being one.
+
+    Parameters
+    ----------
+    kind : of noise.
+    random : source of the draws.
+    draws : how many.
+    noise_scale : (m,) of the observations.
+    standing : see :func:`order_and_side`.
+    wider : (m, draws) by how much each is wider than a normal one; see :func:`tail_widths`.
+    """
+    order, side = standing
+    white = np.empty((len(order), draws))
+    white[order] = random.standard_normal((len(order), draws)) * (1.0 if wider is None else wider)
+    white *= side[:, None]
+    # the whitening is mostly an orthogonal matrix T between two diagonal ones: D·T·S; the root is then S⁻¹·Tᵀ·D⁻¹·T
+    turned = kind.whitening @ sparse.diags_array(1 / noise_scale)
+    squares = turned @ turned.T
+    length = np.sqrt(squares.diagonal())
+    if abs(squares - sparse.diags_array(length**2)).max() <= _ORTHOGONAL * float(length.max()) ** 2:
+        found = kind.coloured((turned @ white) / length[:, None])
+    else:  # as of readings that follow each other
+        found = _root(kind, len(order)) @ white
+    return found + kind.slow @ random.standard_normal((kind.slow.shape[1], draws)) if kind.slow.size else found
+
+
+def tail_widths(random: np.random.Generator, heavy: NDArray[np.bool_], count: int) -> Floats:
+    """Factors (count, draws) that make normal draws those of Student's t where these (draws,) are heavy, of one variance."""
+    found = np.ones((count, len(heavy)))
+    dof = random.choice(DEGREES, len(heavy))
+    square = (dof - 2) / random.chisquare(dof, found.shape)
+    found[:, heavy] = np.sqrt(square[:, heavy])
+    return found
+
+
+def _root(kind: NoiseKind, count: int) -> Floats:
+    """Symmetric root (m, m) of a kind's covariance without what is slow."""
+    half = kind.coloured(np.eye(count))
+    values, vectors = np.linalg.eigh(half @ half.T)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T, dtype=np.float64)
+
+
+def order_and_side(left: Floats, reached: Floats) -> tuple[Ints, Floats]:
+    """Order and side of the observations that follow from their values alone.
+
+    Parameters
+    ----------
+    left : (m,) what the baseline leaves of them.
+    reached : (m, q) orthonormal basis of what it reaches.
+
+    Returns
+    -------
+    (m,) indices by the size of what is left, equal ones by how much the baseline reaches of them; (m,) sign of what is left.
+    """
+    size = float(np.sqrt(np.mean(left**2))) or 1.0
+    keys = (left / size, np.sum(reached**2, axis=1), np.abs(left) / size)
+    return np.lexsort([np.round(key, _DIGITS) for key in keys]), np.where(left < 0, -1.0, 1.0)

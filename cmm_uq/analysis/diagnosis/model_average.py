@@ -1,0 +1,237 @@
+"""What each explanation that remains makes of the effects that a job names, and their average over all of them.
+
+Where one combination of explanations is not well enough known to be the right one, an estimate under it alone is too sure: the
+next may put another value on a scale. Of every combination that remains the posterior of all that is linear is exact, given
+the noise; the average is the mixture of these, weighted by the probabilities of the combinations. It is kept as draws, so that
+estimates, how they vary together, and what is computed from them are of one distribution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key
+from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult, with_effects
+from cmm_uq.analysis.diagnosis.joint import JointPosterior
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import unit
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.posterior import Density
+from cmm_uq.maths.uncertainty.mixture import mixed
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+REMAINS = 0.01
+"""Probability from which a combination of explanations remains."""
+
+SETTLED = 0.95
+"""Probability of one combination from which no other remains."""
+
+_WORTH = float(np.log(3.2))
+"""Log evidence up to which an explanation more is not worth more than a bare mention (Kass & Raftery 1995, JASA 90, 777)."""
+
+_MOST = 12
+_DRAWS = 4000
+_ROUNDS = 3
+_AS_READINGS = 12
+"""Readings that a stated noise is worth: it is good to a fifth."""
+
+EffectParameters = Mapping[str, Mapping[str, Quantity]]
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A combination of explanations that remains.
+
+    Parameters
+    ----------
+    probability : among all combinations, with what adds nothing to it.
+    effects : names of the effects that it adds to the model.
+    functions : what is unknown besides.
+    named : parameters of the effects that the job names, under it.
+    added : parameters of its own effects.
+    model : the job's, with its effects.
+    draws : (N, k) of that model's unknowns.
+    """
+
+    probability: float
+    effects: tuple[str, ...]
+    functions: tuple[Text, ...]
+    named: EffectParameters
+    added: EffectParameters
+    model: MeasurementModel
+    draws: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ModelAverage:
+    """All combinations that remain, the most probable first, and what they make of the named effects on average.
+
+    Empty where one is settled, or nothing is missing.
+
+    Parameters
+    ----------
+    rivals : each.
+    averaged : parameters of the effects that the job names, over all of them.
+    draws : (N, k) of the unknowns of the job's model, over all of them; ``None`` where there are none.
+    """
+
+    rivals: tuple[Rival, ...] = ()
+    averaged: EffectParameters = field(default_factory=dict)
+    draws: Floats | None = None
+
+    @property
+    def weights(self) -> list[float]:
+        """Probabilities of the rivals, which leave out what is less probable than each of them."""
+        return [rival.probability for rival in self.rivals]
+
+
+def average_models(found: SearchResult, joint: JointPosterior, before: MeasurementModel, seed: int) -> ModelAverage:
+    """What remains of a search.
+
+    Parameters
+    ----------
+    found : by the search; of what is asserted the model is that of all observations.
+    joint : its posterior, whose noise is taken for all.
+    before : the job's model.
+    seed : of the draws.
+    """
+    combinations = found.combinations
+    if combinations is None:
+        return ModelAverage()
+    whole = found.first.model.artefact is before.artefact
+    total: dict[Key, float] = {}
+    for key, p in needed_combinations(combinations).items():
+        # functions are known where the candidates were compared: of a large recording, on some of the observations
+        own = key if whole else combinations.effects_of(key)
+        total[own] = total.get(own, 0.0) + p
+    order = sorted((key for key in total if total[key] > REMAINS), key=lambda key: -total[key])[:_MOST]
+    if not order or total[order[0]] >= SETTLED or len(order) < 2:
+        return ModelAverage()
+    typical = joint.posterior.sizes.typical
+    noise = joint.components.white(typical), float(typical.coordinate[0])
+    rivals = tuple(_rival(found, combinations, noise, before, key, total[key], seed) for key in order)
+    draws = _over_all(rivals, before, seed)
+    return ModelAverage(rivals, _reported(before, draws), draws)
+
+
+def _over_all(rivals: Sequence[Rival], before: MeasurementModel, seed: int) -> Floats:
+    """Draws (N, k) of the unknowns of the job's model, whichever explanation is the right one."""
+    keys, each = [unknown.key for unknown in before.unknowns], []
+    for rival in rivals:
+        own = {unknown.key: column for column, unknown in enumerate(rival.model.unknowns)}
+        each.append(rival.draws[:, [own[key] for key in keys]])
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(18,)))
+    return mixed(each, [rival.probability for rival in rivals], random)
+
+
+def needed_combinations(combinations: Combinations) -> dict[Key, float]:
+    """Probability of every combination of which each member explains something.
+
+    One whose evidence is not three times that without a member is no other explanation than that without it: its probability
+    goes there. (A recording that is consistent leaves open as well what it does not show.)
+    """
+    evidence = {key: one.log_posterior - one.log_prior for key, one in combinations.found.items()}
+    total = dict(combinations.probability)
+    for key in sorted(total, key=lambda key: -len(key)):
+        fewer = [key - {i} for i in key if key - {i} in evidence]
+        enough = [one for one in fewer if evidence[key] - evidence[one] < _WORTH]
+        if enough:
+            total[max(enough, key=lambda one: evidence[one])] += total.pop(key)
+    return total
+
+
+def _rival(
+    found: SearchResult, combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: MeasurementModel,
+    key: Key, probability: float, seed: int,
+) -> Rival:  # fmt: skip
+    """One that remains; ``noise`` is what whitens observations, and its standard deviation of a reading, mm."""
+    explanations, (white, sigma) = found.first.explanations, noise
+    functions = sorted(i for i in key if explanations[i].kind == UNKNOWN)
+    combination = max(
+        (k for k in combinations.found if key <= k and combinations.effects_of(k) == combinations.effects_of(key)),
+        key=lambda k: combinations.found[k].log_posterior,
+    )
+    versions = combinations.found[combination].versions
+    effects = key - frozenset(functions)
+    model = before
+    if effects:
+        model = with_effects(found.first, versions, effects)
+        model = replace(model, artefact=before.artefact, used=before.used)
+    linear = replace(model.linearised(_about(model, before, found.model)), sigma=None)
+    for version in versions:
+        if version.explanation in functions:
+            member = explanations[version.explanation].members[version.member]
+            linear = _with_columns(linear, member.columns, version.amplitude * sigma)
+    own = linear.uncorrelated(white)
+    draws = _drawn(own, sigma, found.stated, seed)[:, : len(model.unknowns)]
+    reported = _reported(model, draws)
+    added = tuple(effect.name for effect in model.effects if effect.name not in {e.name for e in before.effects})
+    return Rival(
+        probability, added, tuple(explanations[i].name for i in functions),
+        {effect.name: reported[effect.name] for effect in before.effects}, {name: reported[name] for name in added},
+        model, draws,
+    )  # fmt: skip
+
+
+def _about(model: MeasurementModel, *estimated: MeasurementModel) -> Floats:
+    """Parameters (k,) that a model is linear about: as the last of others estimates them, else as they are known beforehand.
+
+    It is not estimated by itself: what it cannot tell apart is held by what physics allows alone.
+    """
+    values = {unknown.key: unknown.prior_mean for unknown in model.unknowns}
+    for other in estimated:
+        values |= dict(zip((unknown.key for unknown in other.unknowns), other.estimate().about, strict=True))
+    return np.array([values[unknown.key] for unknown in model.unknowns])
+
+
+def _with_columns(linear: LinearModel, columns: Floats, sd: float) -> LinearModel:
+    """With what is unknown besides: columns (m, r), mm, whose coefficients have this standard deviation."""
+    more = tuple(Unknown(("unknown", str(i)), unit("1"), 0.0, sd, sd) for i in range(columns.shape[1]))
+    return replace(linear, design=np.hstack([linear.design, columns]), unknowns=(*linear.unknowns, *more))
+
+
+def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -> Floats:
+    """Draws (N, k) from the multivariate t distribution of all that is linear, the noise estimated from what it leaves."""
+    reduced = linear.reduced
+    known = _AS_READINGS if stated is not None and 0.5 < sigma / stated < 2 else 0
+    mean, covariance, degrees = np.zeros(0), np.zeros((0, 0)), 1.0
+    for _ in range(_ROUNDS):
+        mean, covariance, _ = Density(replace(linear, sigma=sigma)).conditional(float(np.log(sigma)))
+        left = reduced.observed - reduced.design @ mean
+        fitted = float(np.einsum("ij,jk,ik->", reduced.design, covariance, reduced.design)) / sigma**2
+        degrees = max(reduced.count - fitted, 1.0) + known
+        sigma = float(np.sqrt((left @ left + known * (stated or 0.0) ** 2) / degrees))
+        sigma = max(sigma, 1e-6)
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(17,)))
+    scale = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    half = vectors * np.sqrt(np.maximum(values, 0.0))
+    # The symmetric root: axes of equal length turn with the last digits, their sum does not.
+    root = scale[:, None] * (half @ vectors.T)
+    normal = random.standard_normal((_DRAWS, len(mean)))
+    wider = np.sqrt(degrees / random.chisquare(degrees, _DRAWS))
+    return np.asarray(mean + wider[:, None] * (normal @ root.T))
+
+
+def _reported(model: MeasurementModel, draws: Floats) -> dict[str, dict[str, Quantity]]:
+    """Parameters of every effect as they are reported, by effect and name."""
+    found: dict[str, dict[str, Quantity]] = {}
+    column = 0
+    for effect in model.effects:
+        own = draws[:, column : column + len(effect.coefficients)]
+        column += len(effect.coefficients)
+        shape = np.tile(np.array(model.shapes.get(effect.name, ()), dtype=np.float64), (len(own), 1))
+        units = {parameter.name: parameter.unit for parameter in effect.reported}
+        # what shapes an effect is held here: neither it nor a phase, which goes with it, is estimated
+        held = {shaped.name for shaped in effect.shape} | ({"phase_rad"} if effect.shape else set())
+        found[effect.name] = {
+            name: Quantity.of_draws(values, units[name])
+            for name, values in effect.to_reported(own, shape).items() if name not in held
+        }  # fmt: skip
+    return found

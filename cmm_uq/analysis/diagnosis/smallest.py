@@ -1,0 +1,254 @@
+"""What a recording would not have shown: of each effect the smallest amplitude that its diagnosis would have found.
+
+On the recording's own design, with the noise that was found, beside what was asserted. *Detected* and *named* are those of
+``power``, but here probabilities are a closed form (``detection``): the statistic is
+computed on the bare effect at a few sizes, and where it passes the threshold of the recording's own null distribution is
+interpolated; no recording is drawn. How far the two differ is in docs/diagnosis.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
+from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
+from cmm_uq.analysis.diagnosis.power import ALLOWED
+from cmm_uq.analysis.diagnosis.visibility import HIDDEN, Thresholds, Visibility, aliased, phases, thresholds
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import Unit
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import CONTRACT, Effect
+
+POWER = 0.9
+
+BLIND = 1 / 6
+"""Part of what physics allows, half of its standard deviation, that a recording with power shows of a common effect."""
+
+USUAL_LENGTH = 6.0
+"""Visible length, over the noise, from which on a usual diagnosis detects an effect."""
+
+_FAINT = 0.5
+"""Visible length of the largest allowed amplitude below which an effect is not looked at."""
+
+ABSORBED = 1e-5
+"""Part of its length below which a column is the baseline's own."""
+
+
+@dataclass(frozen=True)
+class PeriodRange:
+    """Of an effect with a nonlinear parameter, for which values of it the figures hold.
+
+    Parameters
+    ----------
+    parameter, unit : its name and unit.
+    low, high : range of what is tried.
+    worst : largest of the smallest amplitudes that are detected, over all resolved values and any phase.
+    unresolved : ranges of values that the positions do not resolve: nothing of them is left, or another looks the same.
+    """
+
+    parameter: str
+    unit: Unit
+    low: float
+    high: float
+    worst: float | None
+    unresolved: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SmallestEffect:
+    """How large one effect must have been for the recording to show it.
+
+    Parameters
+    ----------
+    effect, title : its name, and in words.
+    parameter, unit : its (first) parameter.
+    allowed : largest amplitude that physics allows.
+    detected : amplitude detected with a probability of 90 %, though beyond what is allowed; ``None`` where hardly any is.
+    named : amplitude named rightly with this probability; ``None`` where none that is allowed is.
+    share : part of the effect's length in the observations that what is fitted leaves.
+    taken_up : names of what is fitted that takes up the rest, where that is most of it.
+    common : whether it is one of the common effects.
+    periods : where it has a nonlinear parameter, of which the figures are then the typical ones.
+    length : of what is left of it over the noise, from which on it is detected; ``None`` where it was not computed.
+    """
+
+    effect: str
+    title: Text
+    parameter: str
+    unit: Unit
+    allowed: float
+    detected: float | None
+    named: float | None
+    share: float
+    taken_up: tuple[str, ...]
+    common: bool
+    periods: PeriodRange | None = None
+    length: float | None = None
+
+    @property
+    def shown(self) -> bool:
+        """Whether an amplitude that physics allows would have been detected."""
+        return self.detected is not None and self.detected <= self.allowed
+
+    @property
+    def blind(self) -> bool:
+        """Whether not even a plausible amplitude of a common effect would have been detected, though it shows at all."""
+        there = self.share > 0 or bool(self.taken_up)
+        return self.common and there and (self.detected is None or self.detected > BLIND * self.allowed)
+
+
+def smallest_effects(found: SearchResult, alpha: float, model: MeasurementModel) -> tuple[SmallestEffect, ...]:
+    """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
+
+    Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
+
+    Parameters
+    ----------
+    found : the search of the recording.
+    alpha : false-alarm rate.
+    model : with all that was asserted.
+    """
+    view = Visibility.of(found)
+    named = {effect.name for effect in model.effects}
+    listed = [
+        (i, explanation, effect)
+        for i, explanation in enumerate(view.explanations)
+        if (effect := explanation.effect) is not None and not effect.of_artefact and explanation.name not in named
+    ]
+    signals = _signals(view, listed)
+    visible = [signal for signal in signals if signal.unit_length * ALLOWED > _FAINT]
+    which, columns = [s.index for s in visible], np.array([s.column / s.unit_length for s in visible])
+    each = dict(zip(which, thresholds(view, which, columns, alpha), strict=True))
+    rows = [signal.smallest(view, each.get(signal.index)) for signal in signals]
+    known = {explanation.name for explanation in view.explanations}
+    rows += [_never(effect) for effect in _motionless(found.first.model, named | known)]
+    return tuple(sorted(rows, key=lambda row: -_reach(row)))
+
+
+def _reach(row: SmallestEffect) -> float:
+    return min(float("inf") if row.detected is None else row.detected / row.allowed, 1e9)
+
+
+def _never(effect: Effect) -> SmallestEffect:
+    parameter = effect.coefficients[0]
+    allowed, common = ALLOWED * parameter.prior_sd, effect.tier == CONTRACT
+    name = effect.reported[0].name
+    return SmallestEffect(effect.name, effect.title, name, parameter.unit, allowed, None, None, 0.0, (), common)
+
+
+def _motionless(model: MeasurementModel, known: set[str]) -> Iterator[Effect]:
+    """Common effects of which nothing shows in such observations, though they could act and all that they need is recorded."""
+    points = model.artefact.points
+    for effect in every().values():
+        if effect.name in known or effect.tier != CONTRACT or effect.shape:
+            continue
+        if any(column not in points.columns for column in effect.columns) or effect.unfit(points) is not None:
+            continue
+        try:
+            effect.basis(points)
+        except CmmUqError:  # the job does not give the travel that this effect needs
+            continue
+        yield effect
+
+
+@dataclass(frozen=True, eq=False)
+class _Signal:
+    """What an effect shows, for a coefficient as large as its prior standard deviation.
+
+    ``column`` (m,) is what is left of it, ``unit_length`` its visible length; ``raw`` (m,) the whole. Of an effect with a
+    nonlinear parameter it is the typical one; ``worst`` and ``typical`` (p,) are then the lengths at each value of ``values``.
+    """
+
+    index: int
+    effect: Effect
+    raw: Floats
+    column: Floats
+    unit_length: float
+    values: Floats
+    worst: Floats
+    typical: Floats
+    resolved: NDArray[np.bool_]
+
+    @classmethod
+    def shaped(cls, view: Visibility, index: int, explanation: Explanation, effect: Effect) -> _Signal:
+        """Of an effect with a nonlinear parameter."""
+        scale = view.found.first.comparison.noise_scale[:, None]
+        members = [member for member in explanation.members if member.shape and not member.rough]
+        raws = np.stack([member.columns / scale for member in members])
+        p, m, r = raws.shape
+        lefts = view.rest(raws.transpose(1, 0, 2).reshape(m, p * r)).reshape(m, p, r).transpose(1, 0, 2)
+        worst, typical, way = phases(view, lefts)
+        middle = int(np.argsort(typical)[p // 2])
+        values = np.array([member.shape[0] for member in members])
+        column = lefts[middle] @ way[middle]
+        length = float(view.lengths(column[:, None])[0])
+        resolved = np.logical_not(aliased(view, lefts, values))
+        return cls(index, effect, raws[middle] @ way[middle], column, length, values, worst, typical, resolved)
+
+    def smallest(self, view: Visibility, thresholds: Thresholds | None) -> SmallestEffect:
+        """The row of this effect."""
+        effect, parameter = self.effect, self.effect.coefficients[0]
+        whole = float(np.linalg.norm(self.raw))
+        share = float(np.linalg.norm(self.column)) / whole if whole else 0.0
+        detected = named = None
+        length = float(np.inf) if thresholds is None else thresholds.length_detected(POWER)
+        if thresholds is not None:
+            detected = _amplitude(length, self.unit_length, parameter.prior_sd)
+            if length <= self.unit_length * ALLOWED:
+                named = _amplitude(thresholds.length_named(POWER), self.unit_length, parameter.prior_sd)
+        periods = self._periods(length) if len(self.values) else None
+        taken_up = view.taking(self.raw) if share < HIDDEN else ()
+        return SmallestEffect(
+            effect.name, effect.title, effect.reported[0].name, parameter.unit, ALLOWED * parameter.prior_sd, detected, named,
+            share, taken_up, effect.tier == CONTRACT, periods, length if np.isfinite(length) else None,
+        )  # fmt: skip
+
+    def _periods(self, length: float) -> PeriodRange:
+        parameter = self.effect.coefficients[0]
+        shown = self.resolved & (self.worst * ALLOWED >= length)
+        worst = _amplitude(length, float(self.worst[shown].min()), parameter.prior_sd) if shown.any() else None
+        shape = self.effect.shape[0]
+        order = np.argsort(self.values)
+        values = self.values[order]
+        return PeriodRange(
+            shape.name, shape.unit, float(values[0]), float(values[-1]), worst, _ranges(values, ~shown[order])
+        )
+
+
+def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]) -> list[_Signal]:
+    """What each of some effects shows; of several coefficients the first."""
+    straight = [row for row in listed if not row[1].shaped]
+    scale, none = view.found.first.comparison.noise_scale, np.zeros(0)
+    raws = np.column_stack([np.zeros((len(scale), 0)), *(e.members[0].columns[:, 0] / scale for _, e, _ in straight)])
+    lefts = view.rest(raws)
+    there = np.linalg.norm(lefts, axis=0) > ABSORBED * np.linalg.norm(raws, axis=0)
+    lefts = np.where(there, lefts, 0.0)
+    found = [
+        _Signal(i, effect, raw, left, length, none, none, none, none > 0)
+        for (i, _, effect), raw, left, length in zip(
+            straight, raws.T, lefts.T, view.lengths(lefts).tolist(), strict=True
+        )
+    ]
+    return found + [_Signal.shaped(view, *row) for row in listed if row[1].shaped]
+
+
+def _amplitude(length: float, unit_length: float, unit: float) -> float | None:
+    return length / unit_length * unit if np.isfinite(length) and unit_length > 0 else None
+
+
+def _ranges(values: Floats, chosen: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+    """Runs of ascending values (p,) that are chosen."""
+    found: list[tuple[float, float]] = []
+    run = False
+    for value, one in zip(values.tolist(), chosen.tolist(), strict=True):
+        if one:
+            found.append((found.pop()[0], value) if run else (value, value))
+        run = bool(one)
+    return tuple(found)

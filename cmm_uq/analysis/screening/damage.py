@@ -1,0 +1,396 @@
+"""Which coordinates of a recording are damaged, and how: found against the artefact's own shape, before anything is fitted.
+
+Which coordinates of a recording are damaged, and how: found against the artefact's own shape, before anything is fitted.
+
+What makes the whole recording wrong is refused. Single rows, bars or placings are reported with what undoes the damage, and
+left out; nothing is repaired in silence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations, pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq.analysis.screening.finding import Finding, at_lines, finding
+from cmm_uq.analysis.screening.mistakes import Mistake, block_mistakes, row_mistakes
+from cmm_uq.analysis.screening.shape import ArtefactShape
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, plural, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.machine.model.kind import Observed
+from cmm_uq.machine.model.placings import Placings
+
+MOST = 0.2
+"""Part of the rows that may be left out; with more damage the recording is refused."""
+
+_PART, _STRAYS = 0.2, 0.05
+_FEW, _MANY = 16, 60
+_MOST_BALLS = 400
+_SAME_PLACE = 10.0
+_TRAVEL_TOLERANCE = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Damage:
+    """What happened to some rows, and all coordinates and references without it, where that is known."""
+
+    kind: str
+    rows: Ints
+    why: Text
+    column: str | None = None
+    mended: tuple[Floats, Floats] | None = None
+
+
+class DamageSearch:
+    """The points that miss an artefact, and what makes them fit.
+
+    Parameters
+    ----------
+    points : the recording.
+    shape : what its artefact asks of them.
+
+    Attributes
+    ----------
+    misfit : (n,) by how much each point misses the artefact, mm.
+    bad : (n,) points that miss it by too much, and a few that lie as far outside the travel as that is long.
+    """
+
+    def __init__(self, points: Points, shape: ArtefactShape) -> None:
+        self.points, self.shape = points, shape
+        self.misfit = shape.misfit(points.xyz, shape.reference)
+        self.bad = self._wrong(self.misfit)
+        sound = self.misfit[~self.bad]
+        usual = 0.05 + 10 * float(np.median(sound)) if len(sound) else np.inf
+        self._fine = min(shape.tolerance, usual)
+        self._placing = np.full(len(points), -1)
+        for i, rows in enumerate(shape.rows):
+            self._placing[rows] = i
+        self._inside = bool(np.any(outside_travel(points)[~self.bad], axis=1).mean() < _STRAYS) if len(sound) else False
+        self._xyz, self._reference = points.xyz, shape.reference
+        self._open, self._settled = self.bad.copy(), np.zeros(len(points), dtype=bool)
+
+    def findings(self) -> list[Finding]:
+        """What is damaged, by its cause where that is known, each with the rows to leave out."""
+        found = []
+        for causes in (self._copies(), self._swapped(_FEW), self._blocks(), self._swapped(_MANY), self._singles()):
+            for cause in causes:
+                self._settle(cause)
+                found.append(self._finding(cause))
+        groups = self.points.group if self.shape.together else np.arange(len(self.points))
+        unknown = [np.flatnonzero(self._open & (groups == group)) for group in np.unique(groups[self._open])]
+        why = say("no known mistake explains it: measure again")
+        return found + [self._finding(Damage("outlier", rows, why)) for rows in unknown]
+
+    def changed(self, change: Mistake, rows: Ints) -> tuple[Floats, Floats]:
+        """Coordinates and references with a mistake undone in some rows, beside those that are undone already."""
+        xyz, reference = self._xyz.copy(), self._reference.copy()
+        xyz[rows], reference[rows] = change.apply(xyz[rows], reference[rows])
+        return xyz, reference
+
+    def _wrong(self, misfit: Floats) -> NDArray[np.bool_]:
+        low, high = self.points.machine.travel_mm.T
+        beyond = np.maximum(low - self.points.carriages, self.points.carriages - high)
+        astray = np.any(beyond > high - low, axis=1)
+        missed = misfit > self.shape.tolerance
+        return np.asarray(missed | astray if astray.mean() <= MOST else missed)
+
+    def _settle(self, cause: Damage) -> None:
+        """Take rows whose damage is known out of the search, and look again at those that stand in their placings."""
+        self._settled[self._lost_with(cause.rows)] = True
+        if cause.mended is not None:
+            self._xyz, self._reference = cause.mended
+        again = np.isin(self._placing, self._placing[cause.rows])
+        misfit = self.shape.misfit(self._xyz, self._reference, self._placings(cause.rows))
+        self._open[again] = (self._wrong(misfit) & ~self._settled)[again]
+
+    def _finding(self, cause: Damage) -> Finding:
+        rows = cause.rows
+        amount = float(self.misfit[rows].max())
+        missed = (
+            say("the artefact is missed by {amount:.3g} mm, far more than any machine's error", amount=amount)
+            if np.isfinite(amount)
+            else say("the artefact is missed far more than any machine's error")
+        )
+        what = missed if amount > self.shape.tolerance else say("the readings lie far outside the travel")
+        told = say("{at_lines}: {what}; {why}", at_lines=at_lines(self.points, rows), what=what, why=cause.why)
+        lost = tuple(int(row) for row in self._lost_with(rows))
+        return replace(finding(cause.kind, self.points, rows, told, cause.column), set_aside=True, rows=lost)
+
+    def _lost_with(self, rows: Ints) -> Ints:
+        """Rows that cannot be used without these: the other end of a bar, the other corners of a triangle."""
+        return np.flatnonzero(np.isin(self.points.group, self.points.group[rows])) if self.shape.together else rows
+
+    def _placings(self, rows: Ints) -> list[int]:
+        return [int(i) for i in np.unique(self._placing[rows]) if i >= 0]
+
+    def _copies(self) -> Iterator[Damage]:
+        """Rows with all three coordinates of another row, where they do not fit; those of one block together."""
+        _, same = np.unique(self.points.xyz, axis=0, return_inverse=True)
+        rows, originals = [], []
+        for row in np.flatnonzero(self._open):
+            others = np.flatnonzero(same.ravel() == same.ravel()[row])
+            others = others[self._other_place(others, np.full(len(others), row))]
+            if len(others):
+                rows.append(row)
+                originals.append(others[0])
+        block, source = np.array(rows, dtype=np.int64), np.array(originals, dtype=np.int64)
+        offset = np.diff(block - source, prepend=0, append=0) if len(block) else block
+        for start, end in pairwise(sorted({0, *np.flatnonzero(offset).tolist(), len(block)})):
+            lines = at_lines(self.points, source[start:end])
+            why = plural(
+                end - start,
+                one=say("it has the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
+                many=say("they have the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
+            )
+            yield Damage("duplicate" if end - start == 1 else "repeated block", block[start:end], why)
+
+    def _other_place(self, rows: Ints, others: Ints) -> NDArray[np.bool_]:
+        keys = np.column_stack([self.points.measurement, self.points.point])
+        return np.asarray(np.any(keys[rows] != keys[others], axis=1))
+
+    def _swapped(self, most: int) -> Iterator[Damage]:
+        """Two points that fit once they are exchanged."""
+        rows = np.flatnonzero(self._open)
+        if len(rows) > most:
+            return
+        for pair in combinations(rows.tolist(), 2):
+            chosen = np.array(pair)
+            if not self._open[chosen].all() or (self.shape.together and np.ptp(self._placing[chosen]) == 0):
+                continue
+            xyz = self._xyz.copy()
+            xyz[chosen] = xyz[chosen[::-1]]
+            if self._fit(chosen, xyz, self._reference):
+                why = self._exchanged(chosen)
+                yield Damage("swapped", chosen, why, None, (xyz, self._reference))
+
+    def _exchanged(self, pair: Ints) -> Text:
+        one, other = (
+            say("point {point} of measurement {measurement}", point=point, measurement=measurement)
+            for point, measurement in zip(self.points.point[pair], self.points.measurement[pair], strict=True)
+        )
+        if self.shape.is_bar:
+            return say("{one} and {other}, or the other ends of these bars, are exchanged: exchange their coordinates",
+                       one=one, other=other)  # fmt: skip
+        return say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
+
+    def _blocks(self) -> Iterator[Damage]:
+        """Measurements, runs of rows and repeats that fit as a whole once one mistake is undone in all their rows."""
+        both = (*row_mistakes(self.shape), *block_mistakes(self.shape))
+        for rows in self._candidates():
+            if self._open[rows].mean() >= _PART and (cause := self._first(both, rows)) is not None:
+                yield cause
+        for rows in self._candidates():
+            if self._open[rows].mean() >= _PART and self._numbered_otherwise(rows):
+                why = say("its points seem numbered in another order than the references: number them alike")
+                yield Damage("swapped", rows, why)
+
+    def _candidates(self) -> Iterator[Ints]:
+        several = 1 if self.shape.together else 3
+        if self.shape.names or not self.shape.together:
+            for number in np.unique(self.points.measurement[self._open]):
+                yield np.flatnonzero(self.points.measurement == number)
+        rows = np.flatnonzero(self._open)
+        if len(rows) > several:
+            yield np.arange(rows[0], rows[-1] + 1)
+        for group in np.unique(self.points.group[self._open]):
+            rows = np.flatnonzero(self.points.group == group)
+            if len(rows) > several:
+                yield rows
+
+    def _singles(self) -> Iterator[Damage]:
+        every = row_mistakes(self.shape)
+        outside: NDArray[np.bool_] = np.any(outside_travel(self.points), axis=1)
+        rows = np.flatnonzero(self._open)
+        for row in rows[np.argsort(~outside[rows], kind="stable")].tolist():
+            if self._open[row] and (cause := self._stuck(row) or self._first(every, np.array([row]))) is not None:
+                yield cause
+
+    def _stuck(self, row: int) -> Damage | None:
+        """One coordinate repeated from the row before, digit for digit, while the others moved on."""
+        same = self.points.xyz[row] == self.points.xyz[row - 1] if row else np.zeros(3, dtype=bool)
+        if same.sum() != 1:
+            return None
+        column = f"{AXES[int(np.argmax(same))]}_mm"
+        why = say("{column} seems stuck at the value of the row before. Measure again", column=Verbatim(column))
+        return Damage("stuck", np.array([row]), why, column)
+
+    def _first(self, every: Iterable[Mistake], rows: Ints) -> Damage | None:
+        for change in every:
+            if change.edges and len(rows) < 4:
+                continue
+            xyz, reference = self.changed(change, rows)
+            if self._fit(rows, xyz, reference, change.edges):
+                why = say("{what}. {fix}", what=change.what, fix=change.fix)
+                return Damage(change.kind, rows, why, change.columns[0], (xyz, reference))
+        return None
+
+    def _fit(self, rows: Ints, xyz: Floats, reference: Floats, edges: int = 0) -> bool:
+        """Whether these rows fit as well as the sound ones, inside the travel as these are, where their repeats are."""
+        after = self.shape.misfit(xyz, reference, self._placings(rows))[rows]
+        return (
+            int(np.sum(after > self._fine)) <= edges
+            and not (self._inside and np.any(outside_travel(self.points.at(xyz))[rows]))
+            and self._near_repeats(rows, xyz) >= len(rows) - edges
+        )
+
+    def _near_repeats(self, rows: Ints, xyz: Floats) -> int:
+        """How many of some rows lie where sound repeats of the same points lie, or have none."""
+        near, points = 0, self.points
+        for row in rows:
+            same = (points.measurement == points.measurement[row]) & (points.point == points.point[row]) & ~self.bad
+            same[rows] = False
+            near += not same.any() or bool(np.linalg.norm(xyz[same] - xyz[row], axis=1).min() < _SAME_PLACE)
+        return near
+
+    def _numbered_otherwise(self, rows: Ints) -> bool:
+        """Whether a placing that does not fit by itself has the artefact's distances, in another order."""
+        if not self.shape.names[2:] or self.shape.names[0] == "nx" or len(rows) > _MOST_BALLS:
+            return False
+        xyz, reference = self.points.xyz[rows], self.shape.reference[rows]
+        if np.median(self.shape.misfit_of(xyz, reference, self.shape.size)) <= self.shape.tolerance:
+            return False
+        found, own = (
+            np.sort(np.linalg.norm(v[:, None] - v[None], axis=2)[np.triu_indices(len(v), 1)]) for v in (xyz, reference)
+        )
+        return bool(np.abs(found - own).max(initial=0.0) < self.shape.tolerance)
+
+
+def outside_travel(points: Points) -> NDArray[np.bool_]:
+    """(n, 3) whether a scale reading lies outside its travel."""
+    low, high = points.machine.travel_mm.T
+    readings = points.carriages
+    return np.asarray((readings < low - _TRAVEL_TOLERANCE) | (readings > high + _TRAVEL_TOLERANCE))
+
+
+_SEVERAL = 4
+_EDGES = 0.05
+_ABSURD = (1.0, 2e4)
+"""mm; a bar shorter or longer than this is in another unit."""
+
+
+def coordinate_findings(
+    points: Points, shape: ArtefactShape, observe: Observed, set_aside: Collection[int], where: str
+) -> list[Finding]:
+    """Damaged coordinates, each with the rows to leave out.
+
+    Parameters
+    ----------
+    points : the recording.
+    shape : what the artefact asks of the points.
+    observe : makes the artefact of points, in whose own checks another one shows.
+    set_aside : measurements that the job leaves out of the estimates; however many of them are damaged is no matter.
+    where : the recording's name, for messages.
+
+    Raises
+    ------
+    CmmUqError : a damage of the whole recording, or of too much of it.
+    """
+    _refuse_absurd_size(shape, where)
+    search = DamageSearch(points, shape)
+    counted = ~np.isin(points.measurement, list(set_aside))
+    if search.bad.sum() >= _SEVERAL:
+        _refuse_whole(search, where)
+    if 2 * int(search.bad[counted].sum()) > counted.sum():
+        _refuse_another(search, observe, where)
+    found = search.findings() if search.bad.any() else []
+    lost = {row for f in found for row in f.rows if counted[row]}
+    if len(lost) > max(MOST * len(points), 2):
+        raise CmmUqError(
+            f"{len(lost)} of {len(points)} points do not fit the artefact; {found[0].why}", where=where,
+            fix="So much of a recording cannot be left out: mend it, or measure again",
+        )  # fmt: skip
+    return found + _reversed_bars(points, shape)
+
+
+def _refuse_absurd_size(shape: ArtefactShape, where: str) -> None:
+    """A bar without a certificate has no length to compare, but none is shorter than a millimetre, or twenty metres long."""
+    low, high = _ABSURD
+    if np.isfinite(shape.size) or not shape.is_bar or low <= shape.extent <= high:
+        return
+    unit = "metres" if shape.extent < low else "micrometres"
+    raise CmmUqError(
+        f"the recorded bars are about {shape.extent:.3g} mm long: the coordinates look like {unit}, not mm",
+        where=where,
+        fix="Give x_mm, y_mm, z_mm in mm",
+    )
+
+
+def _refuse_whole(search: DamageSearch, where: str) -> None:
+    """Refuse a mistake that concerns the whole recording, or a whole column of it."""
+    points, shape = search.points, search.shape
+    bad = int(search.bad.sum())
+    told = _missed(search)
+    best, fewest = None, min(max(2, int(_EDGES * len(points))), bad // _SEVERAL)
+    strays = max(_EDGES, _astray(points))
+    for change in (*row_mistakes(shape), *block_mistakes(shape)):
+        if _shrinks(change, shape):
+            continue
+        xyz, reference = search.changed(change, np.arange(len(points)))
+        left = int(np.sum(shape.misfit(xyz, reference) > shape.tolerance))
+        if left <= fewest and _astray(points.at(xyz)) <= strays:
+            best, fewest = change, left - 1
+    if best is not None:
+        raise CmmUqError(f"{told}, and fit once one mistake is undone: {best.what}",
+                         where=f"{where}, column {best.columns[0]}", fix=best.fix)  # fmt: skip
+    for axis, column in zip(AXES, points.xyz.T, strict=True):
+        if np.ptp(column) == 0 and bad > MOST * len(points):
+            raise CmmUqError(
+                f"{told}: {axis}_mm is stuck at {column[0]:g} in every row",
+                where=f"{where}, column {axis}_mm",
+                fix="Export the recording again",
+            )
+
+
+def _astray(points: Points) -> float:
+    """Part of the points whose readings lie outside the travel."""
+    return float(np.any(outside_travel(points), axis=1).mean())
+
+
+def _refuse_another(search: DamageSearch, observe: Observed, where: str) -> None:
+    """Refuse a recording of another artefact, or of none: in the words of the artefact's own checks where these see it."""
+    observe(search.points)
+    raise CmmUqError(
+        _missed(search), where=where, fix="Check [artefact] in job.toml, and the order of rows and columns"
+    )
+
+
+def _missed(search: DamageSearch) -> str:
+    bad = int(search.bad.sum())
+    return f"{bad} of {len(search.points)} points miss the artefact by up to {search.misfit.max():.3g} mm"
+
+
+def _shrinks(change: Mistake, shape: ArtefactShape) -> bool:
+    """Whether a change makes everything fit by making everything small: no proof where the size is free."""
+    free = np.isnan(shape.size) and not shape.reference.shape[1]
+    return bool(free and change.kind == "unit" and change.apply(np.ones((1, 3)), np.zeros((1, 0)))[0].min() < 1)
+
+
+def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
+    """Repeats of a bar whose balls are numbered the other way round than in the others."""
+    if not shape.together or shape.reference.shape[1]:
+        return []
+    ends = np.array([rows[np.argsort(points.point[rows])] for rows in shape.rows])
+    bars = points.xyz[ends[:, 1]] - points.xyz[ends[:, 0]]
+    found = []
+    placings = Placings.of(points.measurement[ends[:, 0]])
+    for number, own in zip(placings.numbers, placings.rows, strict=True):
+        if len(own) < 2:
+            continue
+        against = bars[own] @ bars[own[0]] < 0
+        if not against.any():
+            continue
+        fewer = own[against] if against.sum() <= len(own) / 2 else own[~against]
+        rows = ends[fewer].ravel()
+        why = say(
+            "{at_lines}: balls 1 and 2 of measurement {number} are exchanged against its other repeats. "
+            "The length does not show it; what was recorded beside each ball (approach, temperatures) "
+            "may be exchanged too",
+            at_lines=at_lines(points, rows),
+            number=number,
+        )
+        found.append(finding("swapped", points, rows, why))
+    return found

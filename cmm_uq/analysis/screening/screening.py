@@ -1,0 +1,325 @@
+"""Screening of a recording: damaged coordinates, wrong units, slipped or stuck columns, copies, gross outliers.
+
+Screening of a recording: damaged coordinates, wrong units, slipped or stuck columns, copies, gross outliers.
+
+What is found is reported as what it is, never silently dropped or mended. Damage of a whole column, and of a column that the
+model uses, is refused; single damaged rows and columns that nothing needs are left out; the rest is used as it stands. Each
+finding says which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, special
+
+from cmm_uq.analysis.screening.columns import SENSORS, about_whole_column, column_findings
+from cmm_uq.analysis.screening.damage import coordinate_findings, outside_travel
+from cmm_uq.analysis.screening.finding import Finding, finding, span
+from cmm_uq.analysis.screening.shape import Screening
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, comma_or, say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.machine.model.kind import Observe
+from cmm_uq.maths.inference.linear_model import LinearModel
+
+
+def copied_measurements(points: Points) -> dict[int, int]:
+    """Groups that repeat one of another measurement to the last digit, with that other (see :attr:`Points.copies`).
+
+    A repeat that repeats another of its own measurement is none: with a coarse display that happens honestly.
+    """
+    return {
+        later: original
+        for later, original in points.copies.items()
+        if points.run_of(later)[0] != points.run_of(original)[0]
+    }
+
+
+def counted_with(points: Points, set_aside: Collection[int] = ()) -> Ints:
+    """For every point, a row of the group that it counts with: its own, or that of which it is a copy, (n,).
+
+    Parameters
+    ----------
+    points : the recording.
+    set_aside : measurements that the job leaves out; the copy of one counts in its place.
+    """
+    first = np.unique(points.group, return_index=True)[1]
+    counts = np.arange(len(first))
+    for later, original in copied_measurements(points).items():
+        if points.run_of(original)[0] not in set_aside:
+            counts[later] = original
+    return first[counts[points.group]]
+
+
+GROSS = 1e-3
+"""Probability, over all observations together, that noise alone makes one look like an outlier."""
+
+REVERSED = "reversed"
+"""Kind of a finding whose rows are sound, but not what was recorded beside them."""
+
+_UNIT_LENGTH = 0.02
+_REFUSED_WHOLE = ("unit", "sign", "shifted column")
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenedRecording:
+    """A recording that may be fitted, and what screening found in it.
+
+    Parameters
+    ----------
+    points : without the rows and columns that are left out.
+    findings : all of them.
+    """
+
+    points: Points
+    findings: tuple[Finding, ...]
+
+
+def screen_recording(
+    points: Points, facts: ArtefactFacts, screening: Screening | None, observe: Observe, *, needed: Collection[str],
+    set_aside: Collection[int], where: str,
+) -> ScreenedRecording:  # fmt: skip
+    """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it.
+
+    Parameters
+    ----------
+    points : the recording as read.
+    facts : what the job says of the artefact.
+    screening : what its kind asks of a recording; ``None`` when it asks nothing.
+    observe : makes the artefact of facts and points.
+    needed : columns that the model uses.
+    set_aside : measurements that the job leaves out of the estimates.
+    where : the recording's name, for messages.
+
+    Raises
+    ------
+    CmmUqError : a damage of the whole recording, of a whole column, or of one that the model uses.
+    """
+    shape = screening.shape_of(facts, points) if screening else None
+    made = partial(observe, facts, where=where)
+    damaged = coordinate_findings(points, shape, made, set_aside, where) if shape else []
+    balls = screening is not None and screening.balls
+    odd = screen(points, needed=needed, set_aside=set_aside, where=where, balls=balls)
+    if shape and shape.together:
+        damaged = [_reversal(found, points, needed) for found in damaged]
+    findings = (*damaged, *(_left_out(f) for f in odd if not _told(f, damaged)))
+    lost = sorted({row for found in findings for row in found.rows})
+    kept = points.select(np.delete(np.arange(len(points)), lost)) if lost else points
+    return ScreenedRecording(with_sound_sensors(kept, findings), findings)
+
+
+def with_sound_sensors(points: Points, findings: Sequence[Finding]) -> Points:
+    """The same points without columns of sensors that cannot be trusted."""
+    gone = {found.column for found in findings if found.set_aside and found.column in SENSORS}
+    return replace(points, columns={name: values for name, values in points.columns.items() if name not in gone})
+
+
+def screen(
+    points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, balls: bool = False
+) -> tuple[Finding, ...]:
+    """All that is odd in a recording without regard to its artefact's shape.
+
+    Parameters
+    ----------
+    points : the recording.
+    needed : columns that the model uses.
+    set_aside : measurements that the job leaves out of the estimates.
+    where : the recording's name, for messages.
+    balls : whether its points are centres of balls or cylinders, each of several touches.
+
+    Raises
+    ------
+    CmmUqError : a whole column in another unit or place, or a value that the model uses cannot be.
+    """
+    impossible = impossible_values(points, balls=balls)
+    for found in impossible:
+        if found.column in needed:
+            raise CmmUqError(found.why, where=_place(where, found),
+                             fix="The model uses this column: mend it, or leave out the effect that needs it")  # fmt: skip
+        if found.kind in _REFUSED_WHOLE and about_whole_column(found, points):
+            raise CmmUqError(found.why, where=_place(where, found), fix="Mend the column, or remove it")
+    odd = (*impossible, *repeated_figures(points))
+    return tuple(replace(f, set_aside=_aside(f, set_aside)) for f in odd)
+
+
+def impossible_values(points: Points, *, balls: bool = False) -> list[Finding]:
+    """Values that cannot be: one finding a column, and one an axis whose readings leave the machine's travel."""
+    found = column_findings(points, balls=balls)
+    if all(f"n{a}" in points.columns for a in AXES):
+        norm = np.linalg.norm([points.columns[f"n{a}"] for a in AXES], axis=0)
+        if np.any(rows := np.abs(norm - 1) > _UNIT_LENGTH):
+            found.append(finding("impossible", points, rows, say("the normal nx, ny, nz has no unit length"), "nx"))
+    outside = outside_travel(points)
+    for i, axis in enumerate(AXES):
+        if np.any(rows := outside[:, i]):
+            low, high = points.machine.travel_mm[i]
+            why = say(
+                "scale readings of {axis} ({column}_mm + origin) of {span} mm lie outside the travel {low:g} "
+                "to {high:g} mm{hint}",
+                axis=Verbatim(axis.upper()),
+                column=Verbatim(axis),
+                span=span(points.readings[axis][rows]),
+                low=low,
+                high=high,
+                hint=_hint(points, i),
+            )
+            found.append(finding("impossible", points, rows, why, f"{axis}_mm"))
+    return found
+
+
+def repeated_figures(points: Points) -> list[Finding]:
+    """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
+    copies = sorted((original, later) for later, original in copied_measurements(points).items())
+    copies.sort(key=lambda pair: pair[1])
+    return [_copied(points, run) for run in _runs(copies)]
+
+
+def gross_outliers(
+    linear: LinearModel, measurement: NDArray[np.int64], least: float = 0.0
+) -> list[tuple[int, float]]:  # fmt: skip
+    """Observations (index, times of their standard deviation) that noise would hardly ever put so far off.
+
+    Externally studentised residuals against their t distribution, the probability multiplied by the number of
+    observations (Bonferroni; Barnett & Lewis 1994, 8.2); the worst is taken out and the rest tested again, up to a tenth
+    of the recording.
+
+    Parameters
+    ----------
+    linear : with its estimate's observations.
+    measurement : (m,) of each observation.
+    least : mm, noise that the observations have however little they scatter, as that of their last digit.
+    """
+    reduced = linear.reduced
+    keep = np.ones(len(reduced.observed), dtype=bool)
+    found: list[tuple[int, float]] = []
+    scale = np.array([u.scale for u in linear.unknowns])
+    for _ in range(max(1, len(keep) // 10)):
+        U, s, _ = linalg.svd(reduced.design[keep] * scale, full_matrices=False)
+        U = U[:, s > 1e-9 * s[0]] if s.size else U
+        dof = reduced.count - (~keep).sum() - U.shape[1] - 1
+        if dof < 3:
+            break
+        residual = reduced.observed[keep] - U @ (U.T @ reduced.observed[keep])
+        free = np.maximum(1 - np.einsum("ij,ij->i", U, U), 1e-12)
+        rest = np.maximum(residual @ residual - residual**2 / free, 0.0)
+        with np.errstate(divide="ignore"):
+            t = np.where(rest > 0, np.abs(residual) / np.sqrt(free * np.maximum(rest / dof, least**2)), 0.0)
+        worst = int(np.argmax(t))
+        if 2 * special.stdtr(dof, -t[worst]) * len(measurement) > GROSS:
+            break
+        index = int(np.flatnonzero(keep)[worst])
+        found.append((index, float(t[worst])))
+        keep[index] = False
+    return found
+
+
+def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
+    originals, later = zip(*run, strict=True)
+    both = np.isin(points.group, (*originals, *later))
+    if len(run) == 1:
+        a, b = _measurement(points, originals[0]), _measurement(points, later[0])
+        why = say(
+            "measurement {b} repeats the coordinates of measurement {a} to the last digit: a copy, not a measurement, and "
+            "counts once",
+            b=b,
+            a=a,
+        )
+        return replace(finding("duplicate", points, both, why), measurements=(a, b))
+    ends = [_measurement(points, group) for group in (later[0], later[-1], originals[0], originals[-1])]
+    first, last, original, final = ends
+    block = say(
+        "measurements {first} to {last} repeat the coordinates of measurements {original} to {final} to the last digit: a "
+        "block pasted twice, whose copies say nothing: remove them, or record what was measured",
+        first=first,
+        last=last,
+        original=original,
+        final=final,
+    )
+    rows = tuple(np.flatnonzero(np.isin(points.group, later)).tolist())
+    return replace(finding("repeated block", points, both, block), rows=rows)
+
+
+def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
+    """Copies in runs whose originals and copies both follow each other."""
+    runs: list[list[tuple[int, int]]] = []
+    for a, b in copies:
+        if runs and runs[-1][-1] == (a - 1, b - 1):
+            runs[-1].append((a, b))
+        else:
+            runs.append([(a, b)])
+    return runs
+
+
+def _measurement(points: Points, group: int) -> int:
+    return points.run_of(group)[0]
+
+
+def _aside(found: Finding, set_aside: Collection[int]) -> bool:
+    """Whether the estimates leave out what was found: a copy, or a measurement that the job leaves out."""
+    *others, last = found.measurements
+    return last in set_aside or (found.kind == "duplicate" and not any(other in set_aside for other in others))
+
+
+def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Finding:
+    """A bar numbered the other way round is left out where the model uses what was recorded beside each ball."""
+    if found.kind != "swapped" or found.rows:
+        return found
+    rows = np.flatnonzero(np.isin(points.lines, found.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
+    differing = [
+        name
+        for name in needed
+        for group in np.unique(points.group[rows])
+        if np.ptp(points.column(name)[points.group == group]) > 0
+    ]
+    if not differing:
+        return found
+    why = say(
+        "{why}; the model uses {differing}: number the balls as in the other repeats",
+        why=found.why,
+        differing=Verbatim(differing[0]),
+    )
+    return replace(found, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
+
+
+def _left_out(found: Finding) -> Finding:
+    """Copies of a block are left out, and columns of sensors that cannot be trusted."""
+    return replace(found, set_aside=found.set_aside or bool(found.rows) or found.column in SENSORS)
+
+
+def _told(found: Finding, damaged: Sequence[Finding]) -> bool:
+    """Whether a reading outside the travel is told already as what it is."""
+    lines = {line for other in damaged for line in other.lines}
+    return found.kind == "impossible" and found.column in ("x_mm", "y_mm", "z_mm") and set(found.lines) <= lines
+
+
+def _hint(points: Points, axis: int) -> Text:
+    """What would bring most readings of an axis inside: the origin, a sign, another axis."""
+    if outside_travel(points)[:, axis].mean() < 0.5:
+        return NOTHING
+    low, high = points.machine.travel_mm[axis]
+
+    def inside(readings: Floats) -> bool:
+        return bool(np.mean((readings >= low) & (readings <= high)) > 0.95)
+
+    origin = points.machine.origin_mm
+    own = Verbatim(f"{AXES[axis]}_mm")
+    hints = [say("a missing origin_mm")]
+    if inside(origin[axis] - points.xyz[:, axis]):
+        hints.append(say("{column} with the wrong sign", column=own))
+    hints += [
+        say("{column} exchanged with {other}", column=own, other=Verbatim(f"{AXES[j]}_mm"))
+        for j in range(3)
+        if j != axis and inside(origin[axis] + points.xyz[:, j])
+    ]
+    return say(": look for {hints}", hints=comma_or(hints))
+
+
+def _place(where: str, found: Finding) -> str:
+    line = f" line {found.lines[0]}" if found.lines else ""
+    return f"{where}{line}, column {found.column}"

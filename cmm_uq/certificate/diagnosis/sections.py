@@ -1,0 +1,441 @@
+"""Sections of a diagnosis: what to measure next, what the choice of an explanation costs, what would not have been seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.accuracy import TITLES, UNITS
+from cmm_uq.analysis.diagnosis.model_average import EffectParameters, Rival
+from cmm_uq.analysis.diagnosis.power import ALLOWED
+from cmm_uq.analysis.diagnosis.smallest import POWER, PeriodRange, SmallestEffect
+from cmm_uq.analysis.diagnosis.visibility import PLACES
+from cmm_uq.analysis.planning.advice import ODDS, DetectionChange, NextPlan, odds_words, rounded
+from cmm_uq.base.messages import (
+    DASH,
+    NOTHING,
+    Text,
+    Verbatim,
+    after,
+    commas,
+    listed,
+    number,
+    plural,
+    say,
+    semicolons,
+    together,
+)
+from cmm_uq.base.units import Unit
+from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.effect_words import parameter_title, title_of, titles
+from cmm_uq.certificate.plan_picture import placing_pictures
+from cmm_uq.certificate.quantity_data import quantity_data
+from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
+from cmm_uq.machine.model.artefact import Artefact
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.machine.physics.catalogue import every
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.uncertainty.quantity import Quantity
+
+_PARTED = 3.0
+"""Odds from which on two are parted at all."""
+
+TO_FILL_IN = "next_plan.csv"
+"""File that a diagnosis writes the set-ups to."""
+
+
+def next_section(found: Diagnosed) -> Section:
+    """The set-ups that would part what this recording cannot, or show what it could not have shown."""
+    title, plan = say("What to measure next"), found.next_plan
+    if plan is None:
+        return Section(title, ())
+    blocks: list[Block] = [Paragraph(_what(found, plan)), _set_ups(plan)]
+    if plan.partings:
+        blocks.append(_partings(plan))
+    if plan.shown:
+        blocks.append(_shown(plan, found.diagnosis.after.artefact))
+    return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
+
+
+def next_sentence(found: Diagnosed) -> Text:
+    """The set-ups in a sentence, with the odds that they are expected to reach; nothing without any."""
+    plan = found.next_plan
+    if plan is None:
+        return NOTHING
+    ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
+    told = say(
+        "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(found, plan), ends=ends
+    )
+    if not plan.partings:
+        return told
+    odds = [parting.after for parting in plan.partings]
+    if max(odds) < _PARTED and not plan.shown:
+        return say(
+            "No set-up that was tried is expected to part what this recording cannot: odds of {odds} : 1 at best for the "
+            "true one. Another artefact is needed for that.", odds=rounded(max(odds)),
+        )  # fmt: skip
+    least = min((each for each in odds if each >= _PARTED), default=None)
+    if least is None:
+        return told
+    if min(odds) < _PARTED:
+        return say(
+            "{told} Odds of {odds} : 1 or more for the true one are then expected, but for {count} of {all} pairs, which "
+            "they do not part: see below.", told=told, odds=rounded(least), count=sum(each < _PARTED for each in odds),
+            all=len(odds),
+        )  # fmt: skip
+    return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
+
+
+def _what(found: Diagnosed, plan: NextPlan) -> Text:
+    times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
+    count = plural(len(plan.placings), one=say("one set-up"), many=say("{count} set-ups", count=len(plan.placings)))
+    what = say(
+        "{count:capital} more of the {artefact:small}, each measured {times}, added to this recording.", count=count,
+        artefact=found.diagnosis.before.artefact.title, times=times,
+    )  # fmt: skip
+    if plan.reached:
+        return what
+    return say("{what} They are the best that was found, but do not reach everything: see below.", what=what)
+
+
+def _set_ups(plan: NextPlan) -> Table:
+    rows = tuple(
+        (number(plan.first + i), placing.title, placing.ends, number(plan.repeats))
+        for i, placing in enumerate(plan.placings)
+    )
+    heads = (
+        Column(say("Measurement")), Column(say("Set-up"), numeric=False),
+        Column(say("First and last point, scale readings / mm"), numeric=False), Column(say("Repeats")),
+    )  # fmt: skip
+    return Table(say("Set-ups to measure"), heads, rows, (say("A CSV to fill in comes with this page."),))
+
+
+def _partings(plan: NextPlan) -> Table:
+    rows = tuple(
+        (
+            together(title_of(name) for name in parting.effects),
+            odds_words(parting.before),
+            say("{odds} : 1", odds=rounded(parting.after)),
+        )
+        for parting in plan.partings
+    )  # fmt: skip
+    heads = (
+        Column(say("Cannot be told apart"), numeric=False), Column(say("Odds now, first over second")),
+        Column(say("Odds expected then")),
+    )  # fmt: skip
+    note = say(
+        "Expected are the odds of the true one of the two, whichever it is, each as large as it would have to be to explain "
+        "this recording; {odds:.0f} : 1 is aimed at.", odds=ODDS,
+    )  # fmt: skip
+    return Table(say("What the set-ups part"), heads, rows, (note,))
+
+
+def _shown(plan: NextPlan, artefact: Artefact) -> Table:
+    rows = []
+    for one in plan.shown:
+        effect = _acting(one, artefact)
+        rows.append((effect.title, _amplitude(effect, one.before), _amplitude(effect, one.after)))
+    heads = (Column(say("Error"), numeric=False), Column(say("Found from, now")), Column(say("Found from, then")))
+    note = say("One error at a time, in 90 of 100 such recordings, with everything that the model names fitted.")
+    return Table(say("What the set-ups show"), heads, tuple(rows), (note,))
+
+
+def _acting(one: DetectionChange, artefact: Artefact) -> Effect:
+    """The effect with the sizes that this artefact allows it, where it is a fault of its own."""
+    return artefact.acting(every()[one.effect])
+
+
+def _amplitude(effect: Effect, size: float) -> Text:
+    parameter = effect.coefficients[0]
+    if size > ALLOWED:
+        return say("not found")
+    value = size * parameter.prior_sd
+    return say("{value}\u00a0{unit}", value=number(value, ".2g" if value < 100 else ".0f"), unit=parameter.unit)
+
+
+def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
+    """The same for results.json."""
+    if plan is None:
+        return None
+    return {
+        "repeats": plan.repeats,
+        "reached": plan.reached,
+        "set_ups": [
+            {"measurement": plan.first + i, "what": placing.title, "ends": placing.ends}
+            for i, placing in enumerate(plan.placings)
+        ],
+        "parts": [
+            {"effects": list(parting.effects), "odds_before": parting.before, "odds_after": parting.after}
+            for parting in plan.partings
+        ],
+        "shows": [_shown_data(one, _acting(one, artefact)) for one in plan.shown],
+    }  # fmt: skip
+
+
+def _shown_data(one: DetectionChange, effect: Effect) -> dict[str, Any]:
+    parameter = effect.coefficients[0]
+    before, after = (
+        size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None for size in (one.before, one.after)
+    )
+    return {
+        "effect": one.effect,
+        "parameter": effect.reported[0].name,
+        "detected_before": before,
+        "detected_after": after,
+    }
+
+
+_SHOWN = 4
+"""Explanations that a table has columns for."""
+
+
+def costs_section(found: Diagnosed) -> Section:
+    """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
+    title, rivals = say("What the choice of an explanation costs"), found.diagnosis.remaining.rivals
+    rows = (*_named(found), *_figures(found), *_decisions(found)) if rivals else ()
+    if not rows:  # as against a simulation, where no effect of the job takes part
+        return Section(title, ())
+    heads = (
+        Column(say("Quantity"), numeric=False),
+        *(
+            Column(say("{what}: {probability}", what=explanation(one), probability=probability(one.probability)))
+            for one in rivals[:_SHOWN]
+        ),
+        Column(say("Averaged")), Column(say("Unit"), numeric=False),
+    )  # fmt: skip
+    notes: list[Text] = [
+        say(
+            "Each column is what follows if this explanation is the right one; figures and decisions are then corrected for "
+            "its effects. Averages are weighted by the probabilities; a certificate states those of the error factors."
+        )
+    ]
+    told = sum(one.probability for one in rivals)
+    more = max(len(rivals) - _SHOWN, 0)
+    share = say(
+        "The averages are over explanations with {told} of the probability together; each of the rest has less.",
+        told=probability(told),
+    )
+    left = plural(
+        more, one=say("One further explanation is in results.json."),
+        many=say("{count} further explanations are in results.json.", count=more),
+    ) if more else NOTHING  # fmt: skip
+    notes.append(after(left, share))
+    return Section(title, (Table(say("What follows from each explanation that remains"), heads, rows, tuple(notes)),))
+
+
+def costs_data(found: Diagnosed) -> dict[str, Any]:
+    """For results.json: what remains, and the average; nothing where one explanation is settled."""
+    remaining, costs = found.diagnosis.remaining, found.costs
+    if not remaining.rivals:
+        return {}
+    each: list[dict[str, Any]] = []
+    for i, rival in enumerate(remaining.rivals):
+        cost = None if costs is None else costs.each[i]
+        each.append({
+            "probability": rival.probability, "effects": list(rival.effects), "functions": list(rival.functions),
+            "estimates": _data(rival.named), "parameters": _data(rival.added),
+            "figures": {} if cost is None else _each(cost.figures),
+            "decisions": [] if cost is None else [one.outcome for one in cost.statements],
+        })  # fmt: skip
+    whole = {
+        "estimates": _data(remaining.averaged),
+        "figures": {} if costs is None else _each(costs.figures),
+        "decisions": [] if costs is None else [dict(one) for one in costs.decisions],
+    }
+    return {"remaining": each, "averaged": whole}
+
+
+def explanation(rival: Rival) -> Text:
+    """What remains as an explanation, in short."""
+    words = (*titles(rival.effects), *rival.functions)
+    return commas(words) if words else say("nothing missing")
+
+
+def _named(found: Diagnosed) -> list[tuple[Text, ...]]:
+    remaining = found.diagnosis.remaining
+    return [
+        (
+            parameter_title(effect, name),
+            *(_size(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN]), _size(quantity), quantity.unit,
+        )
+        for effect, parameters in remaining.averaged.items() for name, quantity in parameters.items()
+    ]  # fmt: skip
+
+
+def _figures(found: Diagnosed) -> list[tuple[Text, ...]]:
+    costs = found.costs
+    if costs is None:
+        return []
+    return [
+        (TITLES[name], *(_size(cost.figures[name]) for cost in costs.each[:_SHOWN]), _size(quantity), UNITS[name])
+        for name, quantity in costs.figures.items()
+    ]
+
+
+def _decisions(found: Diagnosed) -> list[tuple[Text, ...]]:
+    costs = found.costs
+    if costs is None:
+        return []
+    return [
+        (
+            say("{standard}, {quantity}", standard=Verbatim(first.facts.standard), quantity=first.quantity),
+            *(OUTCOME_WORDS[cost.statements[i].outcome] for cost in costs.each[:_SHOWN]),
+            commas(
+                say("{outcome} {probability}", outcome=OUTCOME_WORDS[outcome], probability=probability(p))
+                for outcome, p in costs.decisions[i].items()
+            ),
+            NOTHING,
+        )
+        for i, first in enumerate(costs.each[0].statements)
+    ]
+
+
+def _size(quantity: Quantity) -> Text:
+    return with_uncertainty(quantity)
+
+
+def _data(named: EffectParameters) -> dict[str, Any]:
+    return {effect: _each(parameters) for effect, parameters in named.items()}
+
+
+def _each(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
+    return {name: quantity_data(quantity) for name, quantity in quantities.items()}
+
+
+_NAMED = 5
+"""Effects that the sentence beside the verdict names."""
+
+_RANGES = 3
+
+
+def without_power(found: Diagnosed) -> Text:
+    """What follows a verdict of agreement where even a plausible common effect would not have shown; else nothing."""
+    if found.diagnosis.verdict != "consistent":
+        return NOTHING
+    order = {name: i for i, name in enumerate(every())}
+    blind = sorted((row for row in found.unseen if row.blind), key=lambda row: order.get(row.effect, len(order)))
+    if not blind:
+        return NOTHING
+    words = [
+        say("{title:small} up to {size}", title=row.title, size=_size_of_unseen(_invisible(row), row.unit))
+        for row in blind
+    ]
+    more = len(words) - _NAMED
+    if more > 1:
+        words = [*words[:_NAMED], say("{more} more", more=more)]
+    return say("But this recording could not have shown: {effects}.", effects=listed(words))
+
+
+def _invisible(row: SmallestEffect) -> float:
+    return row.allowed if row.detected is None else min(row.detected, row.allowed)
+
+
+def unseen_section(found: Diagnosed) -> Section:
+    """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
+    rows = tuple(
+        (
+            row.title,
+            _found(row, row.detected),
+            _found(row, row.named),
+            _size_of_unseen(row.allowed, row.unit),
+            _why(row),
+        )
+        for row in found.unseen
+        if row.common or not row.shown
+    )
+    if not rows:
+        return Section(say("What would not have been seen"), ())
+    heads = (
+        Column(say("Error"), numeric=False), Column(say("Found from")), Column(say("Named from")),
+        Column(say("Reckoned with up to")), Column(say("Why, and for which periods"), numeric=False),
+    )  # fmt: skip
+    notes = (
+        say(
+            "With the noise that was found and beside what was asserted, an error of this size would have been found, or "
+            "called by its right name, in {power:.0f} of 100 such recordings; “not found” where even the largest error "
+            "reckoned with would not. In closed form: mostly within 15 %, a name with a close rival within a factor of two.",
+            power=100 * POWER,
+        ),
+    )
+    beside = without_power(found)
+    head = (Paragraph(beside, tone="warning"),) if beside else ()
+    return Section(
+        say("What would not have been seen"),
+        (*head, Table(say("Smallest errors that would have shown"), heads, rows, notes)),
+    )
+
+
+def _found(row: SmallestEffect, size: float | None) -> Text:
+    return say("not found") if size is None or size > row.allowed else _size_of_unseen(size, row.unit)
+
+
+def _size_of_unseen(value: float, unit: Unit) -> Text:
+    return say("{value}\u00a0{unit}", value=number(value, ".2g" if value < 100 else ".0f"), unit=unit)
+
+
+def _why(row: SmallestEffect) -> Text:
+    said: list[Text] = []
+    if row.share == 0 and not row.taken_up:
+        said.append(say("moves nothing that is observed here"))
+    elif row.taken_up and row.share < 1e-3:
+        said.append(say("taken up by {effects}", effects=listed(_titles(row.taken_up))))
+    elif row.taken_up:
+        said.append(say("mostly taken up by {effects}", effects=listed(_titles(row.taken_up))))
+    if row.detected is not None and row.detected > row.allowed and row.detected < 100 * row.allowed:
+        said.append(say("it would take {size}", size=_size_of_unseen(row.detected, row.unit)))
+    if row.periods is not None:
+        said.append(_periods(row.periods, row))
+    return commas(said) if said else DASH
+
+
+def _titles(owners: Sequence[str]) -> list[Text]:
+    return [_taker(name) for name in owners]
+
+
+def _taker(name: str) -> Text:
+    """What takes an error up, in words."""
+    if name == PLACES:
+        return say("the place of the artefact")
+    if name == ARTEFACT:
+        return say("the size of the artefact")
+    effect = every().get(name)
+    return Verbatim(name) if effect is None else say("{title:small}", title=effect.title)
+
+
+def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
+    every_one = say("{low:.3g} to {high:.3g}\u00a0{unit}", low=periods.low, high=periods.high, unit=periods.unit)
+    if periods.worst is None:
+        return say("none of {every_one} resolved by these positions", every_one=every_one)
+    worst = say("{every_one}, at worst {size}", every_one=every_one, size=_size_of_unseen(periods.worst, row.unit))
+    if not periods.unresolved:
+        return worst
+    ranges = [
+        number(low, ".3g") if low == high else say("{low:.3g} to {high:.3g}", low=low, high=high)
+        for low, high in periods.unresolved
+    ]
+    if len(ranges) > _RANGES:
+        ranges = [*ranges[:_RANGES], say("{more} more ranges", more=len(ranges) - _RANGES)]
+    return say("{worst}; not resolved: {ranges}\u00a0{unit}", worst=worst, ranges=listed(ranges), unit=periods.unit)
+
+
+def unseen_data(rows: Sequence[SmallestEffect]) -> list[dict[str, Any]]:
+    """The same for results.json, every effect."""
+    return [
+        {
+            "effect": row.effect, "parameter": row.parameter, "detected": row.detected, "named": row.named,
+            "allowed": row.allowed, "shown": row.shown, "share": row.share,
+            "taken_up_by": [name for name in row.taken_up if name != PLACES],
+            **({} if row.periods is None else {"periods": _periods_data(row.periods)}),
+        }
+        for row in rows
+    ]  # fmt: skip
+
+
+def _periods_data(periods: PeriodRange) -> dict[str, Any]:
+    return {
+        "parameter": periods.parameter, "low": periods.low, "high": periods.high, "worst": periods.worst,
+        "unresolved": [list(each) for each in periods.unresolved],
+    }  # fmt: skip

@@ -1,0 +1,152 @@
+"""What processes answer, kept in a file as soon as it is there.
+
+Answers are appended a line each and are on the disk before the next is awaited: what a kill
+leaves is a prefix of whole lines, and perhaps a torn one, which is dropped.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.base.output.locking import locked
+from cmm_uq.laboratory.proving.cases import canonical_json
+from cmm_uq.laboratory.schedule.pool import answers
+from cmm_uq.laboratory.schedule.talking import Work
+
+Record = dict[str, Any]
+"""What was said of a task: plain data with its ``number``."""
+
+TRUTH, RECORDS, LOCK = "truth.json", "cases.jsonl", "lock"
+
+
+class AnswersFolder:
+    """A folder with the sealed truth and the answers so far; this process alone writes to it while it is open.
+
+    Parameters
+    ----------
+    folder : that may hold a run which was interrupted.
+    truth : contents of the sealed file: the run is the same if and only if these are.
+
+    Raises
+    ------
+    CmmUqError : it holds another run, or another process is at it.
+    OutputError : it cannot be written to.
+    """
+
+    def __init__(self, folder: Path, truth: bytes) -> None:
+        self.folder = folder
+        self._descriptor = -1
+        with _told(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / LOCK).touch()
+            descriptor = locked(folder / LOCK, create=False)
+            if descriptor is None:
+                raise CmmUqError("another cmm-uq prove is at work here", where=str(folder), fix="Wait until it is done")
+            self._descriptor = descriptor
+            try:
+                self.records = self._begun(truth)
+                self._file = (folder / RECORDS).open("ab")
+            except BaseException:
+                os.close(descriptor)
+                raise
+
+    def _begun(self, truth: bytes) -> dict[int, Record]:
+        sealed = self.folder / TRUTH
+        if sealed.exists() and sealed.read_bytes() != truth:
+            raise CmmUqError("holds an unfinished run with another truth: other options, inputs, seed or version",
+                             where=str(self.folder),
+                             fix="Repeat the command that began it to go on, or remove the folder")  # fmt: skip
+        if not sealed.exists():
+            part = self.folder / f"{TRUTH}.part"
+            with part.open("wb") as file:
+                _synced(file, truth)
+            (self.folder / RECORDS).unlink(missing_ok=True)
+            part.replace(sealed)
+        path = self.folder / RECORDS
+        content = path.read_bytes() if path.exists() else b""
+        records, whole = _whole_lines(content)
+        if whole < len(content):
+            with path.open("rb+") as file:
+                file.truncate(whole)
+        return records
+
+    def keep(self, record: Record) -> None:
+        """Append an answer."""
+        with _told(self.folder):
+            _synced(self._file, canonical_json(record))
+        self.records[record["number"]] = record
+
+    def close(self) -> None:
+        """Leave it to others; what it holds stays."""
+        if self._descriptor >= 0:
+            self._file.close()
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def remove(self) -> None:
+        """What was kept is in place elsewhere."""
+        self.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _whole_lines(content: bytes) -> tuple[dict[int, Record], int]:
+    """Answers in the whole lines, and how many bytes these are."""
+    found: dict[int, Record] = {}
+    end = 0
+    for line in content.splitlines(keepends=True):
+        try:
+            record: Record = json.loads(line) if line.endswith(b"\n") else {}
+            found[int(record["number"])] = record
+        except (ValueError, TypeError, KeyError):
+            break
+        end += len(line)
+    return found, end
+
+
+def answer_tasks(
+    program: str, setting: Any, tasks: Mapping[int, Any], workers: int, *, keep: Callable[[Record], None]
+) -> None:  # fmt: skip
+    """Have every task answered.
+
+    Parameters
+    ----------
+    program : module that a process runs; see :func:`cmm_uq.laboratory.schedule.processes.serve`.
+    setting : what every process is told first.
+    tasks : by number.
+    workers : processes at once.
+    keep : given every answer as it comes.
+
+    Raises
+    ------
+    CmmUqError : a task that is refused, or over which processes ended; what was answered before is kept.
+    """
+    with contextlib.closing(answers(WorkerTask(program, setting), tasks.items(), workers)) as found:
+        for answer in found:
+            if answer.failure is not None:
+                raise answer.failure
+            keep(answer.value)
+
+
+def _synced(file: Any, content: bytes) -> None:
+    file.write(content)
+    file.flush()
+    os.fsync(file.fileno())
+
+
+@contextlib.contextmanager
+def _told(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        if isinstance(error, CmmUqError):
+            raise
+        what = getattr(error, "strerror", None) or error
+        raise OutputError(f"cannot be written: {what}", where=str(folder),
+                          fix="Free the disk, mend the permissions, or choose another --out") from error  # fmt: skip
