@@ -248,7 +248,7 @@ def prove(
     """
     from cmm_uq.app.commands.prove import ProofOptions as Asked
     from cmm_uq.app.commands.prove import prove_outcome
-    from cmm_uq.laboratory.schedule.pool import processes
+    from cmm_uq.laboratory.schedule.processes import processes
 
     asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
     return Proof(prove_outcome(in_language(_job(job), language), asked))

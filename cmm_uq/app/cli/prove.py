@@ -10,7 +10,7 @@ import typer
 
 from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Verbose, examples, job_folders, out
 from cmm_uq.app.cli.summary import conclude
-from cmm_uq.app.cli.terminal import progress, say
+from cmm_uq.app.cli.terminal import say
 
 EXAMPLES = examples(
     "prove examples/iota-1102-20C", "prove JOB --cases 400 --workers 8", "prove examples/plan-ballbar --strict"
@@ -55,7 +55,7 @@ def command(
     with shown(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.prove import ProofOptions as Asked
         from cmm_uq.app.commands.prove import write_proof
-        from cmm_uq.laboratory.schedule.pool import processes
+        from cmm_uq.laboratory.schedule.processes import processes
 
         asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
         written = write_proof(

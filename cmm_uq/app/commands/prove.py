@@ -33,7 +33,7 @@ from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, an
 from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file
 from cmm_uq.laboratory.proving.design import Design
 from cmm_uq.laboratory.proving.judgement import ANSWER, REFUSED, Judgement, judge
-from cmm_uq.laboratory.schedule.pool import check_workers
+from cmm_uq.laboratory.schedule.processes import check_workers
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import every, plugins

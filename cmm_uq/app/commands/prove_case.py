@@ -25,7 +25,7 @@ from cmm_uq.laboratory.proving.answers import Record
 from cmm_uq.laboratory.proving.cases import Case
 from cmm_uq.laboratory.proving.design import Design
 from cmm_uq.laboratory.proving.judgement import REFUSED
-from cmm_uq.laboratory.schedule.talking import serve
+from cmm_uq.laboratory.schedule.processes import serve
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.quantity import Quantity

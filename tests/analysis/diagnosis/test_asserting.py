@@ -129,9 +129,12 @@ def test_where_no_size_of_a_group_is_known_the_most_probable_is_withheld(monkeyp
 
     monkeypatch.setattr(search, "_of", lambda first, own, chosen, stated: replace(start, chosen=chosen))
     for name, stub in {
-        "withhold_unresolved": lambda found: (found, ()), "_of_all": lambda found, _model: found, "effects_without_size": open_size,
-        "joint_posterior": lambda *_: None, "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
-    }.items():  # fmt: skip
+        "withhold_unresolved": lambda found: (found, ()),
+        "_of_all": lambda found, _model: found,
+        "effects_without_size": open_size,
+        "joint_posterior": lambda *_: None,
+        "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
+    }.items():
         monkeypatch.setattr(diagnosis, name, stub)
     found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
     assert seen == [{0}, {1}, set()]
@@ -150,10 +153,13 @@ def test_of_effects_whose_sizes_are_open_together_the_least_probable_goes_first(
         return {i: WithheldEffect(str(i), say("one"), probability[i], HOLDS_ZERO) for i in listed}
 
     for name, stub in {
-        "withhold_unresolved": lambda found: (found, ()), "_of_all": lambda found, _model: found, "effects_without_size": open_size,
-        "joint_posterior": lambda *_: None, "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
-        "in_place_of": lambda *_: None,
-    }.items():  # fmt: skip
+        "withhold_unresolved": lambda found: (found, ()),
+        "_of_all": lambda found, _model: found,
+        "effects_without_size": open_size,
+        "joint_posterior": lambda *_: None,
+        "withhold": lambda found, gone: replace(found, chosen=found.chosen - gone),
+        "substitute": lambda *_: None,
+    }.items():
         monkeypatch.setattr(diagnosis, name, stub)
     found, _, withheld = diagnosis._asserted(start, cast("Any", None), 0, None, None)
     assert (found.chosen, [each.effect for each in withheld]) == (frozenset({0, 1}), ["2"])
