@@ -10,7 +10,7 @@ import typer
 
 from cmm_uq.app.cli.options import Force, Json, Language, Quiet, Verbose, examples, job_folders, out
 from cmm_uq.app.cli.summary import conclude
-from cmm_uq.app.cli.terminal import say
+from cmm_uq.app.cli.terminal import progress, say
 
 EXAMPLES = examples(
     "prove examples/iota-1102-20C", "prove JOB --cases 400 --workers 8", "prove examples/plan-ballbar --strict"
@@ -52,12 +52,11 @@ def command(
     language: Language = None,
 ) -> None:
     """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
-    with shown(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.prove import ProofOptions as Asked
-        from cmm_uq.app.commands.prove import write_proof
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.prove import ProofOptions, write_proof
         from cmm_uq.laboratory.schedule.processes import processes
 
-        asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
+        asked = ProofOptions(cases, processes() if workers is None else workers, seed, alpha)
         written = write_proof(
             job, asked, out, force=force, stage=stage, sealed=None if quiet or json else _tell, language=language
         )

@@ -17,7 +17,7 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output.locking import locked
 from cmm_uq.laboratory.proving.cases import canonical_json
-from cmm_uq.laboratory.schedule.processes import answers
+from cmm_uq.laboratory.schedule.processes import WorkerTask, answers
 
 Record = dict[str, Any]
 """What was said of a task: plain data with its ``number``."""
