@@ -21,7 +21,6 @@ from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, tails
 from cmm_uq.base.points import Floats
 from tests.analysis.parts.causes.test_condensing import bore, face
 
-
 Width = Callable[[Floats], Floats]
 
 WIDTHS: dict[str, tuple[int, Width]] = {

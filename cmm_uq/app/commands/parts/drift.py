@@ -18,9 +18,10 @@ from cmm_uq.analysis.parts.machine.state import MachineState, aged
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, commas, plural, say
 from cmm_uq.certificate.effect_words import titles
-from cmm_uq.laboratory.due.drift import History, history
+from cmm_uq.laboratory.due.drift import DriftHistory as History
+from cmm_uq.laboratory.due.drift import history
+from cmm_uq.laboratory.due.drift_filter import change_since
 from cmm_uq.laboratory.due.history import MachineHistory
-from cmm_uq.laboratory.due.since import change_since
 from cmm_uq.laboratory.records import Series
 from cmm_uq.laboratory.records.place import NONE
 
@@ -144,7 +145,7 @@ def with_drift(
         found = aged(state, on)
         return Aged(found, _not_known(found))
     if kept is None:
-        from cmm_uq.app.commands.history import history_of
+        from cmm_uq.app.commands.laboratory.history import history_of
 
         kept = attached_history(history_of(serial, records, on=on), since)
     known = known_of(kept)
