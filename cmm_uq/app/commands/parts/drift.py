@@ -22,7 +22,7 @@ from cmm_uq.laboratory.due.drift import DriftHistory as History
 from cmm_uq.laboratory.due.drift import history
 from cmm_uq.laboratory.due.drift_filter import change_since
 from cmm_uq.laboratory.due.history import MachineHistory
-from cmm_uq.laboratory.records import Series
+from cmm_uq.laboratory.records.facts import Series
 from cmm_uq.laboratory.records.place import NONE
 
 FILE = "machine-records/history.json"
