@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.parts.outlines import outline
 from cmm_uq.analysis.parts.plan import Feature, Nominal
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.part.views import outline
 from tests.parts_drawn import UP, bore, circle, plane, spot
 
 CENTRE = np.array([60.0, 40.0, 0.0])
