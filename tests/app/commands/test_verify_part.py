@@ -15,7 +15,7 @@ import pikepdf
 import pytest
 from typer.testing import CliRunner
 
-from cmm_uq.app.cli import NOT_VERIFIED, NOT_WHOLLY_CHECKED
+from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.app.commands.parts.documents import Asked, contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import machine_found
 from cmm_uq.app.commands.parts.part import part_found
