@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cmm_uq import __version__
-from cmm_uq.analysis.diagnosis.compared import compared_on
+from cmm_uq.analysis.diagnosis.observations import thin_out
 from cmm_uq.analysis.parts.machine.conditional import given_recording
 from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
 from cmm_uq.app.commands.diagnosing import screened_model
