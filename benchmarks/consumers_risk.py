@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import decide
-from cmm_uq.analysis.conformity.risk import Known
+from cmm_uq.analysis.conformity.decision import PriorKnowledge, decide
 from cmm_uq.jobs.conformity import FalseAccept, GuardBand, PosteriorProbability, Rule, UnconditionalRisk
 
 DRAWS = 100_000
 LIMIT, U = 10.0, 1.0
-PRIOR, NEAR = Known(0.0, 5.0), Known(10.0, 2.0)
+PRIOR, NEAR = PriorKnowledge(0.0, 5.0), PriorKnowledge(10.0, 2.0)
 
 AT_LIMIT: list[tuple[str, Rule, float]] = [
     ("simple", "simple", 50.0),
@@ -39,7 +38,7 @@ OF_ALL: list[tuple[str, Rule]] = [
 """Rules that go by what all items are like."""
 
 
-def passed(values: np.ndarray, rule: Rule, prior: Known | None = None) -> np.ndarray:
+def passed(values: np.ndarray, rule: Rule, prior: PriorKnowledge | None = None) -> np.ndarray:
     """Whether each of some measured values passes."""
     decided = (decide(float(value), U, LIMIT, rule, signed=True, prior=prior).outcome for value in values)
     return np.array([outcome == "pass" for outcome in decided])
@@ -64,7 +63,7 @@ def main() -> None:
         stated_and_found(prior, random)
 
 
-def stated_and_found(prior: Known, random: np.random.Generator) -> None:
+def stated_and_found(prior: PriorKnowledge, random: np.random.Generator) -> None:
     """Print probabilities of conforming by the measurement alone and with the prior, and the share that does conform."""
     items = random.normal(prior.mean, prior.sd, DRAWS)
     measured = items + U * random.standard_normal(DRAWS)

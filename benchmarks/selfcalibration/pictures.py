@@ -16,7 +16,7 @@ from benchmarks.examples.shift_job import error as example_error
 from cmm_uq.app.commands.analysis import analyse
 from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.plot_style import ACCENT, INK, MUTED, as_svg, house_style, new_figure
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, as_svg, house_style, new_figure
 
 ROOT = Path(__file__).parents[2]
 PITCH, SHIFT = 40.0, 20.0

@@ -1,25 +1,77 @@
-"""What every certificate has (ISO/IEC 17025:2017, 7.8): particulars, results, statements, and opinions in an annex."""
+"""Certificates and working pages: what each of them has (ISO/IEC 17025:2017, 7.8), and the sections in their order."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, without_keys
-from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, draft, replaced_certificate
-from cmm_uq.certificate.completeness import formal_warnings
-from cmm_uq.certificate.conditions import conditions
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed, without_keys
+from cmm_uq.base.points import Points
+from cmm_uq.base.units import unit
+from cmm_uq.certificate.clauses import (
+    DRAFT,
+    NOT_OURS,
+    STATEMENTS,
+    clauses_data,
+    draft,
+    formal_warnings,
+    replaced_certificate,
+)
+from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature
-from cmm_uq.certificate.origin import CERTIFICATE, DIGITAL, came_about, file_name
-from cmm_uq.certificate.provenance import FILE as PROVENANCE
-from cmm_uq.certificate.reissue import COMPARED, NOT_COMPARED
-from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.certificate.origin import CERTIFICATE, DIGITAL, came_about, file_name, program
+from cmm_uq.certificate.outcome import Outcome, Page
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import StatedUncertainty as Stating
+from cmm_uq.certificate.results.contents import results
+from cmm_uq.certificate.results.plain import posterior_file, posterior_name
+from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
+from cmm_uq.certificate.results.reissue import COMPARED, NOT_COMPARED
+from cmm_uq.certificate.sections.conformity import conformity_section
+from cmm_uq.certificate.sections.first_page import overview_of, summary, with_first
+from cmm_uq.certificate.sections.method import method, posterior_section
+from cmm_uq.certificate.sections.results import (
+    as_found_data,
+    as_found_section,
+    error_factors,
+    performance,
+    quantities_left,
+    tolerance_sections,
+)
+from cmm_uq.certificate.sections.traceability import claimed, traceability
+from cmm_uq.certificate.sections.warnings import warnings
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.origin import MEASURED, SIMULATED
 from cmm_uq.maths.uncertainty.rounding import nominal
+
+TEMPERATURES: Mapping[str, Text] = {
+    "temp_artefact_c": say("artefact"), "temp_x_c": say("scale of X"), "temp_y_c": say("scale of Y"),
+    "temp_z_c": say("scale of Z"), "temp_air_c": say("air"), "temp_table_top_c": say("table, top"),
+    "temp_table_bottom_c": say("table, bottom"),
+}  # fmt: skip
+
+
+def conditions(job: Job) -> Facts:
+    """As stated, and the least and largest recorded temperatures; without rows where there are none."""
+    rows: list[tuple[Text, Text]] = []
+    if job.facts.job.conditions:
+        rows.append((say("Conditions"), Verbatim(job.facts.job.conditions)))
+    if recorded := _recorded(job.points):
+        rows.append((say("Temperatures recorded"), recorded))
+    return Facts(tuple(rows))
+
+
+def _recorded(points: Points) -> Text:
+    return commas(
+        say("{what} {low} to {high} {unit}", what=what, low=signed(float(points.columns[name].min()), ".2f"),
+            high=signed(float(points.columns[name].max()), ".2f"), unit=unit("°C"))
+        for name, what in TEMPERATURES.items() if name in points.columns
+    )  # fmt: skip
+
 
 Row = tuple[Text, str]
 """What a particular is, and what the job states of it; empty where it states nothing."""
@@ -35,14 +87,7 @@ def certificate_of(
 ) -> Document:
     """Sections and warnings between what every certificate has.
 
-    Parameters
-    ----------
-    job : that was analysed.
-    sections : of which the first page shows those that are marked.
-    told : warnings on the results; those on what the job does not state follow them.
-    produced_by : program, sampler and seed.
-    files : attached beside job and recording.
-    overview : what every statement of conformity comes to.
+    ``told``: warnings on the results; those on what the job does not state follow them.
     """
     facts = job.facts
     return in_words(Document(
@@ -124,7 +169,7 @@ CERTIFICATE_NUMBER = say("Certificate number")
 
 def identified(
     job: Identification, laboratory: Laboratory, origin: str, numbered: Text = CERTIFICATE_NUMBER
-) -> tuple[Row, ...]:  # fmt: skip
+) -> tuple[Row, ...]:
     """Number, by what it is called, customer, order and dates of any certificate or report."""
     measured = origin == MEASURED
     return (
@@ -152,19 +197,16 @@ def performed(job: Identification) -> tuple[Row, ...]:
 
 
 def issuer_of(laboratory: Laboratory) -> tuple[Text, ...]:
-    """Name and address, a line each."""
     return tuple(Verbatim(line) for line in (laboratory.name, *laboratory.address.splitlines()) if line)
 
 
 def signatures_of(laboratory: Laboratory) -> tuple[Signature, ...]:
-    """Who authorises, where it is stated."""
     if not laboratory.signatory:
         return ()
     return (Signature(Verbatim(laboratory.signatory), Verbatim(laboratory.signatory_role)),)
 
 
 def statements_of(job: Identification) -> tuple[Text, ...]:
-    """What stands before the signatures."""
     return (*STATEMENTS, NOT_OURS) if job.from_customer else STATEMENTS
 
 
@@ -198,3 +240,72 @@ def _travel(facts: JobFile) -> Text:
 def _agreed(job: JobFacts) -> Text:
     """No interval is recommended that the customer did not agree to (7.8.4.3)."""
     return day(job.recalibration_agreed) if job.recalibration_agreed else NOTHING
+
+
+def with_capability(result: Result) -> tuple[Result, Stating]:
+    """The result as a certificate states it, and what was raised.
+
+    Lengths are taken at the artefact's longest dimension. The noise is a figure of the recording and stays.
+    """
+    longest = max((s.nominal for s in result.artefact.sizes if s.role == "dimension" and s.unit == "mm"), default=0.0)
+    stating = Stating.of(result.job, longest)
+    reported = [size.name for size in result.artefact.sizes if size.role != "set-up"]
+    stated = replace(
+        result,
+        parameters={effect: stating.all(effect, found) for effect, found in result.parameters.items()},
+        sizes=dict(result.sizes) | stating.all("artefact", {name: result.sizes[name] for name in reported}),
+        accuracy=stating.all("accuracy", result.accuracy),
+        stating=stating,
+    )
+    return stated, stating
+
+
+def certified(result: Result, page: Page) -> Outcome:
+    """What there is to write of a result: the certificate, complete but for its looks, and its figures."""
+    result, stating = with_capability(result)
+    told = (*warnings(result), *stating.warnings())
+    warned = (*told, *formal_warnings(result.job))
+    draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
+    data = (
+        results(result)
+        | as_found_data(result.job)
+        | clauses_data(result.job)
+        | stating.data()
+        | ({} if draws is None else {"posterior": draws.entry})
+    )
+    return Outcome(
+        result, lambda: _certificate(result, page, told), page.with_further(result, data), summary(result, warned), warned,
+        {draws.name: draws.content} if draws else {}, draws=result.draws, verdicts=result.verdicts,
+        in_order=result.diagnosed.diagnosis.verdict == "consistent",
+    )  # fmt: skip
+
+
+def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document:
+    diagnosis = diagnosis_sections(result.diagnosed) if result.job.facts.job.diagnosis_on_certificate else ()
+    sections = [
+        *with_first(result, [*_ordered(result, page.sections(result)), *tolerance_sections(result)]), method(result),
+        *(replace(section, opinion=True) for section in (*diagnosis, posterior_section(result))),
+    ]  # fmt: skip
+    produced_by = say(
+        "{program}, {sampler}, seed {seed}",
+        program=program(result.job),
+        sampler=Verbatim(result.posterior.sampler),
+        seed=result.posterior.seed,
+    )
+    files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
+    return certificate_of(result.job, sections, told, produced_by, files, overview_of(result))
+
+
+def _ordered(result: Result, own: list[Section]) -> list[Section]:
+    """Results first, then what is decided on them and what they rest on, then what else the kind shows (``own``).
+
+    The results of an artefact without lengths are the error factors, and without these the first of the kind's own sections.
+    """
+    figures, factors, decided = performance(result), error_factors(result), conformity_section(result.statements)
+    before = as_found_section(result.job, quantities_left(result), result.verdicts)
+    rests_on = traceability(result)
+    if figures.blocks:
+        return [figures, decided, before, factors, rests_on, *own]
+    if factors.blocks:
+        return [factors, decided, before, rests_on, *own]
+    return [*own[:1], decided, before, rests_on, *own[1:]]

@@ -1,7 +1,13 @@
-"""ISO/IEC 17025:2017, 7.8, clause by clause: what each asks of a calibration certificate, and what of it the job states.
+"""What ISO/IEC 17025:2017, 7.8 asks of a certificate, and what a job does not state of it.
+
+ISO/IEC 17025:2017, 7.8, clause by clause: what each asks of a calibration certificate, and what of it the job states.
 
 One table for the warning of a certificate, the mark of a draft, ``results.json`` and ``cmm-uq check``. A certificate is a
 draft until nothing that the standard asks of every certificate is missing; what it asks for where there is any makes none.
+
+What ISO/IEC 17025:2017, 7.8 asks for and the job does not state, with the key that would mend it; dates out of their order.
+
+A recording that nobody measured has no certificate, so nothing is asked of it.
 """
 
 from __future__ import annotations
@@ -11,9 +17,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from cmm_uq.analysis.conformity.decision import rule_name
-from cmm_uq.base.messages import Text, Verbatim, day, say
+from cmm_uq.base.messages import Key, Text, Verbatim, at_key, day, foreign, say, semicolons
 from cmm_uq.certificate.origin import CERTIFICATE
-from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.certificate.sections.traceability import claimed
+from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFile
 from cmm_uq.jobs.laboratory import Laboratory
@@ -44,16 +51,13 @@ DRAFT = say("DRAFT, not complete by ISO/IEC 17025:2017, 7.8")
 
 
 @dataclass(frozen=True)
-class Clause:
+class Requirement:
     """One thing that a clause asks for.
 
-    Parameters
-    ----------
-    clause : its number, with the letter where it has one.
-    asks : what for; a text that can be said in other languages where a certificate may have to name it.
-    status : whether the certificate has it.
-    stated : what satisfies it; empty where nothing does.
-    key : of job.toml, that states it or would; empty where the form of the certificate does.
+    ``clause``: its number, with the letter where it has one; ``asks``: what for; a text that can be said in other
+    languages where a certificate may have to name it; ``status``: whether the certificate has it; ``stated``: what
+    satisfies it; empty where nothing does; ``key``: of job.toml, that states it or would; empty where the form of the
+    certificate does.
     """
 
     clause: str
@@ -71,7 +75,7 @@ class Clause:
         }  # fmt: skip
 
 
-def clauses(job: Job) -> tuple[Clause, ...]:
+def clauses(job: Job) -> tuple[Requirement, ...]:
     """Every clause of 7.8 that speaks of calibration certificates, in the standard's order."""
     facts = job.facts
     return (
@@ -83,7 +87,7 @@ def clauses(job: Job) -> tuple[Clause, ...]:
     )
 
 
-def missing(job: Job) -> tuple[Clause, ...]:
+def missing(job: Job) -> tuple[Requirement, ...]:
     """What every certificate must state and this one does not."""
     return tuple(one for one in clauses(job) if one.status == "missing")
 
@@ -112,18 +116,16 @@ def replaced_certificate(replaced: Replaced) -> Text:
     return say("{number} of {date}", number=Verbatim(replaced.number), date=day(replaced.date))
 
 
-def asked(clause: str, asks: str, stated: object, key: str = "") -> Clause:
-    """Of every certificate."""
-    return Clause(clause, asks, "stated" if stated else "missing", _plain(stated), key)
+def asked(clause: str, asks: str, stated: object, key: str = "") -> Requirement:
+    return Requirement(clause, asks, "stated" if stated else "missing", _plain(stated), key)
 
 
-def _where(clause: str, asks: str, stated: object, key: str = "") -> Clause:
-    """Where there is any."""
-    return Clause(clause, asks, "stated" if stated else "not applicable", _plain(stated), key)
+def _where(clause: str, asks: str, stated: object, key: str = "") -> Requirement:
+    return Requirement(clause, asks, "stated" if stated else "not applicable", _plain(stated), key)
 
 
-def _done(clause: str, asks: str, key: str = "") -> Clause:
-    return Clause(clause, asks, "laboratory", "", key)
+def _done(clause: str, asks: str, key: str = "") -> Requirement:
+    return Requirement(clause, asks, "laboratory", "", key)
 
 
 def _plain(stated: object) -> str:
@@ -134,7 +136,7 @@ def _lines(parts: Iterable[str]) -> str:
     return ", ".join(line for part in parts for line in part.splitlines() if line)
 
 
-def _reporting(facts: JobFile) -> tuple[Clause, ...]:
+def _reporting(facts: JobFile) -> tuple[Requirement, ...]:
     return (
         _done("7.8.1.1", "results reviewed and authorised before release", "[laboratory] four_eyes"),
         asked("7.8.1.2", "results and all that their interpretation needs, in a report", _number(facts)),
@@ -142,7 +144,7 @@ def _reporting(facts: JobFile) -> tuple[Clause, ...]:
     )
 
 
-def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
+def _of_every_report(facts: JobFile) -> tuple[Requirement, ...]:
     machine = facts.machine
     named = (machine.manufacturer, machine.model, machine.name)
     item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
@@ -150,13 +152,12 @@ def _of_every_report(facts: JobFile) -> tuple[Clause, ...]:
     return of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial)
 
 
-def of_every_report(job: Identification, laboratory: Laboratory, title: str, item: Clause) -> tuple[Clause, ...]:
+def of_every_report(
+    job: Identification, laboratory: Laboratory, title: str, item: Requirement
+) -> tuple[Requirement, ...]:
     """7.8.2.1 of any report.
 
-    Parameters
-    ----------
-    title : of the document.
-    item : what names the item (7.8.2.1 g).
+    ``item``: what names the item (7.8.2.1 g).
     """
     return (
         asked("7.8.2.1 a", "title", title),
@@ -185,7 +186,7 @@ def of_every_report(job: Identification, laboratory: Laboratory, title: str, ite
     )  # fmt: skip
 
 
-def _of_a_calibration(of: Job) -> tuple[Clause, ...]:
+def _of_a_calibration(of: Job) -> tuple[Requirement, ...]:
     facts, job = of.facts, of.facts.job
     return (
         asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
@@ -203,15 +204,15 @@ def _of_a_calibration(of: Job) -> tuple[Clause, ...]:
     )  # fmt: skip
 
 
-def _traceable(job: Job) -> tuple[Clause, ...]:
+def _traceable(job: Job) -> tuple[Requirement, ...]:
     """How the results are traceable; where that is not shown, all that each certificate which they rest on lacks."""
     chain = claimed(job)
     if chain.claim != "not shown":
         return (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
-    return tuple(Clause("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
+    return tuple(Requirement("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
 
 
-def _statements(facts: JobFile) -> tuple[Clause, ...]:
+def _statements(facts: JobFile) -> tuple[Requirement, ...]:
     decided = bool(facts.conformity or facts.model.tolerances)
     named = (
         *(rule_name(wish.rule) for wish in facts.conformity),
@@ -231,7 +232,7 @@ def _statements(facts: JobFile) -> tuple[Clause, ...]:
     )  # fmt: skip
 
 
-def _replacing(facts: JobFile) -> tuple[Clause, ...]:
+def _replacing(facts: JobFile) -> tuple[Requirement, ...]:
     replaced = facts.job.replaces
     return (
         _where("7.8.8.1", "what was changed, and why", replaced and f"{replaced.changed} ({replaced.reason})",
@@ -249,3 +250,45 @@ def _standards(facts: JobFile) -> str:
 
 def _number(facts: JobFile) -> str:
     return facts.job.number or facts.job.id
+
+
+_INTERIM = say(
+    "An interim check{key}: no calibration certificate, whatever the title says.", key=at_key("[job] interim")
+)
+
+
+def formal_warnings(job: Job) -> tuple[Text, ...]:
+    """What an assessor would hold against a certificate of this job, whatever was measured."""
+    if job.origin != MEASURED:
+        return ()
+    if job.facts.job.interim:
+        return (_INTERIM, *contradictions(job))
+    return (*contradictions(job), *not_stated(missing(job)))
+
+
+def contradictions(job: Job) -> tuple[Text, ...]:
+    """Dates out of their order, and an artefact that was certified on the machine which it tests."""
+    return (*_circular(job.facts), *dates_out_of_order(job))
+
+
+def not_stated(lacking: Iterable[Requirement]) -> list[Text]:
+    """That a certificate is not complete, and by which keys it would be; nothing of one that is."""
+    wanted = [
+        say("{what} ({clause}){key}", what=foreign(one.asks), clause=Verbatim(one.clause), key=Key(f": {one.key}"))
+        for one in lacking
+    ]
+    if not wanted:
+        return []
+    return [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(wanted))]
+
+
+def _circular(facts: JobFile) -> list[Text]:
+    if not certified_on_this_machine(facts):
+        return []
+    return [
+        say(
+            "The artefact was certified on the machine that it now tests{key}: errors that both "
+            "measurements have in common are not seen here.",
+            key=at_key("[artefact.certificate] machine"),
+        )
+    ]

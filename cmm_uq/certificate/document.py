@@ -1,5 +1,7 @@
 """A document as data: what a certificate says, before anyone decides what it looks like.
 
+A document as data: what a certificate says, before anyone decides what it looks like.
+
 HTML and PDF are two views of one :class:`Document`; every figure stands in it once, already as text, so that the views
 cannot differ. A section is a list of blocks, and a block is one of the small classes below: whoever adds an artefact, a
 budget or a diagnosis composes blocks and touches neither view. Text is plain Unicode without markup; a line feed is a new
@@ -11,15 +13,56 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Literal
 
-from cmm_uq.base.languages.language import ENGLISH, code_of
+from cmm_uq.base.languages.language import ENGLISH, Code, code_of
 from cmm_uq.base.languages.saying import said_in
-from cmm_uq.base.messages import NOTHING, Text, say
-from cmm_uq.certificate.view_words import label
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.logo import Logo
+
+_BREAK = Verbatim("\x1f")
+
+WORDS: Mapping[str, Text] = {
+    "number": say("No."), "quantity": say("Quantity"), "measured": say("Measured"), "limit": say("Limit"),
+    "rule": say("Decision rule"), "missing": say("Missing"), "warning": say("Warning"), "warnings": say("Warnings"),
+    "warning_mark": say("Warning."), "in_short": say("In short"), "particulars": say("Particulars"),
+    "authorised": say("Authorised by"),
+    "attachments": say("Files that belong to this document: {files}", files=_BREAK),
+    "page": say("Page {page} of {pages}", page=_BREAK, pages=_BREAK),
+    "replaced": say("□ stands for a character that the fonts of this file lack: {codes}. The HTML view shows it.",
+                    codes=_BREAK),
+    "annex": say("Annex: opinions and interpretations"),
+    "annex_clause": say("Opinions and interpretations by ISO/IEC 17025:2017, 7.8.7."),
+    "annex_note": say(
+        "What stands in this annex interprets the results above. It is no result of the "
+        "calibration, and no statement of conformity rests on it."
+    ),
+    "pass": say("Pass"), "fail": say("Fail"), "undecided": say("Undecided"), "incomplete": say("Incomplete"),
+    "conditional pass": say("Conditional pass"), "conditional fail": say("Conditional fail"), "remeasure": say("Remeasure"),
+}  # fmt: skip
+"""By the names that the templates use."""
+
+
+def view_words(language: Code) -> dict[str, Any]:
+    """The same as plain text in a language; what a view fills in parts it into a list."""
+    said = {name: str.__str__(said_in(text, language)) for name, text in WORDS.items()}
+    return {name: text.split(_BREAK) if _BREAK in text else text for name, text in said.items()}
+
+
+def block_label(kind: str, number: int) -> Text:
+    """What a table or a picture is called: ``Table 2``."""
+    return say("Table {number}", number=number) if kind == "table" else say("Figure {number}", number=number)
+
+
+def attachment_title(name: str, *, outcome: bool) -> Text:
+    if outcome:
+        return say("Results in machine-readable form: {name}", name=Verbatim(name))
+    return say("Input of this document: {name}", name=Verbatim(name))
+
 
 Outcome = Literal["pass", "conditional pass", "incomplete", "undecided", "conditional fail", "remeasure", "fail"]
 
@@ -78,7 +121,7 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Decision:
+class DecisionBlock:
     """A statement of conformity: what was compared with what, by which rule, what follows, and what of the test is missing."""
 
     standard: Text
@@ -106,7 +149,7 @@ class Overview:
     kind: ClassVar[str] = "overview"
 
 
-Block = Paragraph | Facts | Table | Plot | Decision | Overview
+Block = Paragraph | Facts | Table | Plot | DecisionBlock | Overview
 
 
 @dataclass(frozen=True)
@@ -195,7 +238,7 @@ class Document:
                 plain_block.pop("lettering", None)
                 if block.kind in _NUMBERED:
                     counted[block.kind] += 1
-                    plain_block["label"] = str.__str__(said_in(label(block.kind, counted[block.kind]), language))
+                    plain_block["label"] = str.__str__(said_in(block_label(block.kind, counted[block.kind]), language))
                 if block.kind == "table":
                     _measure(plain_block, english=language == ENGLISH)
         return data
@@ -239,7 +282,6 @@ def _parts(line: str, separator: str | None) -> list[str]:
 
 
 def _width(line: str) -> float:
-    """Of a line, roughly, in widths of a small letter."""
     return _wide(line) + sum(
         1.5 if c in "mwMW%—" else 0.6 if c in "fijlrtI.,:;'|()[] −-" else 1.2 if c.isupper() else 1.0 for c in line
     )
@@ -281,3 +323,54 @@ def _printable(value: Any) -> Any:
         plain = value.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
         return _UNPRINTABLE.sub("\ufffd", _LEFT_OUT.sub("", plain))
     return value
+
+
+def translated(document: Document, code: Code) -> Document:
+    """The document in a language; pictures were lettered when they were drawn (:mod:`cmm_uq.certificate.plots.style`)."""
+    if code == ENGLISH:
+        return document
+    found: Document = _said(document, code)
+    return replace(found, language=code)
+
+
+def _said(value: Any, code: Code) -> Any:
+    if isinstance(value, Text):
+        return said_in(value, code)
+    if isinstance(value, tuple):
+        return tuple(_said(item, code) for item in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        found = {field.name: getattr(value, field.name) for field in fields(value)}
+        return replace(value, **{name: _said(item, code) for name, item in found.items()})
+    return value
+
+
+def working_page(
+    facts: JobFile,
+    title: Text,
+    subject: Text,
+    *,
+    particulars: tuple[Facts, ...],
+    warnings: Iterable[Text],
+    sections: Iterable[Section],
+    produced_by: Text,
+    end: Text = say("End of diagnosis"),
+    attachments: tuple[Text, ...] = (),
+    overview: Overview | None = None,
+) -> Document:
+    """A document about a job, without the sections that have nothing to say; see :class:`Document`."""
+    return Document(
+        title=title,
+        number=Verbatim(facts.job.id),
+        subject=say("{name}, {subject}", name=Verbatim(facts.machine.name), subject=subject),
+        issuer=tuple(Verbatim(line) for line in (facts.laboratory.name,) if line),
+        particulars=particulars,
+        warnings=tuple(warnings),
+        sections=tuple(section for section in sections if section.blocks),
+        statements=(),
+        signatures=(),
+        attachments=attachments,
+        produced_by=produced_by,
+        date=facts.job.date,
+        end=end,
+        overview=overview,
+    )

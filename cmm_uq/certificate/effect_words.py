@@ -27,7 +27,6 @@ def title_of(name: str, own: Iterable[Effect] = ()) -> Text:
 
 
 def titles(names: Iterable[str], own: Iterable[Effect] = ()) -> list[Text]:
-    """Several of them."""
     known = tuple(own)
     return [title_of(name, known) for name in names]
 
@@ -43,11 +42,7 @@ def parameter_title(owner: str, name: str, own: Iterable[Effect] = ()) -> Text:
 def size_of(effect: Effect | None, parameters: Mapping[str, Quantity], *, factors: bool = True) -> Text:
     """How large an effect is, and what that means at the machine: ``the angle between X and Y is 90° minus 36 ± 4 ″``.
 
-    Parameters
-    ----------
-    effect : whose parameters they are; of an unknown one the figures alone are told.
-    parameters : reported ones, by name.
-    factors : whether coverage factors are told.
+    ``effect``: whose parameters they are; of an unknown one the figures alone are told.
     """
     quantities = {
         name: quantity.times(1e6, unit("10⁻⁶/K")) if quantity.unit == "1/K" else quantity
@@ -78,7 +73,6 @@ def _amount(quantity: Quantity, factors: bool) -> Amount:
 
 
 def _figures(quantity: Quantity, factors: bool) -> Text:
-    """Value, expanded uncertainty, unit, and its factor."""
     if not quantity.u > 0:
         return say("{value}\u00a0{unit}", value=figure(quantity.value), unit=quantity.unit)
     stated, k = with_uncertainty(quantity), expanded(quantity)[2]

@@ -1,15 +1,19 @@
-"""What a document says of a recording that nobody measured: on every page, in its title, in its file's name."""
+"""Where a recording comes from and which program made a document of it, as every file says it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import PurePosixPath
+from typing import Any
 
-from cmm_uq.base.messages import Text, Verbatim, after, commas, names, say
+from cmm_uq import __version__
+from cmm_uq.base.messages import Text, Verbatim, after, commas, names, say, together
+from cmm_uq.base.plugins import KINDS, STANDARDS, versions
 from cmm_uq.certificate.document import Document
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED, Origin
+from cmm_uq.machine.physics.catalogue import plugins
 
 BANNERS = {
     SIMULATED: say("SIMULATED RECORDING, not a calibration certificate"),
@@ -42,14 +46,6 @@ def marked(document: Document, job: Job) -> Document:
 
 
 def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text]) -> Document:  # noqa: A002
-    """The same of any document.
-
-    Parameters
-    ----------
-    origin : of what was measured.
-    id : of the job.
-    told : warnings of where it comes from.
-    """
     warnings = (*told, *document.warnings)
     if origin == MEASURED:
         return replace(document, warnings=warnings)
@@ -81,7 +77,6 @@ def _of_such(title: Text, origin: str) -> Text:
 
 
 def came_about(job: Job) -> Text:
-    """The word before the date of a recording."""
     return say("simulated, dated") if job.origin == SIMULATED else say("measured on")
 
 
@@ -102,3 +97,31 @@ def origin_warnings(job: Job) -> list[Text]:
     if job.altered:
         texts.append(say("Changed after it was derived: {files}.", files=commas(names(job.altered))))
     return [*texts, *taken]
+
+
+NAME = "cmm-uq"
+
+
+def software(job: Job, *, effects: bool = True) -> dict[str, Any]:
+    """For results.json: name and version, and those of other packages that took part, if there are any.
+
+    These are the packages whose effects were candidates, where ``effects`` says that there were candidates, and those of the
+    job's kind and standards.
+    """
+    taking_part = (plugins() if effects else {}) | _of_the_job(job)
+    return {"name": NAME, "version": __version__, **({"plugins": taking_part} if taking_part else {})}
+
+
+def program(job: Job, effects: Iterable[str] | None = None) -> Text:
+    """The same in words: ``cmm-uq 1.0`` or ``cmm-uq 1.0 with outside-effects 0.1``; of the effects named only, if any are."""
+    parts = [_versioned(package, version) for package, version in (plugins(effects) | _of_the_job(job)).items()]
+    own = _versioned(NAME, __version__)
+    return say("{program} with {plugins}", program=own, plugins=together(parts)) if parts else own
+
+
+def _of_the_job(job: Job) -> dict[str, str]:
+    return versions({KINDS: [job.facts.artefact.kind], STANDARDS: [wish.standard for wish in job.facts.conformity]})
+
+
+def _versioned(package: str, version: str) -> Text:
+    return say("{package} {version}", package=Verbatim(package), version=Verbatim(version))

@@ -10,9 +10,9 @@ from typing import Any, Protocol
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.certificate.document import Document, Section
-from cmm_uq.certificate.in_short import Summary
-from cmm_uq.certificate.lettering import lettered_in
+from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import Origin
 from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
@@ -23,9 +23,7 @@ class Found(Protocol):
     """What an analysis found, in the kind's own terms; of most kinds a :class:`~cmm_uq.certificate.result.Result`."""
 
     @property
-    def job(self) -> Job:
-        """That was analysed."""
-        ...
+    def job(self) -> Job: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +66,6 @@ class Outcome:
 
     @property
     def origin(self) -> Origin:
-        """Of the recording."""
         return self.found.job.origin
 
     @property
@@ -98,12 +95,7 @@ class Page:
     results: Callable[[Result], Mapping[str, Any]] | None = None
 
     def with_further(self, result: Result, data: Mapping[str, Any]) -> dict[str, Any]:
-        """Contents of results.json that every result has, and the kind's further keys.
-
-        Raises
-        ------
-        CmmUqError : one of these is a key that every result has.
-        """
+        """Contents of results.json that every result has, and the kind's further keys."""
         further = {} if self.results is None else self.results(result)
         if clash := sorted(set(further) & set(data)):
             raise CmmUqError(f"a kind's own results cannot be named {clash[0]!r}, which every result has",
@@ -115,10 +107,8 @@ class Page:
 class Recipe:
     """A kind's own way from a job to its outcome.
 
-    Parameters
-    ----------
-    analyse : ``(job, *, seed, progress)``, of a diagnosis also ``alpha``: what it finds.
-    outcome : of that, and of the seed.
+    ``analyse``: ``(job, *, seed, progress)``, of a diagnosis also ``alpha``: what it finds; ``outcome``: of that, and
+    of the seed.
     """
 
     analyse: Callable[..., Found]

@@ -1,29 +1,34 @@
-"""What an analysis finds: the object that certificates and results.json are written from."""
+"""What an analysis by effects comes to: estimates, noise, diagnosis, statements of conformity."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.consequences import Consequences, Costs
-from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.analysis.conformity.verdicts import by_standard, by_tolerance
+from cmm_uq.analysis.conformity.statement import Statement, by_standard, by_tolerance
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.diagnosis.smallest import SmallestEffect
 from cmm_uq.analysis.planning.advice import NextPlan, Suggestion
 from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.base.messages import Text, at_key, say
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.simulated import Simulated
-from cmm_uq.certificate.stating import Stating
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.laboratory import Capability
+from cmm_uq.jobs.reading import sha256
+from cmm_uq.jobs.simulation import SimulationFacts
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.model import Estimate, MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.doubt import growth
+from cmm_uq.machine.model.predicted_errors import PredictedErrors
+from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.doubt import Cause, Doubt
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.inference.least_squares import LeastSquares
@@ -31,6 +36,140 @@ from cmm_uq.maths.inference.posterior import NoisyPosterior
 from cmm_uq.maths.uncertainty.covariance import Covariance
 from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.maths.uncertainty.quantity import Quantity
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedTwin:
+    """The simulation that a recording was compared with.
+
+    ``files``: with their SHA-256; ``program``: that made it, in the user's words; ``maps``: whether it is error maps;
+    ``u_um, u_common_um``: of a predicted coordinate, root mean square, and of the artefact's size, as stated;
+    ``u_turned_um``: what there is besides because the artefact was taken to lie in another direction, root mean square;
+    ``contains``: effects that it contains; ``refitted``: those that were estimated anew; ``shift_mm, turn_deg``: of its
+    frame against the recording's; ``farthest_mm``: from a recorded point to the predicted one; ``rms_predicted_um``: of
+    the errors that it predicts, as the observations show them.
+    """
+
+    files: Mapping[str, str]
+    program: str
+    maps: bool
+    u_um: float
+    u_common_um: float
+    u_turned_um: float
+    contains: tuple[str, ...]
+    refitted: tuple[str, ...]
+    shift_mm: tuple[float, ...]
+    turn_deg: float
+    farthest_mm: float
+    rms_predicted_um: float
+
+    @classmethod
+    def of(
+        cls, facts: SimulationFacts, job: Job, found: PredictedErrors, named: Sequence[Effect], model: MeasurementModel
+    ) -> SimulatedTwin:
+        """As a job names it.
+
+        ``facts``: ``[simulation]``.
+        """
+        files = [given.file for given in facts.map] if facts.file is None else [facts.file]
+        hashes = sha256(job.inputs)
+        contains = tuple(effect.name for effect in named)
+        shown = model.artefact.project(model.artefact.points.xyz, found.errors[:, :, None])[model.used, 0]
+        return cls(
+            {name: hashes[name] for name in files}, facts.program, bool(facts.map),
+            _rms_um(found.u), facts.u_common_um, _rms_um(found.turned), contains,
+            contains if facts.refit else (), tuple(float(v) for v in found.frame.shift),
+            float(np.degrees(found.frame.angle)), found.apart, _rms_um(shown),
+        )  # fmt: skip
+
+    def data(self, corrections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+        return {
+            "files_sha256": dict(self.files), "program": self.program, "kind": "map" if self.maps else "prediction",
+            "u_um": self.u_um, "u_common_um": self.u_common_um, "u_turned_um": self.u_turned_um,
+            "effects": list(self.contains),
+            "refitted": dict(corrections), "frame": {"shift_mm": list(self.shift_mm), "turn_deg": self.turn_deg},
+            "farthest_mm": self.farthest_mm, "rms_predicted_um": self.rms_predicted_um,
+        }  # fmt: skip
+
+
+def _rms_um(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) / MICROMETRE
+
+
+AtLeast = Callable[..., tuple[float, float]]
+"""U and k of a figure as a certificate states them; see :meth:`StatedUncertainty.raised_to`."""
+
+
+def as_evaluated(
+    name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
+) -> tuple[float, float]:
+    return expanded, factor
+
+
+CAPABILITY_FACTOR = 2.0
+"""Coverage factor of a calibration and measurement capability (ILAC-P14:09/2020)."""
+
+
+@dataclass(frozen=True)
+class StatedUncertainty:
+    """States quantities of one certificate, and keeps what was raised.
+
+    ``capability``: of the laboratory, if it gives one; ``length_mm``: that the capability of lengths is taken at;
+    ``raised``: by name, U as evaluated and as stated.
+    """
+
+    capability: Capability | None
+    length_mm: float
+    raised: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, job: Job, length_mm: float = 0.0) -> StatedUncertainty:
+        """For a job; without a length at the longest travel of the machine."""
+        spans = np.ptp(job.points.machine.travel_mm, axis=1)
+        longest = float(np.nanmax(spans)) if np.isfinite(spans).any() else 0.0
+        return cls(job.facts.laboratory.cmc, length_mm or longest)
+
+    def stated(self, name: str, quantity: Quantity) -> Quantity:
+        """The quantity with U not below the capability; ``name`` as in results.json."""
+        least = self.capability.least(quantity.unit, self.length_mm) if self.capability else 0.0
+        if quantity.expanded < least:
+            self.raised[name] = {"evaluated_U": quantity.expanded, "U": least}
+        return quantity.at_least(least)
+
+    def raised_to(
+        self, name: str, expanded: float, factor: float, unit_: str, length_mm: float | None = None
+    ) -> tuple[float, float]:
+        """U and k of a figure that is no :class:`Quantity`, U not below the capability, k = 2 where it is that.
+
+        ``expanded, factor``: as evaluated; U in ``unit_``.
+        """
+        least = (
+            self.capability.least(unit_, self.length_mm if length_mm is None else length_mm) if self.capability else 0.0
+        )
+        if expanded >= least:
+            return expanded, factor
+        self.raised.setdefault(name, {"evaluated_U": expanded, "U": least})
+        return least, CAPABILITY_FACTOR
+
+    def all(self, group: str, quantities: Mapping[str, Quantity]) -> dict[str, Quantity]:
+        """Quantities of one group, each under ``group.name``."""
+        return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
+
+    def warnings(self) -> list[Text]:
+        if not self.raised:
+            return []
+        return [
+            say(
+                "U is stated as the laboratory's calibration and measurement capability (k = 2){key} where that is larger "
+                "than what was evaluated{names}.",
+                names=at_key(", ".join(self.raised)),
+                key=at_key("[laboratory.cmc]"),
+            )
+        ]
+
+    def data(self) -> dict[str, Any]:
+        return {"cmc": {"length_mm": self.length_mm, "raised": self.raised}} if self.raised else {}
+
 
 LACK_OF_FIT = 0.01
 """Probability below which the residuals are held to contradict the stated noise."""
@@ -45,19 +184,15 @@ class Component:
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class NoiseEstimate:
     """The noise of a recording, and what it does to the uncertainties.
 
-    Parameters
-    ----------
-    coordinate : standard deviation of one reading of one coordinate, root mean square of the axes, µm.
-    components : its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,
-        ``growth``, ``slow``.
-    axes_apart : probability that the axes differ.
-    wider : largest ratio of a parameter's standard uncertainty to what white noise would leave it.
-    stated_um : what the job states, if anything.
-    p_value : of the residuals' sum of squares under the stated noise (χ² test), if it is stated.
-    display_um : step in which coordinates are displayed, 0 where it is too fine to matter.
+    ``coordinate``: standard deviation of one reading of one coordinate, root mean square of the axes, µm;
+    ``components``: its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,;
+    ``growth``, ``slow``.; ``axes_apart``: probability that the axes differ; ``wider``: largest ratio of a parameter's
+    standard uncertainty to what white noise would leave it; ``stated_um``: what the job states, if anything;
+    ``p_value``: of the residuals' sum of squares under the stated noise (χ² test), if it is stated; ``display_um``:
+    step in which coordinates are displayed, 0 where it is too fine to matter.
     """
 
     coordinate: Quantity
@@ -88,16 +223,12 @@ class Noise:
 class Diagnosed:
     """A job with its diagnosis.
 
-    Parameters
-    ----------
-    job, findings : what was read, and what the screening found.
-    diagnosis : what is missing.
-    suggestions : what to measure next.
-    consequences : what correcting for what was found would change; ``None`` where nothing is found or nothing depends on it.
-    simulated : the simulation that the recording was compared with, if it was with one.
-    unseen : the smallest amplitude of each effect that the recording would have shown.
-    next_plan : the fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any.
-    costs : what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
+    ``job, findings``: what was read, and what the screening found; ``diagnosis``: what is missing; ``suggestions``:
+    what to measure next; ``consequences``: what correcting for what was found would change; ``None`` where nothing is
+    found or nothing depends on it; ``simulated``: the simulation that the recording was compared with, if it was with
+    one; ``unseen``: the smallest amplitude of each effect that the recording would have shown; ``next_plan``: the
+    fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any;
+    ``costs``: what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
     """
 
     job: Job
@@ -105,14 +236,14 @@ class Diagnosed:
     diagnosis: Diagnosis
     suggestions: tuple[Suggestion, ...]
     consequences: Consequences | None = None
-    simulated: Simulated | None = None
+    simulated: SimulatedTwin | None = None
     unseen: tuple[SmallestEffect, ...] = ()
     next_plan: NextPlan | None = None
     costs: Costs | None = None
 
 
 @dataclass(frozen=True)
-class Difference:
+class ParameterDifference:
     """``second`` minus ``first``, parameters by their keys, which is determined where neither of them is."""
 
     second: tuple[str, str]
@@ -124,11 +255,8 @@ class Difference:
 class Contradiction:
     """A line along a machine axis that says something else of the axis than an average over explanations does.
 
-    Parameters
-    ----------
-    key : of the parameter, effect and name.
-    measurement : number of the line.
-    alone : the parameter by this line alone, all others as they are on average.
+    ``key``: of the parameter, effect and name; ``measurement``: number of the line; ``alone``: the parameter by this
+    line alone, all others as they are on average.
     """
 
     key: tuple[str, str]
@@ -170,11 +298,11 @@ class Result:
     draws: Draws
     parameters: Mapping[str, Mapping[str, Quantity]]
     sizes: Mapping[str, Quantity]
-    noise: Noise
+    noise: NoiseEstimate
     accuracy: Mapping[str, Quantity]
     statements: tuple[Statement, ...]
     diagnosed: Diagnosed
-    stating: Stating | None = None
+    stating: StatedUncertainty | None = None
     causes: tuple[Cause, ...] = ()
     doubt: Doubt = field(default_factory=lambda: Doubt(()))
     contradictions: tuple[Contradiction, ...] = ()
@@ -182,7 +310,7 @@ class Result:
     def at_least(
         self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
     ) -> tuple[float, float]:
-        """U and k as a certificate states them; see :meth:`Stating.raised_to`."""
+        """U and k as a certificate states them; see :meth:`StatedUncertainty.raised_to`."""
         if self.stating is None:
             return expanded, factor
         return self.stating.raised_to(name, expanded, factor, unit, length_mm)
@@ -210,12 +338,10 @@ class Result:
 
     @property
     def artefact(self) -> Artefact:
-        """The artefact with its recording."""
         return self.model.artefact
 
     @property
     def least_squares(self) -> LeastSquares:
-        """The least-squares estimate."""
         return self.estimate.least_squares
 
     @cached_property
@@ -242,7 +368,7 @@ class Result:
         free = (key for combination in self.undetermined for key in combination)
         return frozenset((*free, *(one.key for one in self.contradictions)))
 
-    def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[Difference, ...]:
+    def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[ParameterDifference, ...]:
         """Differences, within a combination that the recording leaves free, of parameters in one unit.
 
         None with an uncertainty below the laboratory's capability.
@@ -251,13 +377,13 @@ class Result:
         units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
         alike = [key for key in combination if units[key] == units[combination[0]]]
         draws = self.values
-        stating, found = Stating.of(self.job), []
+        stating, found = StatedUncertainty.of(self.job), []
         for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
             quantity = Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
             if self.causes:
                 each = np.eye(len(columns))
                 quantity = self.doubt.larger(quantity, each[columns[second]] - each[columns[first]])
-            found.append(Difference(second, first, stating.stated("differences", quantity)))
+            found.append(ParameterDifference(second, first, stating.stated("differences", quantity)))
         return tuple(found)
 
     @cached_property

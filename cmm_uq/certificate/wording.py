@@ -1,13 +1,15 @@
-"""Figures as a certificate states them."""
+"""How figures, outcomes and names are said in documents and on the terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.base.points import Floats
+from cmm_uq.certificate.document import Standing
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded
@@ -129,12 +131,7 @@ def numbered(measurement: int, repeat: int | None) -> Text:
 def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, spec: str = ".1f") -> Text:
     """The sentence in place of a picture of deviations: their range as recorded, and after the fitted model.
 
-    Parameters
-    ----------
-    what : deviates, with a verb: ``12 lengths: as recorded they deviate``.
-    reference : from what; or nothing.
-    before_um, after_um : deviations, µm.
-    spec : of the figures.
+    ``what``: deviates, with a verb: ``12 lengths: as recorded they deviate``; ``before_um, after_um``: deviations, µm.
     """
     low, high, low_after, high_after = (
         number(float(end), spec) for end in (before_um.min(), before_um.max(), after_um.min(), after_um.max())
@@ -148,3 +145,58 @@ def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, 
         "{what} by {low} to {high} µm; after the fitted model {low_after} to {high_after} µm remain.",
         what=what, low=low, high=high, low_after=low_after, high_after=high_after,
     )  # fmt: skip
+
+
+Figure = tuple[Text, Text, Text]
+"""Name of a quantity, its value with U and unit, its coverage factor."""
+
+
+@dataclass(frozen=True)
+class Headline:
+    """A decision, or what a diagnosis comes to.
+
+    ``word``: the outcome in capitals; ``standing``: what that means for the machine; ``subject``: what was decided;
+    ``remarks``: the figures it rests on, and what is missing.
+    """
+
+    word: str
+    standing: Standing
+    subject: Text
+    remarks: tuple[Text, ...]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """An outcome for the end of a command.
+
+    ``subject, date``: what was measured, and when; ``verdicts``: what it comes to; ``figures``: quantities with their
+    uncertainty; ``remarks``: further sentences; ``details``: rows of a table that only who asks for everything wants to
+    see; ``warnings``: what the reader must know before using a figure.
+    """
+
+    subject: Text = NOTHING
+    date: Text = NOTHING
+    verdicts: tuple[Headline, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    remarks: tuple[Text, ...] = ()
+    details: tuple[tuple[Text, ...], ...] = ()
+    warnings: tuple[Text, ...] = ()
+
+    @property
+    def rows(self) -> tuple[tuple[str, ...], ...]:
+        """The same, without the details, as rows of one table: what, figure, remark."""
+        measured = (say("Measured"), self.subject, self.date) if self.date else (self.subject,)
+        decided = ((each.subject, each.word, "; ".join(each.remarks)) for each in self.verdicts)
+        told = ((text,) for text in self.remarks)
+        warned = ((say("Warning"), text, NOTHING) for text in self.warnings)
+        return (*((measured,) if self.subject else ()), *self.figures, *decided, *told, *warned)
+
+
+def figure_row(name: Text, quantity: Quantity, *, known: bool = True) -> Figure:
+    """A quantity with its expanded uncertainty; ``known`` is false where a recording says nothing of it."""
+    if not known:
+        return name, say("not determined"), NOTHING
+    figure, k = say("{figure} {unit}", figure=with_uncertainty(quantity), unit=quantity.unit), expanded(quantity)[2]
+    if quantity.one_sided:
+        return name, figure, say("95 % interval")
+    return name, figure, NOTHING if k == NO_FACTOR else say("k = {k}", k=k)

@@ -19,7 +19,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import diagnosis_outcome
 from cmm_uq.certificate.document import Block, Document, Table
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.results.plain import as_json
 from tests.conftest import ROOT
 
 SCALE = {"scale_x": 9.0, "scale_y": -6.0, "scale_z": 14.0}

@@ -16,7 +16,7 @@ import pytest
 from cmm_uq.app.commands.analysis import outcome_of
 from cmm_uq.artefacts.shift_plate.curves_page import EVERY
 from cmm_uq.certificate.document import Document, Table
-from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import tables
 from tests.artefacts.simulated import analysed, document
 from tests.conftest import MACHINE_JOBS

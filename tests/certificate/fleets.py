@@ -51,7 +51,7 @@ def many(count: int = 3000) -> FleetResult:
     one = np.ones(count)
     estimates = Estimates(
         one, one, one, one, 0.1 / (1.0 + at), Crossings(last, DAYS, probability, level, one, one, one)
-    )  # fmt: skip
+    )
     usual = (
         UsualRate("fleet", "", count, 0.5, 0.1, 0.3, 0.7),
         *(UsualRate("model", f"{m}", m, 0.5, 0.1, 0.3, 0.7) for m in range(1, MODELS + 1)),

@@ -6,9 +6,19 @@ import datetime as dt
 
 import numpy as np
 
-from cmm_uq.certificate.corner import corner_plot
-from cmm_uq.certificate.document import Column, Decision, Document, Facts, Paragraph, Plot, Section, Signature, Table
-from cmm_uq.certificate.plots import length_plot, volume_plot
+from cmm_uq.certificate.document import (
+    Column,
+    DecisionBlock,
+    Document,
+    Facts,
+    Paragraph,
+    Plot,
+    Section,
+    Signature,
+    Table,
+)
+from cmm_uq.certificate.plots.corner import corner_plot
+from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
 
 HOSTILE = (
     '<script>alert(\'x\')</script> "q" & {{ 7*7 }} {% raw %} #panic("x") $x^2$ *b* _i_ @ref <label> \\u{41} `c` // d '
@@ -53,13 +63,13 @@ def ballbar_certificate() -> Document:
     conformity = Section(
         "Conformity",
         (
-            Decision("ASME B89.4.1-1997", "Range of the lengths", "339.9 µm, U = 8.4 µm", "60.0 µm",
+            DecisionBlock("ASME B89.4.1-1997", "Range of the lengths", "339.9 µm, U = 8.4 µm", "60.0 µm",
                      "ISO 14253-1, guard band 8.4 µm", "fail", "The range lies beyond the limit."),
-            Decision("ISO 10360-2:2009", "Largest error", "4.4 µm, U = 6.1 µm", "4.6 µm", "simple acceptance", "pass",
+            DecisionBlock("ISO 10360-2:2009", "Largest error", "4.4 µm, U = 6.1 µm", "4.6 µm", "simple acceptance", "pass",
                      "The error lies within the limit."),
-            Decision("VDI/VDE 2617", "Largest error", "4.4 µm, U = 6.1 µm", "4.6 µm", "ISO 14253-1", "undecided",
+            DecisionBlock("VDI/VDE 2617", "Largest error", "4.4 µm, U = 6.1 µm", "4.6 µm", "ISO 14253-1", "undecided",
                      "The difference is smaller than the uncertainty."),
-            Decision("ISO 10360-2:2009", "Largest error", "1.1 µm, U = 0.4 µm", "4.6 µm", "ISO 14253-1", "incomplete",
+            DecisionBlock("ISO 10360-2:2009", "Largest error", "1.1 µm, U = 0.4 µm", "4.6 µm", "ISO 14253-1", "incomplete",
                      "The lengths measured conform.", ("space diagonal +X −Y +Z", "81 of 105 lengths")),
         ),
     )  # fmt: skip
@@ -108,7 +118,7 @@ def document_of(text: str) -> Document:
     blocks = (
         Paragraph(text), Paragraph(text, "warning"), Paragraph(text, "note"), Facts(((text, text),)),
         Table(text, (column, Column("n")), ((text, "2.0"), ("a", "1.0")), (text,)),
-        Decision(text, text, text, text, text, "incomplete", text, (text, text)),
+        DecisionBlock(text, text, text, text, text, "incomplete", text, (text, text)),
     )  # fmt: skip
     return Document(
         title=text, number=text, subject=text, issuer=(text, text), particulars=(Facts(((text, text),)),),

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.conformity_plot import trumpet
-from cmm_uq.certificate.corner import corner_plot
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import ACCENT, BAND, DIVERGING, INK, MUTED
-from cmm_uq.certificate.plots import length_plot, volume_plot
-from cmm_uq.certificate.tolerance_plot import tolerance_plot
+from cmm_uq.certificate.plots.conformity import tolerance_plot, trumpet
+from cmm_uq.certificate.plots.corner import corner_plot
+from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
+from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED
 from tests.certificate.svg import Drawing, outlines
 
 WORDS: dict[str, Any] = {"caption": say("c"), "alternative": say("a")}

@@ -12,12 +12,11 @@ import pytest
 from cmm_uq.app.commands.jobs.check import check_read
 from cmm_uq.base.messages import NOTHING, say
 from cmm_uq.certificate.certificate import certificate_of
-from cmm_uq.certificate.clauses import DRAFT, clauses, clauses_data, draft, missing
-from cmm_uq.certificate.completeness import contradictions
+from cmm_uq.certificate.clauses import DRAFT, clauses, clauses_data, contradictions, draft, missing
 from cmm_uq.certificate.document import Document, Paragraph, Section
-from cmm_uq.certificate.html import render_html
 from cmm_uq.certificate.origin import marked
-from cmm_uq.certificate.results_file import head
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.results.contents import head
 from cmm_uq.jobs.job import Job, JobFacts
 from cmm_uq.jobs.replaced import Replaced
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE

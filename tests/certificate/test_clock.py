@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from tests.conftest import ROOT
 
 CLOCKS = {
@@ -27,7 +27,7 @@ CLOCKS = {
 READ = {
     "cmm_uq/base/output/staging.py": {"monotonic"}, "cmm_uq/base/output/interruption.py": {"monotonic"},
     "cmm_uq/app/commands/jobs/new.py": {"now"},
-    "cmm_uq/app/commands/parts/new.py": {"now"},
+    "cmm_uq/app/commands/new_part.py": {"now"},
     "cmm_uq/laboratory/live/instruments/source.py": {"time_ns"},
     "cmm_uq/laboratory/live/instruments/simulated_line.py": {"monotonic"},
     "cmm_uq/laboratory/records/entries.py": {"now"}, "cmm_uq/app/cli/records.py": {"now"},

@@ -11,9 +11,9 @@ import pytest
 from pydantic import BaseModel
 
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.certificate.completeness import formal_warnings
-from cmm_uq.certificate.conditions import conditions
-from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.certificate.certificate import conditions
+from cmm_uq.certificate.clauses import formal_warnings
+from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGaugeFacts
 from cmm_uq.jobs.traceability import Traceability

@@ -13,11 +13,10 @@ from pypdf import PdfReader
 
 from cmm_uq.app.commands.analysis import Result, analyse, outcome_of
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.certificate.clauses import STATEMENTS
-from cmm_uq.certificate.completeness import formal_warnings
-from cmm_uq.certificate.document import Decision, Document, Facts, Plot, Signature, Table
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.clauses import STATEMENTS, formal_warnings
+from cmm_uq.certificate.document import DecisionBlock, Document, Facts, Plot, Signature, Table
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from tests.artefacts.simulated import analysed
 from tests.certificate.test_completeness import changed
 
@@ -75,7 +74,9 @@ def test_the_budget_of_one_length_says_where_each_figure_comes_from(document: Do
 
 
 def test_the_decision_names_rule_limit_and_probability(document: Document) -> None:
-    (decision,) = [block for section in document.sections for block in section.blocks if isinstance(block, Decision)]
+    (decision,) = [
+        block for section in document.sections for block in section.blocks if isinstance(block, DecisionBlock)
+    ]
     assert decision.outcome == "fail"
     assert decision.limit == "60 µm"
     assert "ISO 14253-1:2017" in decision.rule
@@ -250,7 +251,7 @@ def test_every_kind_begins_with_its_results(kind: str) -> None:
 def test_the_formula_of_an_mpe_stands_with_its_limit() -> None:
     """3 + 800/80 = 13 µm."""
     made = outcome_of(analysed("gauge-blocks-simulated")).document
-    (decision,) = [block for section in made.sections for block in section.blocks if isinstance(block, Decision)]
+    (decision,) = [block for section in made.sections for block in section.blocks if isinstance(block, DecisionBlock)]
     assert decision.limit == "4.25 µm at L = 100 mm; MPE = (3 + L/80) µm, L in mm"
 
 

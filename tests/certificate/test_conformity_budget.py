@@ -6,8 +6,8 @@ import pytest
 
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.conformity_budget import budget_table
 from cmm_uq.certificate.document import Table
+from cmm_uq.certificate.sections.conformity import budget_table
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, Line
 from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 

@@ -9,8 +9,8 @@ import pytest
 
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.certificate.conformity_section import conformity_section, decision_block, formula
-from cmm_uq.certificate.document import Decision, Plot, Table
+from cmm_uq.certificate.document import DecisionBlock, Plot, Table
+from cmm_uq.certificate.sections.conformity import conformity_section, decision_block, formula
 from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError, Prior
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from tests.analysis.conformity.recorded import STATED, gauge
@@ -25,10 +25,10 @@ def stated(u_um: float | None = 0.4, **wish: object) -> Statement:
     return statement(facts, artefact, {}, "[[conformity]] 1", (BARS, LENGTHS), None, STATED)
 
 
-def blocks(found: Statement) -> tuple[Decision, Plot, Table]:
+def blocks(found: Statement) -> tuple[DecisionBlock, Plot, Table]:
     section = conformity_section([found])
     decision, plot, table = section.blocks[:3]
-    assert isinstance(decision, Decision)
+    assert isinstance(decision, DecisionBlock)
     assert isinstance(plot, Plot)
     assert isinstance(table, Table)
     return decision, plot, table

@@ -8,9 +8,9 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.corner import corner_plot
-from cmm_uq.certificate.measured import farthest_right
-from cmm_uq.certificate.plot_style import ACCENT, INK, MUTED
+from cmm_uq.certificate.plots.corner import corner_plot
+from cmm_uq.certificate.plots.labels import farthest_right
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED
 from tests.certificate.svg import Drawing, area, outlines, strokes
 
 WORDS = {"caption": "Posterior.", "alternative": "a"}

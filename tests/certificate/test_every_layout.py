@@ -17,12 +17,12 @@ from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.certificate.budget_page import budget_document
 from cmm_uq.certificate.clauses import STATEMENTS
 from cmm_uq.certificate.document import Block, Document, Facts, Plot, Section, Table
-from cmm_uq.certificate.html import render_html
 from cmm_uq.certificate.origin import marked
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.pages.budget import budget_document
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.maths.uncertainty.model_file import read_model_file
 from tests.artefacts.simulated import diagnosed, document, planned
 from tests.certificate.samples import ballbar_certificate
@@ -34,9 +34,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 REPORTED = sorted(
-    path.name for path in MACHINE_JOBS
-    if not path.name.startswith("plan-") and path.name != "iota-1102-maps"
-)  # fmt: skip
+    path.name for path in MACHINE_JOBS if not path.name.startswith("plan-") and path.name != "iota-1102-maps"
+)
 
 
 def report(name: str) -> Document:

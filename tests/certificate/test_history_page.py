@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.due_page import due_document
-from cmm_uq.certificate.history_page import history_document, overview_of
-from cmm_uq.certificate.history_words import history_data, meets, notes, terminal_note
-from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.pages.due import due_document
+from cmm_uq.certificate.pages.history import history_data, history_document, meets, notes, overview_of, terminal_note
+from cmm_uq.certificate.render.html import render_html
 from cmm_uq.laboratory.due.crossing import Crossing, crossing
 from cmm_uq.laboratory.due.due import CalibrationRecord, DueItem, artefact_due, machine_due
 from cmm_uq.laboratory.due.history import MachineHistory, machine_history

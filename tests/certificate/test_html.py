@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.certificate.document import Document, Section
-from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.render.html import render_html
 from tests.certificate.samples import HOSTILE, document_of, plots
 
 VOID = {"meta", "link", "br"}
@@ -113,7 +113,7 @@ def test_a_number_cannot_leave_the_margin_box() -> None:
 
 
 def test_markup_in_a_plot_is_text(certificate: Document) -> None:
-    from cmm_uq.certificate.plots import budget_bars
+    from cmm_uq.certificate.plots.residuals import budget_bars
 
     plot = budget_bars(["</svg><script>x</script>", "a&b"], [0.5, 0.5], caption="c", alternative='"><script>')
     page = Page(render_html(replace(certificate, sections=(Section("One", (plot,)),))))

@@ -21,18 +21,16 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import LANGUAGES, Code
 from cmm_uq.base.languages.saying import Said, said_in
 from cmm_uq.base.messages import Day, Message, Number, Text, Verbatim, commas, say
-from cmm_uq.certificate import fitting, fonts
-from cmm_uq.certificate.document import Document, Paragraph, Plot, Section
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.in_language import said
-from cmm_uq.certificate.lettering import lettered_in
-from cmm_uq.certificate.measured import width_mm
-from cmm_uq.certificate.narrowing import NAMES_MM
-from cmm_uq.certificate.pdf import render_pdf
-from cmm_uq.certificate.plan_picture import _edge, _size, _title
-from cmm_uq.certificate.plot_style import SMALL, TINY
-from cmm_uq.certificate.plots import budget_bars
-from cmm_uq.certificate.results_file import head
+from cmm_uq.certificate.document import Document, Paragraph, Plot, Section, translated
+from cmm_uq.certificate.plots import style as fonts
+from cmm_uq.certificate.plots.labels import NAMES_MM, width_mm
+from cmm_uq.certificate.plots.plans import _edge, _size, _title
+from cmm_uq.certificate.plots.residuals import budget_bars
+from cmm_uq.certificate.plots.style import SMALL, TINY, lettered_in
+from cmm_uq.certificate.render import fitting
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
+from cmm_uq.certificate.results.contents import head
 from tests.artefacts.simulated import outcome
 from tests.certificate.saying import figures, lettering, messages
 from tests.certificate.test_every_layout import CUT_LABELS, HEADS_RUN_TOGETHER, HIDDEN_COLUMNS
@@ -50,7 +48,7 @@ CODES: list[Code] = ["de", "fr", "ja"]
 def certificate(code: Code) -> Document:
     """Of the example, composed and said in a language."""
     with lettered_in(code):
-        return said(outcome(EXAMPLE).composed(), code)
+        return translated(outcome(EXAMPLE).composed(), code)
 
 
 @cache

@@ -13,11 +13,10 @@ from cmm_uq.base.languages.language import LANGUAGES, Code
 from cmm_uq.base.languages.saying import said_in
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.certificate.clauses import STATEMENTS
-from cmm_uq.certificate.document import Document, Facts, Signature
-from cmm_uq.certificate.fitting import fitted
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.in_language import said
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.document import Document, Facts, Signature, translated
+from cmm_uq.certificate.render.fitting import fitted
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.jobs.logo import Logo
 from tests.artefacts.simulated import document
 from tests.certificate.test_customers_words import REPORTED
@@ -47,7 +46,7 @@ def signed(made: Document, warnings: Sequence[Text] = ()) -> Document:
 @pytest.mark.parametrize("code", ["en", *LANGUAGES])
 @pytest.mark.parametrize("name", REPORTED)
 def test_verdict_limits_statements_and_signature_stand_on_the_first_page(name: str, code: Code) -> None:
-    made = said(signed(document(name)), code)
+    made = translated(signed(document(name)), code)
     first = pages(made)[0]
     assert plain(made.statements[-1]) in first
     assert "Dr.A.Muster" in first
@@ -100,5 +99,5 @@ def test_what_has_room_is_not_parted() -> None:
 
 
 def test_what_is_said_in_full_behind_the_page_is_said_in_the_language() -> None:
-    made = said(signed(document("iota-1102-20C"), MANY), "de")
+    made = translated(signed(document("iota-1102-20C"), MANY), "de")
     assert fitted(made).warnings[-1] == said_in(say("In full behind this page."), "de") != "In full behind this page."

@@ -15,7 +15,7 @@ from pypdf import PdfReader
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Column, Document, Plot, Section, Table
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.render.pdf import render_pdf
 from tests.certificate.samples import HOSTILE, NUMBER, UNBREAKABLE, document_of, plots
 
 ATTACHMENTS = {

@@ -13,9 +13,9 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.narrowing import NAMES_MM, narrowed, told_apart
-from cmm_uq.certificate.plot_style import ACCENT, DIVERGING, MUTED, WIDTH_MM, as_svg, dots, house_style, new_figure
-from cmm_uq.certificate.plots import budget_bars, curve_with_band, length_plot, volume_plot
+from cmm_uq.certificate.plots.labels import NAMES_MM, narrowed, told_apart
+from cmm_uq.certificate.plots.residuals import budget_bars, curve_with_band, length_plot, volume_plot
+from cmm_uq.certificate.plots.style import ACCENT, DIVERGING, MUTED, WIDTH_MM, as_svg, dots, house_style, new_figure
 from tests.certificate.samples import plots
 from tests.certificate.svg import Drawing, outlines, strokes
 
@@ -182,7 +182,7 @@ def test_two_runs_give_the_same_bytes_and_leave_no_trace() -> None:
 
 def test_matplotlib_is_imported_late_and_pyplot_never() -> None:
     code = (
-        "import sys, cmm_uq.certificate.plots as p, cmm_uq.certificate.corner\n"
+        "import sys, cmm_uq.certificate.plots.residuals as p, cmm_uq.certificate.plots.corner\n"
         "assert 'matplotlib' not in sys.modules\n"
         "p.curve_with_band([0, 1], [0, 1], [1, 1], x_label='x', y_label='y', caption='c', alternative='a')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"

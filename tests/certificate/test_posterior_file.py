@@ -8,7 +8,7 @@ import io
 import numpy as np
 import pytest
 
-from cmm_uq.certificate.posterior_file import MOST_NUMBERS, posterior_file
+from cmm_uq.certificate.results.plain import MOST_NUMBERS, posterior_file
 from cmm_uq.maths.inference.draws import Draws
 
 

@@ -10,10 +10,9 @@ import pytest
 
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.conformity_section import conformity_section
-from cmm_uq.certificate.document import Decision, Facts, Table
-from cmm_uq.certificate.in_short import figure_row
-from cmm_uq.certificate.wording import expanded, with_uncertainty
+from cmm_uq.certificate.document import DecisionBlock, Facts, Table
+from cmm_uq.certificate.sections.conformity import conformity_section
+from cmm_uq.certificate.wording import expanded, figure_row, with_uncertainty
 from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity
@@ -50,7 +49,7 @@ def test_a_length_that_is_given_is_printed_in_full(length: float, text: str) -> 
     assert nominal(length) == text
 
 
-def decided(characteristics: tuple[str, ...] = ("E0",)) -> list[Table | Decision]:
+def decided(characteristics: tuple[str, ...] = ("E0",)) -> list[Table | DecisionBlock]:
     artefact = gauge(list(np.eye(3)[:2]), [[20.0, 1080.0012], [20.0, 400.0]], errors={(1, 2, 20.0): 2.4}, u_um=0.2)
     limits: dict[str, Any] = {
         "E0": {"mpe": MaximumPermissibleError(a_um=2.5, k=300.0)},
@@ -60,13 +59,13 @@ def decided(characteristics: tuple[str, ...] = ("E0",)) -> list[Table | Decision
         statement(ConformityFacts(standard="ISO 10360-2:2009", characteristic=name, **limits[name]), artefact, {},
                   "[[conformity]] 1", (BARS, LENGTHS)) for name in characteristics
     ]  # fmt: skip
-    return [block for block in conformity_section(found).blocks if isinstance(block, Table | Decision)]
+    return [block for block in conformity_section(found).blocks if isinstance(block, Table | DecisionBlock)]
 
 
 def test_a_decision_names_its_length_in_full_and_states_u_with_k() -> None:
     table = next(block for block in decided() if isinstance(block, Table))
     assert "1080.0012" in {row[1] for row in table.rows}
-    decision = next(block for block in decided() if isinstance(block, Decision))
+    decision = next(block for block in decided() if isinstance(block, DecisionBlock))
     assert " ± " in decision.measured
     assert decision.measured.endswith("µm (k = 2)")
 
@@ -81,7 +80,7 @@ def test_no_two_tables_of_a_certificate_have_one_title() -> None:
 def test_one_figure_has_one_u() -> None:
     """The range of this recording is decided on; the figure of performance is that of repeats, and is called so."""
     every = blocks("iota-1102-20C")
-    (decision,) = [block for block in every if isinstance(block, Decision)]
+    (decision,) = [block for block in every if isinstance(block, DecisionBlock)]
     assert decision.measured == "340 ± 14 µm (k = 2)"
     performance = next(b for b in every if isinstance(b, Table) and b.caption == "Figures of performance")
     assert "Range of the lengths, on average over repeats" in {row[0] for row in performance.rows}

@@ -10,9 +10,9 @@ import pytest
 from prov.model import ProvActivity, ProvAgent, ProvDerivation, ProvDocument, ProvEntity, ProvUsage
 
 from cmm_uq import __version__
-from cmm_uq.certificate import installation
-from cmm_uq.certificate.provenance import provenance, same_but_for_the_platform
-from cmm_uq.certificate.results_file import head
+from cmm_uq.certificate.results import provenance as installation
+from cmm_uq.certificate.results.contents import head
+from cmm_uq.certificate.results.provenance import provenance, same_but_for_the_platform
 from tests.certificate.test_clauses import REPLACED, complete
 from tests.certificate.test_completeness import WHOLE
 
@@ -63,8 +63,8 @@ def test_without_a_certificate_replaced_or_a_laboratory_neither_is_named() -> No
 def test_another_platform_is_no_other_provenance_and_another_hash_is(monkeypatch: pytest.MonkeyPatch) -> None:
     here, other_date = made(), made(number="K-3")
     with monkeypatch.context() as patched:
-        patched.setattr("cmm_uq.certificate.provenance.machine", lambda: {"kernels": "Haswell"})
-        patched.setattr("cmm_uq.certificate.provenance.packages", lambda: {"numpy": "2.0.0"})
+        patched.setattr("cmm_uq.certificate.results.provenance.machine", lambda: {"kernels": "Haswell"})
+        patched.setattr("cmm_uq.certificate.results.provenance.packages", lambda: {"numpy": "2.0.0"})
         there = made()
     assert there != here
     assert same_but_for_the_platform(here, there)

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.results_file import as_json, results
+from cmm_uq.certificate.results.contents import results
+from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 

@@ -13,7 +13,7 @@ import pikepdf
 from pypdf import PdfReader
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
-from cmm_uq.certificate.seal import HEIGHT_MM, WIDTH_MM, seal
+from cmm_uq.certificate.render.pdf import HEIGHT_MM, WIDTH_MM, seal
 from tests.certificate.sign.authority import SIGNED, Held, curve_key, issued
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.plots import length_plot, volume_plot
-from cmm_uq.certificate.shown import MOST, shown, told
-from cmm_uq.certificate.vector_plot import vector_plot
+from cmm_uq.certificate.plots.labels import MOST, shown, told
+from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
+from cmm_uq.certificate.plots.vectors import vector_plot
 
 
 def test_few_values_are_all_drawn_and_the_caption_stays() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.certificate.traceability_section import stated_uncertainty
+from cmm_uq.certificate.sections.traceability import stated_uncertainty
 
 
 def recorded(**columns: Any) -> Points:

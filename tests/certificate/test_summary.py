@@ -6,14 +6,14 @@ import shutil
 from pathlib import Path
 
 from cmm_uq.app.commands.analysis import analyse, outcome_of
-from cmm_uq.certificate.document import Decision
-from cmm_uq.certificate.in_short import Verdict
-from cmm_uq.certificate.summary import summary
+from cmm_uq.certificate.document import DecisionBlock
+from cmm_uq.certificate.sections.first_page import summary
+from cmm_uq.certificate.wording import Headline
 from tests.artefacts.simulated import analysed, blocks
 from tests.conftest import ROOT
 
 
-def said(job: str) -> Verdict:
+def said(job: str) -> Headline:
     (verdict,) = summary(analysed(job), ()).verdicts
     return verdict
 
@@ -24,7 +24,7 @@ def test_an_incomplete_test_is_no_pass_and_says_what_it_lacks() -> None:
     assert verdict.subject.startswith("VDI/VDE 2617, ")
     assert verdict.remarks[0].startswith("the lengths measured conform (2.47 µm against 4.25 µm, ")
     assert verdict.remarks[1].startswith("missing: space diagonal +X +Y +Z; ")
-    (block,) = [block for block in blocks("gauge-blocks-simulated") if isinstance(block, Decision)]
+    (block,) = [block for block in blocks("gauge-blocks-simulated") if isinstance(block, DecisionBlock)]
     assert block.outcome == "incomplete"
     assert "parallel to Z" in block.missing
     assert block.explanation.startswith("The lengths measured conform; the test lacks")
@@ -59,7 +59,7 @@ def test_without_an_uncertainty_no_probability_is_printed(tmp_path: Path) -> Non
     (verdict,) = summary(result, ()).verdicts
     assert verdict.remarks[0] == "the lengths measured conform (2.47 µm against 4.25 µm)"
     (block,) = [
-        b for section in outcome_of(result).document.sections for b in section.blocks if isinstance(b, Decision)
+        b for section in outcome_of(result).document.sections for b in section.blocks if isinstance(b, DecisionBlock)
     ]
     assert (block.measured, "Probability" in block.explanation) == ("2.47 µm", False)
     assert "No uncertainty is stated above zero" in block.explanation

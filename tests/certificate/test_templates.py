@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate import templates
+from cmm_uq.certificate.render import html as templates
 
 
 def test_the_folder_holds_both_views() -> None:

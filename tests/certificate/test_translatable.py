@@ -15,10 +15,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.saying import said_in
 from cmm_uq.base.messages import Message, Number, Text, Verbatim, say
 from cmm_uq.base.units import Unit, unit
-from cmm_uq.certificate.budget_page import budget_document
 from cmm_uq.certificate.document import Column, Document, Paragraph, Plot, Section, Table
-from cmm_uq.certificate.origin import marked
-from cmm_uq.certificate.program import NAME
+from cmm_uq.certificate.origin import NAME, marked
+from cmm_uq.certificate.pages.budget import budget_document
 from cmm_uq.jobs.job import JobFacts
 from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import MachineFacts

@@ -13,8 +13,8 @@ import pytest
 from pypdf import PdfReader
 
 from cmm_uq.certificate.document import Document
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 
 
 class Body(HTMLParser):

@@ -9,9 +9,8 @@ import numpy as np
 from cmm_uq.analysis.diagnosis.location import ResidualField
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plot_style import ACCENT, BAND, DIVERGING, MUTED
-from cmm_uq.certificate.profile_plot import profile_plot
-from cmm_uq.certificate.residual_field import residual_field_plot
+from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, MUTED
+from cmm_uq.certificate.plots.vectors import profile_plot, residual_field_plot
 from tests.certificate.svg import Drawing, outlines, strokes
 
 WORDS: dict[str, Any] = {"caption": say("c"), "alternative": say("a")}

@@ -15,7 +15,7 @@ from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.dcc import Certificate, written
 from cmm_uq.jobs.dcc.results import Statement
 from cmm_uq.jobs.dcc.texts import rich

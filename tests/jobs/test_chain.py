@@ -15,10 +15,9 @@ import pytest
 from pydantic import ValidationError
 
 from cmm_uq.certificate.clauses import clauses, clauses_data, draft
-from cmm_uq.certificate.digital_certificate.administration import formal_statements
-from cmm_uq.certificate.digital_certificate.words import speaking
+from cmm_uq.certificate.digital_certificate.administration import formal_statements, speaking
 from cmm_uq.certificate.document import Paragraph
-from cmm_uq.certificate.traceability_section import claimed, traceability_section
+from cmm_uq.certificate.sections.traceability import claimed, traceability_section
 from cmm_uq.jobs.acquired import Acquired, Provenance
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts

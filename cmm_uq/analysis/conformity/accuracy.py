@@ -65,16 +65,12 @@ def repeated_draws(draws: int, lengths: int) -> Ints:
 
 def with_uncertainty(
     lengths: Floats, predicted: Floats, noise: Repeated, seed: int, drawn_with: Ints | None = None
-) -> dict[str, Quantity]:  # fmt: skip
+) -> dict[str, Quantity]:
     """Figures of recorded lengths, with uncertainty.
 
-    Parameters
-    ----------
-    lengths : (m,) as recorded, mm.
-    predicted : (N, m) lengths that draws from the posterior predict, mm, without noise; see :func:`repeated_draws`.
-    noise : draws that of each repetition.
-    seed : of the repetitions.
-    drawn_with : (m,) equal where lengths share their noise: a copy has that of its original. Each its own by default.
+    ``lengths``: (m,) as recorded, mm; ``predicted``: (N, m) lengths that draws from the posterior predict, mm, without
+    noise; see :func:`repeated_draws`; ``drawn_with``: (m,) equal where lengths share their noise: a copy has that of
+    its original. Each its own by default.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
     shared: Ints | slice = slice(None)

@@ -1,5 +1,7 @@
 """Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
 
+Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
+
 A reading that misses the artefact by more than any machine's error spoils an estimate and is left out of it. For a decision it
 is a value outside: the machine, or whoever worked at it, indicated it. Copies of a whole (measurement, repeat) alone are no
 measurements.
@@ -28,18 +30,14 @@ _NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class OutsideReadings:
     """What of a recording the estimates do not hold.
 
-    Parameters
-    ----------
-    recording : all its rows, copies too.
-    artefact : made of all but copies, or with their places in other repeats for points that no artefact can be made with;
-        ``None`` where that cannot be either, or nothing was left out.
-    xyz : (n, 3) the points of ``artefact`` as they were recorded, mm.
-    kept : (n,) rows of ``artefact.points`` that the estimates hold.
-    outside : (n,) those that they do not, because they miss the artefact.
-    findings : that say why.
+    ``recording``: all its rows, copies too; ``artefact``: made of all but copies, or with their places in other repeats
+    for points that no artefact can be made with;; ``None`` where that cannot be either, or nothing was left out.;
+    ``xyz``: (n, 3) the points of ``artefact`` as they were recorded, mm; ``kept``: (n,) rows of ``artefact.points``
+    that the estimates hold; ``outside``: (n,) those that they do not, because they miss the artefact; ``findings``:
+    that say why.
     """
 
     recording: Points
@@ -50,15 +48,7 @@ class LeftOut:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, recording: Points, findings: Sequence[Finding], observe: Observed) -> LeftOut:
-        """By what the screening found.
-
-        Parameters
-        ----------
-        recording : before the screening.
-        findings : of the screening, whose rows are those of the recording.
-        observe : makes the artefact of points.
-        """
+    def of(cls, recording: Points, findings: Sequence[Finding], observe: Observed) -> OutsideReadings:
         lost, copied = _rows(recording, findings), np.isin(recording.group, list(recording.copies))
         measured = ~(lost & copied)
         damaged = tuple(f for f in findings if f.kind != REVERSED and any(not copied[row] for row in f.rows))
@@ -82,7 +72,6 @@ class LeftOut:
 
     @property
     def without_value(self) -> tuple[Text, ...]:
-        """What is outside and has no value, in words."""
         return () if self.artefact is not None else tuple(f.why for f in self.findings)
 
     def in_words(self, measurements: Sequence[int | None]) -> list[Text]:
@@ -100,14 +89,10 @@ class LeftOut:
 class AsRecorded(Artefact):
     """An artefact with the readings that were left out of it: what rests on others is as these alone have it.
 
-    Parameters
-    ----------
-    own : the artefact without them.
-    raw : with them.
-    left_out : what it is without.
+    ``own``: the artefact without them; ``raw``: with them; ``left_out``: what it is without.
     """
 
-    def __init__(self, own: Artefact, raw: Artefact, left_out: LeftOut) -> None:
+    def __init__(self, own: Artefact, raw: Artefact, left_out: OutsideReadings) -> None:
         self.own, self._raw, self._kept, self._xyz = own, raw, left_out.kept, left_out.xyz
         at = np.flatnonzero(self._kept)
         xyz = left_out.xyz.copy()
@@ -122,7 +107,6 @@ class AsRecorded(Artefact):
         self._at, self._back = at, np.cumsum(self._kept) - 1
 
     def indications(self) -> Indications | None:
-        """See :meth:`Artefact.indications`."""
         own, raw = self.own.indications(), self._raw.indications()
         if own is None or raw is None:
             return raw
@@ -130,12 +114,10 @@ class AsRecorded(Artefact):
         return replace(raw, errors=_merged(raw.errors + (recorded - placed), raw.rows, own.errors, self._at[own.rows]))
 
     def lengths(self) -> Floats | None:
-        """See :meth:`Artefact.lengths`."""
         own, raw = self.own.lengths(), self._raw.lengths()
         return raw if own is None or raw is None else _merged(raw, self.rows, own, self._at[self.own.rows])
 
     def forms(self) -> Forms | None:
-        """See :meth:`Artefact.forms`: of a sphere that lost a point, with all of them."""
         own, raw = self.own.forms(), self._raw.forms()
         if own is None or raw is None:
             return raw
@@ -153,7 +135,6 @@ class AsRecorded(Artefact):
         return replace(raw, form=form, size=size, centres=centres)
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
-        """See :meth:`Artefact.lines_of`."""
         middles, along = (each.copy() for each in self._raw.lines_of(rows))
         known = self._kept[rows].all(axis=1)
         if known.any():
@@ -161,7 +142,6 @@ class AsRecorded(Artefact):
         return middles, along
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
-        """See :meth:`Artefact.bidirectional`."""
         both, known = self._raw.bidirectional(rows), self._kept[rows].all(axis=1)
         own = self.own.bidirectional(self._back[rows[known]]) if known.any() else None
         if both is not None and own is not None:
@@ -170,30 +150,22 @@ class AsRecorded(Artefact):
         return both
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`."""
         return self._raw.fit(true_xyz, sizes)
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`."""
         return self._raw.project(xyz, displacement)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`."""
         return self._raw.size_change()
 
 
-def numbered(
-    points: Points, repeats: int | None = None, *, measurements: bool = True
-) -> tuple[Condition, ...]:  # fmt: skip
+def numbered(points: Points, repeats: int | None = None, *, measurements: bool = True) -> tuple[Condition, ...]:
     """That nothing is missing from the numbering of measurements, of their repeats and of the points in each.
 
     Whoever numbers consecutively and takes a row out leaves a gap: what stood there is not known, and the test lacks it.
 
-    Parameters
-    ----------
-    points : the whole recording.
-    repeats : up to which a repeat has every point of its measurement; later ones may be of a single length.
-    measurements : whether these are numbered consecutively, not after those of another recording.
+    ``repeats``: up to which a repeat has every point of its measurement; later ones may be of a single length;
+    ``measurements``: whether these are numbered consecutively, not after those of another recording.
     """
     absent = _absent(np.unique(points.measurement)) if measurements else []
     gaps = [say("measurement {which}: numbered, and not recorded", which=_which(absent))] if absent else []

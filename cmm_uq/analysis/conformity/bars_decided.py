@@ -13,8 +13,7 @@ from functools import partial
 import numpy as np
 
 from cmm_uq.analysis.conformity.length_conditions import tip_offsets
-from cmm_uq.analysis.conformity.measurement_lines import position_of
-from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan
+from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan, position_of
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.analysis.conformity.uncertainty_lines import u_of_repeats
@@ -41,9 +40,7 @@ def volumetric_performance(test: Test) -> Statement:
     limit = float(test.limits_um(np.array([bar]))[0])
     lengths, aside = artefact.lengths(), bool(test.set_aside(artefact.rows).any())
     value = measured.value if lengths is None or not aside else float(np.ptp(lengths)) / MICROMETRE
-    item = Decided(
-        value, u, limit, test.decide(value, u, limit, signed=False), length_mm=bar, set_aside=aside
-    )  # fmt: skip
+    item = Decided(value, u, limit, test.decide(value, u, limit, signed=False), length_mm=bar, set_aside=aside)
     return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), [told], signed=False,
                        budget=test.budget_at_least(budget, bar) if budget.u > 0 else None)  # fmt: skip
 
@@ -69,7 +66,7 @@ def _budget(test: Test) -> tuple[Budget, Text]:
             "What its certificate leaves uncertain is common to all and cancels; the machine's own scatter is part of what "
             "is tested.",
             u=budget.u,
-        )  # fmt: skip
+        )
     if test.answered:
         return budget, NOT_STATED
     if size.certified and size.sd > 0:
@@ -80,7 +77,7 @@ def _budget(test: Test) -> tuple[Budget, Text]:
             "positions, and it is taken to be no more than its certificate leaves uncertain. The machine's own scatter is "
             "part of what is tested.",
             u=bound.u,
-        )  # fmt: skip
+        )
     return budget, say(
         "Nothing is stated of what the bar leaves uncertain: in its place u is the machine's own "
         "scatter, by which the range would differ if the test were made again."
@@ -129,7 +126,6 @@ def offset_positions(plan: OffsetPlan, artefact: Artefact, *, recorded: bool) ->
 
 
 def _set_aside(test: Test) -> set[Text]:
-    """Positions of bars that the screening left out."""
     _, along = test.artefact.lines_of(test.artefact.rows)
     return {position_of(along[i]) for i in np.flatnonzero(test.set_aside(test.artefact.rows))}
 

@@ -22,14 +22,9 @@ CHOSEN = "this project"
 class Clause:
     """One clause.
 
-    Parameters
-    ----------
-    name : in a form.
-    title : in words.
-    does : what this program does.
-    source : where that comes from.
-    read : whether the words of the standard were read for it, in its text or as its publisher quotes them.
-    of : characteristics that it is for; all of the standard's by default.
+    ``name``: in a form; ``title``: in words; ``does``: what this program does; ``source``: where that comes from;
+    ``read``: whether the words of the standard were read for it, in its text or as its publisher quotes them; ``of``:
+    characteristics that it is for; all of the standard's by default.
     """
 
     name: str
@@ -183,16 +178,10 @@ CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
 """Of each standard that is decided here, and of the documents that decisions and budgets go by."""
 
 
-def in_words(
-    standard: str, asked: Sequence[Clause], form: ClausesForm | None
-) -> tuple[list[Text], tuple[Text, ...]]:  # fmt: skip
+def in_words(standard: str, asked: Sequence[Clause], form: ClausesForm | None) -> tuple[list[Text], tuple[Text, ...]]:
     """What a certificate says of the clauses that a statement goes by, and what the test lacks by the laboratory's own copy.
 
-    Parameters
-    ----------
-    standard : by its name.
-    asked : its clauses that the statement goes by.
-    form : as the laboratory filled it in, where it did.
+    ``asked``: its clauses that the statement goes by.
     """
     held = {} if form is None else {one.name: given for one in asked if (given := _held(one, form)) is not None}
     said: list[Text] = []

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
-from cmm_uq.analysis.conformity.as_recorded import LeftOut
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
@@ -34,10 +34,7 @@ _FEW = 400
 class Consequences:
     """Figures and statements of a recording, as it stands and corrected for what was left out.
 
-    Parameters
-    ----------
-    figures : by name, before and after.
-    statements : as the job asks for, before and after.
+    ``figures``: by name, before and after; ``statements``: as the job asks for, before and after.
     """
 
     figures: Mapping[str, tuple[Quantity, Quantity]]
@@ -48,11 +45,7 @@ class Consequences:
 class Cost:
     """What the recording comes to if one explanation that remains is the right one, and is corrected for.
 
-    Parameters
-    ----------
-    probability : of the explanation.
-    figures : by name.
-    statements : as the job asks for.
+    ``probability``: of the explanation; ``figures``: by name; ``statements``: as the job asks for.
     """
 
     probability: float
@@ -64,11 +57,8 @@ class Cost:
 class Costs:
     """Of every explanation that remains, the most probable first, and of all together.
 
-    Parameters
-    ----------
-    each : in the order of the explanations.
-    figures : averaged, by name.
-    decisions : of each statement, the probability of every outcome.
+    ``each``: in the order of the explanations; ``figures``: averaged, by name; ``decisions``: of each statement, the
+    probability of every outcome.
     """
 
     each: tuple[Cost, ...]
@@ -82,18 +72,11 @@ def consequences(
     observe: Observed,
     tested: Collection[str],
     seed: int,
-    left_out: LeftOut | None = None,
+    left_out: OutsideReadings | None = None,
 ) -> Consequences | None:
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
     The uncertainty of a corrected figure is that of repeated recordings with this correction.
-
-    Parameters
-    ----------
-    observe : makes the artefact of points.
-    tested : what of its kind a standard may be decided on.
-    seed : of the figures' repetitions.
-    left_out : what the screening left out.
     """
     found = {item.effect for item in diagnosis.effects}
     if not found or not _depends(job, diagnosis):
@@ -109,7 +92,8 @@ def consequences(
 
 
 def costs(
-    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int, left_out: LeftOut | None = None
+    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int,
+    left_out: OutsideReadings | None = None
 ) -> Costs | None:  # fmt: skip
     """Of the explanations that remain; ``None`` where none do, and for artefacts without lengths and statements.
 
@@ -136,7 +120,6 @@ def costs(
 
 
 def _noise(diagnosis: Diagnosis) -> Components:
-    """That of all observations, used or not."""
     return noise_of(replace(diagnosis.after, used=np.ones_like(diagnosis.after.used)))
 
 
@@ -157,13 +140,8 @@ class _Drawn:
 class _Correction:
     """A recording, whole, and the same corrected for some effects of a model that was fitted to it.
 
-    Parameters
-    ----------
-    model : with all observations.
-    ours : (k,) which of its unknowns are corrected for.
-    value : (k,) by which values.
-    drawn : from its posterior.
-    corrected : the artefact.
+    ``model``: with all observations; ``ours``: (k,) which of its unknowns are corrected for; ``value``: (k,) by which
+    values; ``drawn``: from its posterior; ``corrected``: the artefact.
     """
 
     model: MeasurementModel
@@ -175,7 +153,7 @@ class _Correction:
     @classmethod
     def of(
         cls, fitted: MeasurementModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
-    ) -> _Correction:  # fmt: skip
+    ) -> _Correction:
         """For the effects of these names, by what a model estimates of them (k,)."""
         model = replace(fitted, used=np.ones_like(fitted.used))
         artefact = model.artefact
@@ -199,7 +177,7 @@ class _Correction:
 
     def statements(
         self, job: Job, tested: Collection[str], artefact: Artefact, figures: Mapping[str, Quantity],
-        left_out: LeftOut | None,
+        left_out: OutsideReadings | None,
     ) -> tuple[Statement, ...]:  # fmt: skip
         """What the job asks for, of figures of this recording, or of it corrected."""
         recorded = None if artefact is self.model.artefact else self.model.artefact

@@ -1,4 +1,12 @@
-"""Decision rules: from a value, its uncertainty and a limit to the decision on that one quantity.
+"""Decision rules: what follows from a measured value, its uncertainty and a limit, and the risks of being wrong.
+
+Risks of a wrong decision, with what is known beforehand of the quantity: of this item, and of all that are tested alike.
+
+A prior is a normal distribution; of a quantity that is never negative the part above zero. JCGM 106:2012: clause 7.2 for the
+posterior distribution, clause 9.5 for the consumer's and the producer's global risk. All integrals are Gauss–Legendre sums
+over panels that are narrow where the integrand bends.
+
+Decision rules: from a value, its uncertainty and a limit to the decision on that one quantity.
 
 A quantity with a sign, as an error of indication, is limited on both sides (−limit to +limit); a range or a form, which is
 never negative, on one. Without a prior the probability of conforming is that of a normal distribution about the value, with
@@ -13,10 +21,11 @@ from functools import lru_cache
 from math import hypot, isfinite
 from typing import Literal
 
+import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.conformity.risk import Known, acceptance_limit
 from cmm_uq.base.messages import Text, say
+from cmm_uq.base.points import Floats
 from cmm_uq.jobs.conformity import (
     FalseAccept,
     GuardBand,
@@ -26,6 +35,105 @@ from cmm_uq.jobs.conformity import (
     UnconditionalRisk,
 )
 from cmm_uq.maths.inference.root import root
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_REACH = 9.0
+"""Standard deviations beyond which a normal distribution is nothing: 1e-19."""
+
+
+@dataclass(frozen=True)
+class PriorKnowledge:
+    """A quantity before it is measured.
+
+    ``mean, sd``: of the normal distribution.
+    """
+
+    mean: float
+    sd: float
+
+    def after(self, value: float, u: float) -> PriorKnowledge:
+        """The same after a measurement of it: precisions add (JCGM 106:2012, formula (A.9))."""
+        weight = self.sd**2 / (self.sd**2 + u**2)
+        return PriorKnowledge(self.mean + weight * (value - self.mean), u * float(np.sqrt(weight)))
+
+    def within(self, limit: float, *, signed: bool) -> float:
+        high = float(special.ndtr((limit - self.mean) / self.sd))
+        if signed:
+            return max(0.0, high - float(special.ndtr((-limit - self.mean) / self.sd)))
+        below = float(special.ndtr(-self.mean / self.sd))
+        return max(0.0, high - below) / (1.0 - below) if below < 1.0 else 1.0
+
+    def beyond(self, limit: float, *, signed: bool) -> float:
+        """The rest, which keeps its digits where it is small."""
+        high = float(special.ndtr((self.mean - limit) / self.sd))
+        if signed:
+            return high + float(special.ndtr((-limit - self.mean) / self.sd))
+        above = float(special.ndtr(self.mean / self.sd))
+        return high / above if above > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Risks:
+    """Of all items that are tested alike.
+
+    ``consumer``: that an item does not conform and is accepted; ``producer``: that an item conforms and is not
+    accepted.
+    """
+
+    consumer: float
+    producer: float
+
+
+@lru_cache(maxsize=4096)
+def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledge, *, signed: bool) -> Risks:
+    """Global risks of accepting values up to an acceptance limit (JCGM 106:2012, 9.5.3 and 9.5.4).
+
+    ``acceptance``: largest accepted size of a measured value; negative where none is accepted.
+    """
+    low = max(prior.mean - _REACH * prior.sd, -np.inf if signed else 0.0)
+    high = max(prior.mean, 0.0) + _REACH * prior.sd
+    total = 1.0 if signed else float(special.ndtr(prior.mean / prior.sd))
+    edges = {low, high, *(np.clip(x, low, high) for x in (-limit, limit))}
+    for at in (-acceptance, acceptance):
+        edges |= {float(np.clip(at + k * u, low, high)) for k in range(-8, 9)}
+    edges |= {float(np.clip(prior.mean + k * prior.sd, low, high)) for k in range(-9, 10)}
+    values, weights = _panels(np.array(sorted(edges)))
+    density = weights * np.exp(-0.5 * ((values - prior.mean) / prior.sd) ** 2) / (prior.sd * np.sqrt(2 * np.pi) * total)
+    accepted = _accepted(values, acceptance, u, signed=signed)
+    conforming = np.abs(values) <= limit
+    return Risks(float(density[~conforming] @ accepted[~conforming]),
+                 float(density[conforming] @ (1.0 - accepted[conforming])))  # fmt: skip
+
+
+@lru_cache(maxsize=4096)
+def acceptance_limit(risk: float, limit: float, u: float, prior: PriorKnowledge, *, signed: bool) -> float | None:
+    """The largest acceptance limit, not beyond the limit itself, that keeps the consumer's global risk at most ``risk``.
+
+    ``None`` where accepting any value at all would exceed it.
+    """
+
+    def excess(acceptance: float) -> float:
+        return global_risks(acceptance, limit, u, prior, signed=signed).consumer - risk
+
+    if excess(limit) <= 0:
+        return limit
+    if excess(0.0) > 0:
+        return None
+    return root(excess, 0.0, limit, 1e-9 * limit)
+
+
+def _accepted(values: Floats, acceptance: float, u: float, *, signed: bool) -> Floats:
+    """Probability that a measurement of each of some true values is accepted."""
+    upper = special.ndtr((acceptance - values) / u)
+    if not signed:
+        return np.asarray(upper)
+    return np.asarray(np.maximum(0.0, upper - special.ndtr((-acceptance - values) / u)))
+
+
+def _panels(edges: Floats) -> tuple[Floats, Floats]:
+    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
+    return (middle + half * _NODES).ravel(), (half * _WEIGHTS).ravel()
+
 
 Outcome = Literal["pass", "conditional pass", "undecided", "conditional fail", "fail"]
 
@@ -46,14 +154,10 @@ UNCONDITIONAL = 0.02
 class Decision:
     """What follows from a value and a limit under a rule.
 
-    Parameters
-    ----------
-    outcome : ``undecided`` when neither conformity nor nonconformity is proved.
-    probability_conforming : that the quantity is within its limits; ``None`` without an uncertainty.
-    probability_beyond : the rest of it, kept apart since 1 − P loses what is small.
-    guard_band : how far the acceptance limit lies inside the limit, same unit; ``None`` when the uncertainty is too large for
-        any value to be accepted.
-    rule : in words.
+    ``outcome``: ``undecided`` when neither conformity nor nonconformity is proved; ``probability_conforming``: that the
+    quantity is within its limits; ``None`` without an uncertainty; ``probability_beyond``: the rest of it, kept apart
+    since 1 − P loses what is small; ``guard_band``: how far the acceptance limit lies inside the limit, same unit;
+    ``None`` when the uncertainty is too large for; any value to be accepted.; ``rule``: in words.
     """
 
     outcome: Outcome
@@ -64,7 +168,8 @@ class Decision:
 
 
 def decide(
-    value: float, u: float, limit: float, rule: Rule, *, signed: bool, prior: Known | None = None, unstated: float = 0.0
+    value: float, u: float, limit: float, rule: Rule, *, signed: bool, prior: PriorKnowledge | None = None,
+    unstated: float = 0.0,
 ) -> Decision:  # fmt: skip
     """Decide whether a quantity conforms.
 
@@ -111,7 +216,6 @@ def decide(
 def _decided(
     size: float, u: float, limit: float, rule: Rule, signed: bool, beyond: float, unstated: float
 ) -> tuple[Outcome, float | None]:
-    """Outcome and guard band, by rules that need no prior."""
     if (ratio := least_ratio(rule)) is not None:
         wide = (2 if signed else 1) * limit >= ratio * 2 * COVERAGE_FACTOR * u
         return (_by_band(size, limit, 0.0), 0.0) if wide else ("undecided", None)
@@ -130,7 +234,7 @@ def _decided(
 
 
 def _decided_knowing(
-    value: float, u: float, limit: float, rule: Rule, signed: bool, prior: Known, unstated: float
+    value: float, u: float, limit: float, rule: Rule, signed: bool, prior: PriorKnowledge, unstated: float
 ) -> tuple[Outcome, float | None]:
     """The same with a prior, of which rules that need none take no account.
 
@@ -161,28 +265,24 @@ def largest_risk(rule: Rule) -> float | None:
 
 
 def least_ratio(rule: Rule) -> float | None:
-    """N of an N : 1 rule."""
     if isinstance(rule, UncertaintyRatio):
         return rule.uncertainty_ratio
     return RATIO if rule_name(rule).startswith("ASME B89.7.3.1") else None
 
 
 def least_probability(rule: Rule) -> float | None:
-    """Least posterior probability of conforming."""
     if isinstance(rule, PosteriorProbability):
         return rule.posterior_probability
     return CONFORMANCE_PROBABILITY if rule_name(rule).startswith("JCGM 106") else None
 
 
 def largest_share(rule: Rule) -> float | None:
-    """Largest share of wrongly accepted items."""
     if isinstance(rule, UnconditionalRisk):
         return rule.max_unconditional_false_accept
     return UNCONDITIONAL if "Z540.3" in rule_name(rule) else None
 
 
 def guard_width(rule: Rule) -> float:
-    """Guard band in expanded uncertainties."""
     if isinstance(rule, GuardBand):
         return rule.guard_band
     return 1.0 if rule_name(rule).startswith("ILAC-G8") else 0.0
@@ -194,7 +294,6 @@ def needs_uncertainty(rule: Rule) -> bool:
 
 
 def rule_name(rule: Rule) -> str:
-    """The rule as job.toml names it."""
     if isinstance(rule, str):
         return rule
     ((key, value),) = rule.model_dump().items()
@@ -244,8 +343,9 @@ def _guard_band(u: float, limit: float, risk: float, signed: bool) -> float | No
     return limit - root(lambda v: _beyond(v, u, limit, signed) - risk, 0.0, limit, 1e-12 * limit)
 
 
-def _posterior_band(u: float, limit: float, risk: float, signed: bool, prior: Known, side: float) -> float | None:
-    """The same with a prior, on the side of the value."""
+def _posterior_band(
+    u: float, limit: float, risk: float, signed: bool, prior: PriorKnowledge, side: float
+) -> float | None:
 
     def excess(size: float) -> float:
         return prior.after(side * size, u).beyond(limit, signed=signed) - risk

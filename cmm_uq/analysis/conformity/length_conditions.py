@@ -8,8 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.measurement_lines import PARALLELS, SPACE_DIAGONALS, crossed_travel, position_on
-from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, LengthPlan
+from cmm_uq.analysis.conformity.plans import (
+    OFFSET_TOLERANCE_MM,
+    PARALLELS,
+    SPACE_DIAGONALS,
+    Condition,
+    LengthPlan,
+    crossed_travel,
+    position_on,
+)
 from cmm_uq.base.messages import Text, Verbatim, at_key, commas, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
@@ -72,7 +79,6 @@ def tip_offsets(points: Points) -> Floats | None:
 
 
 def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
-    """That a tip offset is recorded where the plan asks for one."""
     if not plan.offset_mm:
         return ()
     what = say(
@@ -121,7 +127,6 @@ class _Measured:
 
 
 def _lines(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, int]) -> Iterator[_Measured]:
-    """By position and nominal length."""
     found = artefact.indications()
     if found is None:
         return

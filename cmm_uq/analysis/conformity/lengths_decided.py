@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.length_conditions import nominals, with_offset
-from cmm_uq.analysis.conformity.measurement_lines import position_on
-from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.remeasured import Again, with_standing
+from cmm_uq.analysis.conformity.plans import Condition, position_on
 from cmm_uq.analysis.conformity.shared_causes import Causes, causes_of_lengths, length_budget, temperatures
 from cmm_uq.analysis.conformity.short_gauge import added_in_words
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
-from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.analysis.conformity.statement import Decided, Remeasurement, Statement, least_favourable, with_standing
 from cmm_uq.analysis.conformity.uncertainty_lines import LENGTH_LINES, WARM, away_from_20, u_of_repeats
 from cmm_uq.base.messages import NOTHING, Text, at_key, plural, say, semicolons
 from cmm_uq.base.points import Ints
@@ -41,7 +39,6 @@ def at_offset(offset_mm: float) -> Chosen:
 
 
 def on_lines(positions: Collection[Text]) -> Chosen:
-    """Lengths in some positions."""
     return lambda artefact, found: np.array([line in positions for line in lines(artefact, found)], dtype=bool)
 
 
@@ -56,20 +53,12 @@ def short(longest_mm: float) -> Chosen:
 
 
 def lines(artefact: Artefact, found: Indications) -> list[Text]:
-    """Position of each length in words."""
     middles, along = artefact.lines_of(found.rows)
     return [position_on(artefact.points.machine, m, d) for m, d in zip(middles, along, strict=True)]
 
 
-def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Again | None = None) -> Statement:
-    """Every error of indication against its own maximum permissible error.
-
-    Parameters
-    ----------
-    test : that is decided.
-    chosen : which lengths belong to it; all by default.
-    again : what may be measured again.
-    """
+def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Remeasurement | None = None) -> Statement:
+    """Every error of indication against its own maximum permissible error."""
     found = test.indications()
     rows = _of_this_test(test, found, chosen)
     artefact, first = test.artefact, found.rows[:, 0]
@@ -223,7 +212,7 @@ def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
             "u is the part of the test uncertainty (ISO/TS 23165) that comes from the calibrated length, {u_um:.3g} µm for "
             "the length named; nothing else is stated.",
             u_um=worst.u_um,
-        )  # fmt: skip
+        )
     return NOT_STATED
 
 
@@ -239,7 +228,7 @@ def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:
     )
 
 
-def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]:
+def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> list[Text]:
     if again is None:
         return []
     told: list[Text] = []
@@ -265,7 +254,6 @@ def _again_in_words(items: Sequence[Decided], again: Again | None) -> list[Text]
 
 
 def _unshown(test: Test, found: Indications) -> list[Text]:
-    """What neither job nor recording say, and would have to."""
     under = test.circumstances
     told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
     if test.artefact.bidirectional(found.rows) is None:

@@ -1,4 +1,6 @@
-"""Decisions on a value between limits of a drawing, with probabilities from draws of its error, by the rules for machines.
+"""Limits of a characteristic, and the decision on a value against them.
+
+Decisions on a value between limits of a drawing, with probabilities from draws of its error, by the rules for machines.
 
 The error need not be normal, and a limit may stand on either side or on one. The draws say what the measurement alone says of
 the true value (JCGM 106:2012, 7.2); with a prior each is weighted by it (JCGM 106:2012, 7.2.2, 8.3). Tails that the draws are
@@ -24,7 +26,7 @@ from cmm_uq.analysis.conformity.decision import (
     rule_name,
     rule_words,
 )
-from cmm_uq.analysis.conformity.risk import Known
+from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.conformity import Rule
@@ -45,17 +47,14 @@ _REACH = 8.0
 
 
 @dataclass(frozen=True)
-class Judged:
+class LimitDecision:
     """What follows from a value between limits.
 
-    Parameters
-    ----------
-    lower, upper : limits; ``None`` where there is none.
-    outcome : ``None`` where nothing was measured.
-    probability, beyond : that the true value conforms, and the rest of it, which keeps its digits; ``None`` likewise.
-    accepted : smallest and largest value that the rule accepts, ``None`` of a side without a limit; ``None`` as a whole where
-        it accepts none, or where a zone was measured so much better than its errors that even this value proves nothing.
-    rule : in words.
+    ``lower, upper``: limits; ``None`` where there is none; ``outcome``: ``None`` where nothing was measured;
+    ``probability, beyond``: that the true value conforms, and the rest of it, which keeps its digits; ``None``
+    likewise; ``accepted``: smallest and largest value that the rule accepts, ``None`` of a side without a limit;
+    ``None`` as a whole where; it accepts none, or where a zone was measured so much better than its errors that even
+    this value proves nothing.; ``rule``: in words.
     """
 
     lower: float | None
@@ -71,13 +70,10 @@ class Judged:
 class Limits:
     """Limits of a drawing, and what is known of errors of measurement.
 
-    Parameters
-    ----------
-    lower, upper : limits, one at least.
-    errors : (N,) draws of the error of a value, less their mean, ascending.
-    zone : whether the value is a width that is never negative: probabilities are those given that it is not, or, where
-        fewer than one draw in twenty leaves it so, those of a width as large as the error.
-    prior : what is known of the true value beforehand; of a zone the part above zero.
+    ``lower, upper``: limits, one at least; ``errors``: (N,) draws of the error of a value, less their mean, ascending;
+    ``zone``: whether the value is a width that is never negative: probabilities are those given that it is not, or,
+    where; fewer than one draw in twenty leaves it so, those of a width as large as the error.; ``prior``: what is known
+    of the true value beforehand; of a zone the part above zero.
     """
 
     lower: float | None
@@ -98,7 +94,6 @@ class Limits:
         return None if low is None or self.upper is None else self.upper - low
 
     def inside(self, value: float) -> bool:
-        """Whether a value lies within."""
         return (self.lower is None or value >= self.lower) and (self.upper is None or value <= self.upper)
 
     def beyond(self, value: float) -> float:
@@ -133,21 +128,17 @@ class Limits:
         return max(0.0, self._above(value - self.upper) - self._above(value)) / self._possible(value)
 
     def _scarce(self, value: float) -> bool:
-        """Whether hardly any true value of a zone is possible."""
         return self.zone and self.lower is None and self._below(value) < SCARCE
 
     def _possible(self, value: float) -> float:
-        """Probability of a true value that can be."""
         return max(self._below(value), np.finfo(np.float64).tiny) if self.zone else 1.0
 
     def _below(self, error: float) -> float:
-        """Probability of a smaller error."""
         return self._tail(
             int(np.searchsorted(self.errors, error, "left")), error / self.u if self.u else np.inf * error
         )
 
     def _above(self, error: float) -> float:
-        """Probability of a larger error."""
         count = len(self.errors) - int(np.searchsorted(self.errors, error, "right"))
         return self._tail(count, -error / self.u if self.u else -np.inf * error)
 
@@ -205,28 +196,23 @@ class Limits:
         return np.searchsorted(self.errors, error, "right" if side == "right" else "left") / len(self.errors)
 
 
-def judge(limits: Limits, rule: Rule, value: float | None) -> Judged:
+def judge(limits: Limits, rule: Rule, value: float | None) -> LimitDecision:
     """Decide whether a value conforms.
 
-    Parameters
-    ----------
-    limits : and errors.
-    rule : see :func:`cmm_uq.analysis.conformity.decision.decide`.
-    value : as it is stated, less the mean error; ``None`` where nothing was measured: then what would be accepted is all.
+    ``value``: as it is stated, less the mean error; ``None`` where nothing was measured: then what would be accepted is
+    all.
     """
     accepted = accepted_by(limits, rule)
     if value is None:
-        return Judged(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
+        return LimitDecision(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
     within, beyond = limits.knowing(value)
     if limits.zone:
         accepted = _accepted_near_zero(limits, rule, value, accepted)
     outcome = outcome_of(limits, rule, value, accepted)
-    return Judged(limits.lower, limits.upper, outcome, within, beyond, accepted, rule_words(rule))
+    return LimitDecision(limits.lower, limits.upper, outcome, within, beyond, accepted, rule_words(rule))
 
 
-def outcome_of(
-    limits: Limits, rule: Rule, value: float, accepted: tuple[float | None, float | None] | None
-) -> Outcome:  # fmt: skip
+def outcome_of(limits: Limits, rule: Rule, value: float, accepted: tuple[float | None, float | None] | None) -> Outcome:
     """What a rule makes of a value, where it is known which values it accepts."""
     inside = limits.inside(value)
     taken = accepted is not None and _between(value, accepted) and _safe(limits, rule, value)
@@ -267,7 +253,6 @@ def _safe(limits: Limits, rule: Rule, value: float) -> bool:
 
 
 def _proved(limits: Limits, rule: Rule, value: float) -> bool:
-    """Whether a value outside proves that the true one is."""
     if least_ratio(rule) is not None:
         return _wide(limits, rule)
     if (risk := largest_risk(rule)) is not None:
@@ -280,7 +265,6 @@ def _proved(limits: Limits, rule: Rule, value: float) -> bool:
 
 
 def _off(limits: Limits, value: float) -> float:
-    """How far a value lies outside."""
     above = -np.inf if limits.upper is None else value - limits.upper
     return float(max(above, -np.inf if limits.lower is None else limits.lower - value))
 
@@ -292,7 +276,7 @@ def _wide(limits: Limits, rule: Rule) -> bool:
 
 
 def accepted_by(limits: Limits, rule: Rule) -> tuple[float | None, float | None] | None:
-    """Smallest and largest value that a rule accepts; see :class:`Judged`."""
+    """Smallest and largest value that a rule accepts; see :class:`LimitDecision`."""
     if least_ratio(rule) is not None:
         return (limits.lower, limits.upper) if _wide(limits, rule) else None
     if (risk := largest_risk(rule)) is not None:
@@ -305,7 +289,6 @@ def accepted_by(limits: Limits, rule: Rule) -> tuple[float | None, float | None]
 
 
 def _inwards(limits: Limits, guard: float | None) -> tuple[float | None, float | None] | None:
-    """The limits with a guard band inside of each."""
     if guard is None:
         return None
     low = None if limits.lower is None else limits.lower + guard

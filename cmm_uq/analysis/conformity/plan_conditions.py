@@ -1,4 +1,6 @@
-"""Whether placings, planned or recorded, are those that a standard asks for, and what is missing.
+"""Whether a plan or a recording is a complete test with bars and test spheres.
+
+Whether placings, planned or recorded, are those that a standard asks for, and what is missing.
 
 A plan and a recording are held to the same conditions. Of a recording alone, what repeats another measurement to the last
 digit does not count: that is a copy, where in a plan it is a wish.
@@ -6,24 +8,225 @@ digit does not count: that is a copy, where in a plan it is a wish.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 
-from cmm_uq.analysis.conformity.bar_conditions import bar_positions
+import numpy as np
+
 from cmm_uq.analysis.conformity.length_conditions import lengths_measured
-from cmm_uq.analysis.conformity.plans import BarPlan, Condition, LengthPlan, Plan
-from cmm_uq.analysis.conformity.sphere_conditions import sphere_points
+from cmm_uq.analysis.conformity.plans import PARALLELS, BarPlan, Condition, LengthPlan, Plan, SpherePlan, position_of
+from cmm_uq.base.messages import Text, at_key, commas, number, plural, say
+from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model.artefact import Artefact
+
+_SEARCHED = 60
+"""Bars that hang together, each near another of them."""
+
+
+def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
+    """How many different positions, and in which directions; ``copies`` are groups that do not count."""
+    points = artefact.points
+    travel = points.machine.travel_mm
+    known = bool(np.all(np.isfinite(travel)))
+    wanted = plan.positions_in(np.ptp(travel, axis=1)) if known else plan.positions
+    numbers, ends = _one_a_measurement(artefact)
+    same = _same_places(plan, points, numbers, ends, copies)
+    count = sum(number not in same for number in numbers)
+    missing = _lacking(wanted, count, _in_words(same)) if count < wanted else ()
+    unknown = () if known else (
+        say("the travel of all three axes{key}, by whose proportions the number of positions goes",
+            key=at_key("[machine] travel_mm")),
+    )  # fmt: skip
+    copied = {number for number, (apart, _) in same.items() if apart is None}
+    taken = {position_of(b - a) for (a, b), number in zip(ends, numbers, strict=True) if number not in copied}
+    directions = tuple(say("position {along}", along=_along(d)) for d in plan.directions if d not in taken)
+    return (
+        Condition(
+            say("at least {wanted} positions of the bar: {count}", wanted=wanted, count=count), (*missing, *unknown)
+        ),
+        Condition(_directions(directions), directions),
+    )
+
+
+def _lacking(wanted: int, count: int, same: Sequence[Text]) -> tuple[Text, ...]:
+    lack = say("{lack} of {wanted} positions: {count} distinct", lack=wanted - count, wanted=wanted, count=count)
+    return (commas((lack, *same)),)
+
+
+def _directions(missing: tuple[Text, ...]) -> Text:
+    if not missing:
+        return say("along the axes, and the face and space diagonals of the volume")
+    return say(
+        "along the axes, and the face and space diagonals of the volume; missing: {missing}", missing=commas(missing)
+    )
+
+
+def _along(position: Text) -> Text:
+    return position if position in PARALLELS else say("along {position}", position=position)
+
+
+def _one_a_measurement(artefact: Artefact) -> tuple[list[int], Floats]:
+    """Numbers of the measurements, and the ends (q, 2, 3) of the first bar of each."""
+    numbers, rows = np.unique(artefact.measurement, return_index=True)
+    return numbers.tolist(), np.asarray(artefact.points.xyz[artefact.rows[rows]], dtype=np.float64)
+
+
+def _same_places(
+    plan: BarPlan, points: Points, numbers: Sequence[int], ends: Floats, copies: Mapping[int, int]
+) -> dict[int, tuple[float | None, int]]:
+    """Measurements that are no further position: within how many mm of which other, or a copy of it."""
+    found: dict[int, tuple[float | None, int]] = {}
+    for later, original in copies.items():
+        (one, _), (two, _) = points.run_of(original), points.run_of(later)
+        if one != two:
+            found[two] = None, one
+    left = [i for i, own in enumerate(numbers) if own not in found]
+    near = {i: {j for j in left if j != i and _apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
+    kept = most_apart(near)
+    return found | {numbers[i]: (plan.apart_mm, numbers[min(near[i] & kept)]) for i in left if i not in kept}
+
+
+def most_apart(near: Mapping[int, Collection[int]]) -> set[int]:
+    """A largest set of which none is near another, of equally large ones that with the earlier members.
+
+    A choice in the order of the recording could grow when one is taken away that lies between two others. Groups of more than
+    ``_SEARCHED`` that hang together are chosen from in that order all the same.
+    """
+    left, chosen = set(near), set[int]()
+    while left:
+        group, further = set[int](), {min(left)}
+        while further:
+            group |= further
+            further = {j for i in further for j in near[i]} - group
+        chosen |= _largest(near, group) if len(group) <= _SEARCHED else _in_order(near, group)
+        left -= group
+    return chosen
+
+
+def _largest(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
+    left, chosen = set(group), set[int]()
+    while left:
+        degree = {i: len(left.intersection(near[i])) for i in sorted(left)}
+        single = next((i for i, count in degree.items() if count <= 1), None)
+        if single is None:
+            most = max(degree, key=lambda i: degree[i])
+            with_it, without = (_largest(near, left - {most, *gone}) for gone in (near[most], ()))
+            return chosen | ({most, *with_it} if len(with_it) + 1 >= len(without) else without)
+        chosen.add(single)
+        left -= {single, *near[single]}
+    return chosen
+
+
+def _in_order(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
+    chosen = set[int]()
+    for i in sorted(group):
+        if chosen.isdisjoint(near[i]):
+            chosen.add(i)
+    return chosen
+
+
+def _in_words(same: dict[int, tuple[float | None, int]]) -> list[Text]:
+    """One sentence for all that are the same of one other; copies come first."""
+    pairs = sorted(set(same.values()), key=lambda pair: (pair[1], pair[0] is not None))
+    return [
+        _is_no_further(apart, other, sorted(own for own, pair in same.items() if pair == (apart, other)))
+        for apart, other in pairs
+    ]
+
+
+def _is_no_further(apart: float | None, other: int, numbers: Sequence[int]) -> Text:
+    which = _listed(numbers)
+    if apart is None:
+        return plural(
+            len(numbers),
+            one=say("measurement {which} is a copy of {other}", which=which, other=other),
+            many=say("measurements {which} are copies of {other}", which=which, other=other),
+        )
+    return plural(
+        len(numbers),
+        one=say("measurement {which} is within {apart:g} mm of {other}", which=which, apart=apart, other=other),
+        many=say("measurements {which} are within {apart:g} mm of {other}", which=which, apart=apart, other=other),
+    )
+
+
+def _listed(numbers: Sequence[int]) -> Text:
+    """Numbers in ascending order, those that follow each other as from 2 to 20."""
+    runs: list[list[int]] = []
+    for one in numbers:
+        if runs and runs[-1][-1] == one - 1:
+            runs[-1].append(one)
+        else:
+            runs.append([one])
+    return commas(part for run in runs for part in _run(run))
+
+
+def _run(numbers: Sequence[int]) -> list[Text]:
+    if len(numbers) > 2:
+        return [say("{first} to {last}", first=numbers[0], last=numbers[-1])]
+    return [number(one) for one in numbers]
+
+
+def _apart(one: Floats, two: Floats) -> float:
+    """Larger distance of the ends (2, 3) of two bars, whichever way round they lie, mm."""
+    return float(min(np.linalg.norm(one - turned, axis=1).max() for turned in (two, two[::-1])))
+
+
+_DIRECTIONS = 400
+"""On a hemisphere, at which the reach of its points is looked at."""
+
+
+def sphere_points(
+    plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
+) -> tuple[Condition, ...]:
+    """How many points on each sphere, and whether they cover it.
+
+    ``points, directions``: that were probed, and the outward direction (n, 3) of each from the middle of its sphere.
+    """
+    lacking, bare = [], []
+    for group, rows in enumerate(points.rows_of_groups):
+        if group in copies:
+            continue
+        count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
+        name = say("measurement {number}", number=points.run_of(group)[0])
+        if count < plan.points:
+            lacking.append(
+                say(
+                    "{points} points on the sphere of {name} ({recorded} recorded, {different} different)",
+                    points=plan.points,
+                    name=name,
+                    recorded=len(rows),
+                    different=count,
+                )
+            )
+        elif (gap := _farthest(directions[rows])) > plan.reach_deg:
+            bare.append(
+                say(
+                    "points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
+                    name=name,
+                    gap=gap,
+                )
+            )
+    return (
+        Condition(say("{points} points over the sphere", points=plan.points), tuple(lacking)),
+        Condition(
+            say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=plan.reach_deg),
+            tuple(bare),
+        ),
+    )
+
+
+def _farthest(normals: Floats) -> float:
+    """Largest angle, °, of a direction of the hemisphere about the mean of some normals (n, 3) to the nearest of them."""
+    pole = normals.mean(axis=0)
+    pole = pole / np.linalg.norm(pole) if np.linalg.norm(pole) > 1e-9 else np.array([0.0, 0.0, 1.0])
+    height = (np.arange(_DIRECTIONS) + 0.5) / _DIRECTIONS
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(_DIRECTIONS)
+    radius = np.sqrt(1 - height**2)
+    across = np.linalg.svd(pole[None])[2][1:]
+    grid = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height]) @ np.vstack([across, pole])
+    return float(np.degrees(np.arccos(np.clip((grid @ normals.T).max(axis=1), -1.0, 1.0)).max()))
 
 
 def conditions(plan: Plan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    """All that a standard asks for.
-
-    Parameters
-    ----------
-    plan : of the standard.
-    artefact : with the points that were planned or recorded.
-    recorded : whether they were; then copies do not count.
-    """
     copies = artefact.points.copies if recorded else {}
     if isinstance(plan, LengthPlan):
         return lengths_measured(plan, artefact, copies)

@@ -1,11 +1,11 @@
-"""Whether a test was carried out under the conditions for which the limits of the machine hold, and with its probe."""
+"""Rated operating conditions, and measurements that are copies of others."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.base.messages import Text, Verbatim, at_key, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.circumstances import Circumstances, RatedConditions
 
@@ -30,10 +30,7 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
     if rated.difference_k is not None:
         found.append(_difference(points, rated.difference_k))
     used = circumstances.probe
-    for what, wanted, given in (
-        (say("probe"), rated.probe, used.name),
-        (say("stylus"), rated.stylus, used.stylus),
-    ):
+    for what, wanted, given in ((say("probe"), rated.probe, used.name), (say("stylus"), rated.stylus, used.stylus)):
         if wanted is not None:
             met = wanted == given
             asked = say("rated {what} {wanted}", what=what, wanted=Verbatim(wanted))
@@ -80,7 +77,6 @@ def _change(points: Points, most: float) -> Condition:
 
 
 def _largest_change(time_s: np.ndarray, values: np.ndarray) -> float:
-    """Largest difference of two readings within an hour, K."""
     order = np.argsort(time_s, kind="stable")
     time, value = time_s[order], values[order]
     ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")
@@ -95,3 +91,33 @@ def _difference(points: Points, most: float) -> Condition:
     largest = float(np.ptp(np.array([points.columns[name] for name in columns]), axis=0).max())
     told = say("{what} ({largest:.3g} K)", what=what, largest=largest)
     return Condition(what, () if largest <= most + _ROUNDING else (told,))
+
+
+_NAMED = 5
+"""Copies that are named one by one."""
+
+
+def copies_in_words(points: Points) -> Text:
+    """Which measurements are copies of which; empty when none is."""
+    told = []
+    for later, original in points.copies.items():
+        (one, first), (two, repeat) = points.run_of(original), points.run_of(later)
+        told.append((one, first, two, repeat))
+    said = [
+        say(
+            "measurement {two}, repeat {repeat} of measurement {one}, repeat {first}",
+            two=two,
+            repeat=repeat,
+            one=one,
+            first=first,
+        )
+        for one, first, two, repeat in sorted(told)
+    ]
+    if not said:
+        return NOTHING
+    if len(said) <= _NAMED:
+        return say("Copies to the last digit, which do not count: {copies}.", copies=semicolons(said))
+    return say(
+        "Copies to the last digit, which do not count: {copies} and {count} more.",
+        copies=semicolons(said[:_NAMED]), count=len(said) - _NAMED,
+    )  # fmt: skip

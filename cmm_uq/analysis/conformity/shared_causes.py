@@ -31,11 +31,9 @@ _AT_ONCE = 2_000_000
 class Causes:
     """What makes m test values uncertain.
 
-    Parameters
-    ----------
-    shared : (m, s) by how much one standard uncertainty of each cause that all values share changes each value, µm, with sign.
-    own : (m,) standard uncertainty that values of one set-up share, µm.
-    set_up : (m,) number of the set-up.
+    ``shared``: (m, s) by how much one standard uncertainty of each cause that all values share changes each value, µm,
+    with sign; ``own``: (m,) standard uncertainty that values of one set-up share, µm; ``set_up``: (m,) number of the
+    set-up.
     """
 
     shared: Floats
@@ -54,7 +52,6 @@ class Causes:
         return Causes(np.column_stack([self.shared, more]), self.own, self.set_up) if more.any() else self
 
     def of(self, chosen: Ints) -> Causes:
-        """Those of some of the values."""
         return Causes(self.shared[chosen], self.own[chosen], self.set_up[chosen])
 
 
@@ -69,9 +66,7 @@ def length_budget(
 ) -> Budget:
     """Test uncertainty of one length (ISO/TS 23165:2006).
 
-    Parameters
-    ----------
-    u_mm : of all calibration, that of a short gauge beside it (``u_beside_mm``) included.
+    ``u_mm``: of all calibration, that of a short gauge beside it (``u_beside_mm``) included.
     """
     from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 
@@ -120,11 +115,7 @@ def probability_of_all(values: Sequence[float] | Floats, limits: Sequence[float]
     Of what is shared the largest cause, or of each set-up its own, is integrated exactly; over the others an even sequence
     of settings is averaged, the same on every run.
 
-    Parameters
-    ----------
-    values, limits : (m,) of what was measured, µm.
-    causes : of the uncertainty of each.
-    signed : whether the limits hold on both sides of zero.
+    ``values, limits``: (m,) of what was measured, µm.
     """
     if not len(causes.own) or not np.all(causes.u > 0):
         return None

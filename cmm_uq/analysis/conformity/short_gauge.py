@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.length_conditions import tip_offsets
-from cmm_uq.analysis.conformity.measurement_lines import ALIGNED
-from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition
+from cmm_uq.analysis.conformity.plans import ALIGNED, OFFSET_TOLERANCE_MM, Condition
 from cmm_uq.base.messages import NOTHING, Text, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.short_gauge import ShortGauge
@@ -27,10 +26,7 @@ NEAR_MM = 100.0
 class Supplemented(Artefact):
     """An artefact of which the errors of lengths that are not bidirectional have those of a short gauge added.
 
-    Parameters
-    ----------
-    own : the artefact.
-    gauge : measured beside it.
+    ``own``: the artefact; ``gauge``: measured beside it.
     """
 
     def __init__(self, own: Artefact, gauge: ShortGauge) -> None:
@@ -41,7 +37,6 @@ class Supplemented(Artefact):
         self._served: dict[bytes, Ints] = {}
 
     def indications(self) -> Indications | None:
-        """See :meth:`Artefact.indications`: repeat by repeat; where the gauge has fewer, with the one farthest outwards."""
         found = self.own.indications()
         if found is None:
             return None
@@ -51,32 +46,25 @@ class Supplemented(Artefact):
         )
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
-        """See :meth:`Artefact.bidirectional`: by itself, or by the short gauge measured in its place and direction."""
         own = self.own.bidirectional(rows)
         return None if own is None else np.asarray(own | (self._measured_by(rows) >= 0))
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
-        """See :meth:`Artefact.lines_of`."""
         return self.own.lines_of(rows)
 
     def lengths(self) -> Floats | None:
-        """See :meth:`Artefact.lengths`."""
         return self.own.lengths()
 
     def forms(self) -> Forms | None:
-        """See :meth:`Artefact.forms`."""
         return self.own.forms()
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`."""
         return self.own.fit(true_xyz, sizes)
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`."""
         return self.own.project(xyz, displacement)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`."""
         return self.own.size_change()
 
     def _measured_by(self, rows: Ints) -> Ints:

@@ -47,12 +47,7 @@ def form_error(test: Test) -> Statement:
 
 
 def size_error(test: Test) -> Statement:
-    """Diameter of each least-squares sphere minus the certified one, from the same points as the form.
-
-    Raises
-    ------
-    CmmUqError : no certified diameter is given, or an uncertainty that the rule needs.
-    """
+    """Diameter of each least-squares sphere minus the certified one, from the same points as the form."""
     probed = _probed(test)
     if probed.size is None:
         raise CmmUqError(f"{test.characteristic.name} of {test.facts.standard} compares with a certified diameter",
@@ -77,12 +72,7 @@ def size_error(test: Test) -> Statement:
 
 
 def range_of_centres(test: Test) -> Statement:
-    """Largest range, along an axis, of the middle of a sphere that was probed again and again (ASME B89.4.1-1997).
-
-    Raises
-    ------
-    CmmUqError : the artefact has no middle that comes again, or the rule needs an uncertainty that is not given.
-    """
+    """Largest range, along an axis, of the middle of a sphere that was probed again and again (ASME B89.4.1-1997)."""
     probed = _probed(test)
     if probed.centres is None:
         raise CmmUqError(f"{test.facts.standard} compares middles of a sphere, and the {test.artefact.kind} has none",

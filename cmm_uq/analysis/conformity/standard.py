@@ -14,13 +14,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.conformity.as_recorded import LeftOut, numbered
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, numbered
 from cmm_uq.analysis.conformity.clauses import Clause, in_words
-from cmm_uq.analysis.conformity.copies import copies_in_words
-from cmm_uq.analysis.conformity.decision import Decision, decide, needs_uncertainty, rule_words
+from cmm_uq.analysis.conformity.decision import (
+    Decision,
+    PriorKnowledge,
+    Risks,
+    decide,
+    global_risks,
+    needs_uncertainty,
+    rule_words,
+)
 from cmm_uq.analysis.conformity.plans import Condition
-from cmm_uq.analysis.conformity.rated import rated_conditions, rated_in_words
-from cmm_uq.analysis.conformity.risk import Known, Risks, global_risks
+from cmm_uq.analysis.conformity.rated import copies_in_words, rated_conditions, rated_in_words
 from cmm_uq.analysis.conformity.shared_causes import Causes, probability_of_all
 from cmm_uq.analysis.conformity.statement import Decided, Statement, counted, least_favourable
 from cmm_uq.analysis.conformity.uncertainty_lines import (
@@ -127,16 +133,9 @@ class Standard:
 
     @property
     def clause_names(self) -> tuple[str, ...]:
-        """See :attr:`cmm_uq.jobs.conformity.Asked.clause_names`."""
         return tuple(clause.name for clause in self.clauses)
 
     def characteristic(self, name: str | None) -> Characteristic:
-        """One of them by name; without one the first.
-
-        Raises
-        ------
-        ValueError : it is not decided here.
-        """
         found = next((each for each in self.characteristics if name in (None, each.name, *each.also)), None)
         if found is None:
             known = ", ".join(each.name for each in self.characteristics)
@@ -145,8 +144,7 @@ class Standard:
 
     def uncertainty_missing(
         self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
-    ) -> str | None:  # fmt: skip
-        """See :meth:`cmm_uq.jobs.conformity.Asked.uncertainty_missing`."""
+    ) -> str | None:
         if wish.rule == "simple":
             return None
         asked = self.characteristic(wish.characteristic)
@@ -185,7 +183,7 @@ class Test:
     accuracy: Mapping[str, Quantity]
     key: str
     circumstances: Circumstances = field(default_factory=Circumstances)
-    left_out: LeftOut | None = None
+    left_out: OutsideReadings | None = None
 
     def set_aside(self, rows: Ints) -> NDArray[np.bool_]:
         """Which values (m,), each of several points (m, j), rest on a reading that the screening left out."""
@@ -198,12 +196,7 @@ class Test:
         return bool(self.set_aside(np.flatnonzero(own)[:, None]).any())
 
     def indications(self) -> Indications:
-        """Errors of indication of the calibrated lengths.
-
-        Raises
-        ------
-        CmmUqError : there is no calibration.
-        """
+        """Errors of indication of the calibrated lengths."""
         found = self.artefact.indications()
         if found is None:
             raise CmmUqError(f"{self.facts.standard} compares with calibrated lengths, and the {self.artefact.kind} has none",
@@ -276,36 +269,21 @@ class Test:
                     unit=budget.unit)  # fmt: skip
         return replace(budget, lines=[*budget.lines, more])
 
-    def prior(self, limit_um: float) -> Known | None:
+    def prior(self, limit_um: float) -> PriorKnowledge | None:
         """What the job says of an error with this limit beforehand."""
         given = self.facts.prior
         if given is None:
             return None
-        return Known(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
+        return PriorKnowledge(given.mean_um, given.sd_um or (given.share_of_limit or 0.0) * limit_um)
 
     def refuse_without_uncertainty(self, u: float, name: str) -> None:
-        """Refuse a rule that needs an uncertainty where there is none.
-
-        Parameters
-        ----------
-        u : the least of all.
-        name : the key that would state it.
-
-        Raises
-        ------
-        CmmUqError : with the key and the fix.
-        """
+        """Refuse a rule that needs an uncertainty where there is none."""
         if u <= 0 and needs_uncertainty(self.facts.rule) and not self.answered:
             problem, fix = needed(name, self.facts)
             raise CmmUqError(problem, where=f"job.toml {self.key} rule", fix=fix)
 
     def refuse_nothing_measured(self, measured: bool, what: str) -> None:
-        """Refuse a statement on something of which the recording has nothing.
-
-        Raises
-        ------
-        CmmUqError : with what is to be recorded.
-        """
+        """Refuse a statement on something of which the recording has nothing."""
         if not measured:
             name = f"{self.characteristic.name} of {self.facts.standard}"
             raise CmmUqError(f"{name} is decided on {what}, and the recording has none",
@@ -319,17 +297,8 @@ class Test:
     ) -> Statement:  # fmt: skip
         """What was decided, with what the test lacks, and what the rule leaves out.
 
-        Parameters
-        ----------
-        quantity : what is compared, in words.
-        measured : what was measured, in the plural, for "… conform".
-        items : all that was decided, in the recording's order.
-        remarks : what the reader must know of this use of the standard.
-        signed : whether limits hold on both sides of zero.
-        causes : of the uncertainty of each item, from which follows the probability that all conform.
-        budget : of the least favourable one.
-        repeats : up to which a repeat has every point of its measurement; all of them by default.
-        lacking : what could not be decided of what was recorded.
+        ``causes``: of the uncertainty of each item, from which follows the probability that all conform; ``repeats``:
+        up to which a repeat has every point of its measurement; all of them by default.
         """
         form = self.circumstances.clauses.get(self.facts.clauses or "")
         clauses = [one for one in self.standard.clauses if not one.of or self.characteristic.name in one.of]
@@ -397,7 +366,6 @@ class Test:
 
 
 def _set_aside(reasons: Mapping[int, str]) -> list[Text]:
-    """What the laboratory leaves out of the estimates, and why."""
     return [
         say("Measurement {number}, left out of the estimates by the laboratory, is decided with the others: {reason}.",
             number=number, reason=Verbatim(reason.rstrip(". ")))
@@ -409,7 +377,6 @@ def _set_aside(reasons: Mapping[int, str]) -> list[Text]:
 
 
 def _joint(items: Sequence[Decided], causes: Causes, signed: bool) -> float | None:
-    """Probability that all that counts conforms."""
     rows = np.array([i for i, item in enumerate(items) if item.standing != "replaced"], dtype=np.int64)
     left = counted(items)
     return probability_of_all(
@@ -418,12 +385,7 @@ def _joint(items: Sequence[Decided], causes: Causes, signed: bool) -> float | No
 
 
 def characteristic_of(standard: Standard, facts: ConformityFacts, key: str) -> Characteristic:
-    """The characteristic that a job wishes to be decided.
-
-    Raises
-    ------
-    CmmUqError : it is not decided here.
-    """
+    """The characteristic that a job wishes to be decided."""
     try:
         return standard.characteristic(facts.characteristic)
     except ValueError as error:

@@ -1,4 +1,6 @@
-"""The standards that can be stated, each with its characteristics, and those of other packages.
+"""The standards that a job may name, each with what is decided on it.
+
+The standards that can be stated, each with its characteristics, and those of other packages.
 
 Another package offers one as an entry point of the group ``cmm_uq.standards``, of the standard's own name. What of each is
 tested, from which columns, and what is not: docs/standards.md.
@@ -11,7 +13,9 @@ from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 
-from cmm_uq.analysis.conformity.as_recorded import LeftOut
+import numpy as np
+
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
 from cmm_uq.analysis.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
 from cmm_uq.analysis.conformity.clauses import CLAUSES
 from cmm_uq.analysis.conformity.lengths_decided import (
@@ -23,7 +27,6 @@ from cmm_uq.analysis.conformity.lengths_decided import (
     repeatability_range,
     short,
 )
-from cmm_uq.analysis.conformity.orientation_conditions import orientations
 from cmm_uq.analysis.conformity.plan_conditions import best_of, conditions
 from cmm_uq.analysis.conformity.plans import (
     B89,
@@ -37,8 +40,8 @@ from cmm_uq.analysis.conformity.plans import (
     ISO_10360_8,
     VDI_2617_2_1,
     Condition,
+    ShortLengthPlan,
 )
-from cmm_uq.analysis.conformity.remeasured import Again
 from cmm_uq.analysis.conformity.short_gauge import repeats_of_gauge, supplemented
 from cmm_uq.analysis.conformity.spheres_decided import (
     diameter_allowed,
@@ -51,6 +54,7 @@ from cmm_uq.analysis.conformity.spheres_decided import (
     size_unstated,
 )
 from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
+from cmm_uq.analysis.conformity.statement import Remeasurement as Again
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.conformity.uncertainty_lines import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES
 from cmm_uq.base.errors import CmmUqError, suggestion
@@ -61,6 +65,44 @@ from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity
+
+
+def orientations(plan: ShortLengthPlan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
+    """Orientations that differ, and how often the gauge was measured in each."""
+    found = artefact.indications()
+    what = say(
+        "a length of at most {longest:g} mm in {count} orientations", longest=plan.longest_mm, count=plan.orientations
+    )
+    if found is None:
+        return (Condition(what, (what,)),)
+    points, first = artefact.points, found.rows[:, 0]
+    copied = np.isin(points.group[first], list(points.copies) if recorded else [])
+    rows = np.flatnonzero(short(plan.longest_mm)(artefact, found) & ~copied)
+    _, along = artefact.lines_of(found.rows)
+    kept: list[tuple[np.ndarray, set[int]]] = []
+    for i in rows:
+        direction = along[i] / np.linalg.norm(along[i])
+        near = next(
+            (runs for one, runs in kept if abs(float(one @ direction)) > np.cos(np.radians(plan.apart_deg))), None
+        )
+        if near is None:
+            kept.append((direction, {int(points.group[first[i]])}))
+        else:
+            near.add(int(points.group[first[i]]))
+    lacking = plan.orientations - len(kept)
+    told = () if lacking <= 0 else (say("{lacking} of {count} orientations", lacking=lacking, count=plan.orientations),)
+    few = sorted((len(runs) for _, runs in kept), reverse=True)[: plan.orientations]
+    repeats = say("{repeats} repetitions in each orientation", repeats=plan.repeats)
+    least = min(few, default=0)
+    lacks = say("{what} ({least})", what=repeats, least=least)
+    unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
+    sides = Condition(
+        say("ends of each length reached from opposite sides"),
+        (unknown,) if len(rows) and artefact.bidirectional(found.rows) is None else (),
+        Verbatim("columns approach_x, approach_y, approach_z"),
+    )
+    return (Condition(what, told), Condition(repeats, () if least >= plan.repeats else (lacks,)), sides)
+
 
 AGAIN = Again(repeats=3, outside=1, lengths=5, readings=10)
 """Of ISO 10360-2:2009; see docs/standards.md."""
@@ -161,21 +203,8 @@ def statement(
 ) -> Statement:
     """Compare what the standard asks for with its limit, and decide.
 
-    Parameters
-    ----------
-    facts : standard, limit and rule.
-    artefact : with its recording.
-    accuracy : figures with uncertainty.
-    key : of job.toml, for messages.
-    recorded : the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a measurement.
-    tested : what of this kind of artefact a standard may be decided on.
-    circumstances : under which the test was carried out, by the job.
-    left_out : what the screening left out of the artefact.
-
-    Raises
-    ------
-    CmmUqError : there is no such standard, the recording is not what it is decided on, or the rule needs an uncertainty
-        that is not stated.
+    ``recorded``: the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a
+    measurement.
     """
     under = circumstances or Circumstances()
     standard, characteristic = decidable(facts, artefact.kind, key, tested, under)
@@ -191,19 +220,8 @@ def statement(
 
 def decidable(
     facts: ConformityFacts, kind: str, key: str, tested: Collection[str], under: Circumstances
-) -> tuple[Standard, Characteristic]:  # fmt: skip
-    """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement.
-
-    Parameters
-    ----------
-    facts, key, tested : see :func:`statement`.
-    kind : of measurement.
-    under : circumstances of the test.
-
-    Raises
-    ------
-    CmmUqError : there is no such standard, or it is for other artefacts or probes.
-    """
+) -> tuple[Standard, Characteristic]:
+    """The standard that a job names, and its characteristic, where they can be decided on a kind of measurement."""
     standard = standard_named(facts.standard)
     if standard is None:
         raise CmmUqError(f"no standard {facts.standard!r} is decided", where=f"job.toml {key} standard",
@@ -220,12 +238,7 @@ def decidable(
 
 
 def standard_named(name: str) -> Standard | None:
-    """A standard by its name; ``None`` where there is none. A built-in one cannot be replaced.
-
-    Raises
-    ------
-    CmmUqError : another package offers it, but cannot be loaded, or two packages do.
-    """
+    """A standard by its name; ``None`` where there is none. A built-in one cannot be replaced."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     outside = named(offered(STANDARDS, Plugin), name)

@@ -174,7 +174,6 @@ def _lacks(what: Text, remedy: str) -> Condition:
 
 
 def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[Text]:
-    """Who answers for which line, and why."""
     told: list[Text] = []
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
         negligible, own = getattr(stated.negligible, line, None), getattr(stated.machine, line, None)

@@ -53,7 +53,7 @@ class DueList:
         return f"<Due on {self.found.on.isoformat()}: {counts}>"
 
     def _repr_html_(self) -> str:
-        from cmm_uq.certificate.due_page import due_row
+        from cmm_uq.certificate.pages.due import due_row
 
         rows = [due_row(one, self.found.on, self.found.within) for one in self.found.items]
         return html_table(repr(self)[1:-1], ("Due", "State", "", "What", "Why"), rows)
@@ -127,7 +127,7 @@ class History:
         return f"<History of {found.machine.serial}: {len(found.certificates)} recordings, {len(found.values)} values>"
 
     def _repr_html_(self) -> str:
-        from cmm_uq.certificate.history_words import HEADINGS, value_row
+        from cmm_uq.certificate.pages.history import HEADINGS, value_row
 
         return html_table(repr(self)[1:-1], HEADINGS, [value_row(self.found, one) for one in self.found.values])
 

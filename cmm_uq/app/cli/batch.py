@@ -13,7 +13,7 @@ from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, progress, put_dat
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.batch import Batch
-    from cmm_uq.certificate.in_short import Summary
+    from cmm_uq.certificate.wording import Summary
 
 EXAMPLES = examples(
     "batch jobs/2026",
@@ -93,7 +93,8 @@ def command(
 def _summary(batch: Batch, *, verbose: bool) -> Summary:
     """What came of it, and which jobs failed."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.laboratory.schedule.progress import duration, pace
 
     counted: list[Text] = [say("{count} written", count=batch.written)]

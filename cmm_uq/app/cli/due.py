@@ -54,7 +54,7 @@ def command(
 
 def _show(found: WhatIsDue, files: dict[str, Path]) -> None:
     from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of
-    from cmm_uq.certificate.due_page import counts, due_row
+    from cmm_uq.certificate.pages.due import counts, due_row
 
     told, standing = counts(found.items, found.on, found.within)
     show([((f"{found.on.isoformat()}: ", HEADING), (told, COLOURS[standing]))])

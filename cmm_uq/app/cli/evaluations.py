@@ -40,7 +40,8 @@ from cmm_uq.base.languages.language import ENGLISH
 
 if TYPE_CHECKING:
     from cmm_uq.base.messages import Text
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.evaluation import Evaluation
     from cmm_uq.maths.uncertainty.selftest import Outcome
 
@@ -169,7 +170,8 @@ def budget(
 def _budget_summary(evaluation: Evaluation) -> Summary:
     """Each output as a certificate could state it; in full as the row of a table too."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
 
     names = tuple(evaluation.stated)
@@ -207,7 +209,8 @@ def _selftest_summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool
     """The count, what fails or all figures, and how many there are of each source."""
     from cmm_uq import __version__
     from cmm_uq.base.messages import NOTHING, Verbatim, say
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.selftest import as_text
 
     def verdict(what: Text, passed: bool, *remarks: Text) -> Verdict:

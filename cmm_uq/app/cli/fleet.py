@@ -41,11 +41,11 @@ def command(
         found = fleet(records, name or (), seed=seed, stage=stage or silent)
         files = {} if out is None else write_fleet(found, out, force=force)
     if json:
-        from cmm_uq.certificate.fleet.data import fleet_data
+        from cmm_uq.certificate.pages.fleet_summary import fleet_data
 
         put_data(fleet_data(found))
     elif not quiet:
-        from cmm_uq.certificate.fleet.summary import fleet_summary
+        from cmm_uq.certificate.pages.fleet_summary import fleet_summary
 
         show_summary(fleet_summary(found), files, verbose=verbose)
     if strict and found.outsiders:

@@ -39,7 +39,7 @@ def command(
     found = history_of(machine, records, on=day_of(on), fleet=fleet)
     files = {} if out is None else write_history(found, out, force=force)
     if json:
-        from cmm_uq.certificate.history_words import history_data
+        from cmm_uq.certificate.pages.history import history_data
 
         put_data(history_data(found))
     elif not quiet:
@@ -48,7 +48,7 @@ def command(
 
 def _show(found: MachineHistory, files: dict[str, Path], *, verbose: bool) -> None:
     from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of
-    from cmm_uq.certificate.history_words import summary_row, terminal_note
+    from cmm_uq.certificate.pages.history import summary_row, terminal_note
 
     machine = found.machine
     serial = "" if machine.by_name else f", serial number {machine.serial}"

@@ -30,8 +30,8 @@ from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
-    from cmm_uq.app.commands.parts.new import Answers
-    from cmm_uq.certificate.in_short import Summary
+    from cmm_uq.app.commands.new_part_answers import Answers
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.jobs.importing.keys import ImportKeys
     from cmm_uq.jobs.importing.recognised import Recognised
     from cmm_uq.jobs.job import Job
@@ -77,7 +77,7 @@ def new(
     """
     from cmm_uq.app.commands.jobs.folder import BUDGET
     from cmm_uq.app.commands.jobs.new import check_empty, known, titles, write_new
-    from cmm_uq.app.commands.parts.new import PART
+    from cmm_uq.app.commands.new_part import PART
 
     if not kind:
         if json:
@@ -246,7 +246,8 @@ def _show_clauses(check: JobCheck) -> None:
 def _check_summary(check: JobCheck) -> Summary:
     """Whether anything would stop report, and all that is wrong."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
 
     count = len(check.problems)
     if check.sound:

@@ -33,7 +33,8 @@ from cmm_uq.jobs.origin import COMPENSATED, SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Standing
-    from cmm_uq.certificate.in_short import Summary, Verdict
+    from cmm_uq.certificate.wording import Headline as Verdict
+    from cmm_uq.certificate.wording import Summary
 
 FILES = {
     "certificate.html": "the certificate",
@@ -274,7 +275,7 @@ def conclude_derived(
         put_manifest(files)
     elif not quiet:
         from cmm_uq.base.messages import Verbatim, say
-        from cmm_uq.certificate.in_short import Summary
+        from cmm_uq.certificate.wording import Summary
 
         further = (say("Next: cmm-uq report {folder}", folder=Verbatim(folder_of(files))),) if is_job else ()
         show_summary(Summary(Verbatim(what), remarks=further), files, verbose=verbose)

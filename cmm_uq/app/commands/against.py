@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, in_a_row, plural, say, signed
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.simulated import Simulated
+from cmm_uq.certificate.result import SimulatedTwin as Simulated
 from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.simulation import KEY, SimulationFacts

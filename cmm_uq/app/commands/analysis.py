@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from cmm_uq.analysis.conformity.as_recorded import LeftOut
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.app.commands.diagnosing import diagnosed, screened_model
 from cmm_uq.app.commands.estimation import (
@@ -25,7 +25,7 @@ from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
-from cmm_uq.certificate.compose import certified
+from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.outcome import Found, Outcome, Page, Recipe
 from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.job import Job

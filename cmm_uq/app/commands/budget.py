@@ -11,7 +11,7 @@ from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.language import ENGLISH, Code
 from cmm_uq.base.output import Owner, staged
-from cmm_uq.certificate.fonts import fonts_of
+from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.maths.uncertainty.evaluation import Evaluation
 from cmm_uq.maths.uncertainty.model_file import read_model_file
 
@@ -62,12 +62,12 @@ def write_budget(
         stage("Propagating the uncertainty", 0.0)
         evaluation = model.evaluate(seed)
         stage("Rendering", 0.7)
-        from cmm_uq.certificate.budget_page import budget_document
-        from cmm_uq.certificate.html import render_html
-        from cmm_uq.certificate.in_language import said
-        from cmm_uq.certificate.lettering import lettered_in
-        from cmm_uq.certificate.pdf import render_pdf
-        from cmm_uq.certificate.results_file import as_json
+        from cmm_uq.certificate.document import translated as said
+        from cmm_uq.certificate.pages.budget import budget_document
+        from cmm_uq.certificate.plots.style import lettered_in
+        from cmm_uq.certificate.render.html import render_html
+        from cmm_uq.certificate.render.pdf import render_pdf
+        from cmm_uq.certificate.results.plain import as_json
         from cmm_uq.maths.uncertainty.budget_results import results_of
 
         data = as_json({**results_of(evaluation), **model.further(), "inputs_sha256": {file.name: model.sha256},

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from cmm_uq.analysis.conformity.as_recorded import LeftOut
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
 from cmm_uq.analysis.conformity.consequences import consequences, costs
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.power import ALLOWED

@@ -9,14 +9,15 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.analysis.conformity.accuracy import repeated_draws, with_uncertainty
-from cmm_uq.analysis.conformity.measurement_lines import ALIGNED
+from cmm_uq.analysis.conformity.plans import ALIGNED
 from cmm_uq.analysis.screening.finding import Finding, finding
 from cmm_uq.analysis.screening.outliers import moved_stretches, point_words, recurring_points, stretch_words
 from cmm_uq.analysis.screening.screening import counted_with, gross_outliers
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction, Noise
+from cmm_uq.certificate.result import LACK_OF_FIT, Component, Contradiction
+from cmm_uq.certificate.result import NoiseEstimate as Noise
 from cmm_uq.machine.model import Estimate, MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.display import of_last_digit

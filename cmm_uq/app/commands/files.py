@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.saying import said_in
 from cmm_uq.base.output import Ledger, Owner, staged
-from cmm_uq.certificate.fonts import fonts_of
-from cmm_uq.certificate.in_short import Summary
 from cmm_uq.certificate.outcome import Found, Outcome
+from cmm_uq.certificate.plots.style import fonts_of
+from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.content import certificate_content, folder_from, kind_of_entry
 from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, place_of
@@ -257,15 +257,15 @@ class Form:
         results_only : whether nothing but ``results.json`` is wanted.
         finished : what becomes of a document before the next is made of it, as of one that is signed.
         """
-        from cmm_uq.certificate.results_file import as_json
+        from cmm_uq.certificate.results.plain import as_json
 
         if results_only:
             return {RESULTS: as_json(outcome.results)}
-        from cmm_uq.certificate.html import render_html
-        from cmm_uq.certificate.in_language import said
+        from cmm_uq.certificate.document import translated as said
         from cmm_uq.certificate.origin import marked
-        from cmm_uq.certificate.pdf import render_pdf
-        from cmm_uq.certificate.provenance import FILE, provenance
+        from cmm_uq.certificate.render.html import render_html
+        from cmm_uq.certificate.render.pdf import render_pdf
+        from cmm_uq.certificate.results.provenance import FILE, provenance
 
         job, data = outcome.found.job, as_json(outcome.results)
         document = said(marked(outcome.document, job), job.facts.job.language)

@@ -15,7 +15,7 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.origin import DIGITAL
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.provenance import FILE as PROVENANCE
+from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
 

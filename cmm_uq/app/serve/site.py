@@ -29,8 +29,8 @@ from cmm_uq.app.serve.page import Cell, Chart, PageNotice, WebPage
 from cmm_uq.app.serve.view import ChainComparing, SiteView, problem_of
 from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
-from cmm_uq.certificate import plot_style
-from cmm_uq.certificate.templates import template_folder
+from cmm_uq.certificate.plots import style as plot_style
+from cmm_uq.certificate.render.html import template_folder
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.place import shown
 from cmm_uq.laboratory.records.store import Records

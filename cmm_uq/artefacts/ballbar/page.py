@@ -7,11 +7,10 @@ from cmm_uq.artefacts.distances import page as adjustment_section
 from cmm_uq.artefacts.distances.lengths import Lengths
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.budget_page import budget_blocks
 from cmm_uq.certificate.document import Column, Section, Table
 from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import residual_volume
+from cmm_uq.certificate.pages.budget import budget_blocks
+from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, numbered
 from cmm_uq.maths.uncertainty.rounding import rounded

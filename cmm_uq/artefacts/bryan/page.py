@@ -7,8 +7,7 @@ from cmm_uq.artefacts.distances import page as adjustment_section
 from cmm_uq.base.messages import NOTHING, number, say
 from cmm_uq.certificate.document import Section
 from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import residual_volume
+from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating
 

@@ -11,7 +11,7 @@ from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, 
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.plots import length_plot
+from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.maths.uncertainty.rounding import alike, rounded

@@ -7,8 +7,8 @@ from cmm_uq.artefacts.error_maps.overview import told
 from cmm_uq.artefacts.error_maps.page import maps_document
 from cmm_uq.artefacts.error_maps.results import maps_results
 from cmm_uq.certificate.diagnosis.overview import summary_of
-from cmm_uq.certificate.lettering import lettered_in
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
+from cmm_uq.certificate.plots.style import lettered_in
 
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:

@@ -11,12 +11,11 @@ from cmm_uq.artefacts.error_maps.squareness import squareness_sections
 from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
 from cmm_uq.certificate.diagnosis.overview import held_out, sure
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
 from cmm_uq.certificate.effect_words import effect_of, size_of, titles
-from cmm_uq.certificate.improvement_table import improvement_table
-from cmm_uq.certificate.plots import curve_with_band
+from cmm_uq.certificate.plots.residuals import curve_with_band
+from cmm_uq.certificate.sections.findings import improvement_table
 from cmm_uq.certificate.wording import probability
-from cmm_uq.certificate.working_page import working_page
 
 _PICTURES = 3
 

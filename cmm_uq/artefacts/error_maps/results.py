@@ -9,14 +9,8 @@ from cmm_uq.artefacts.error_maps.diagnosis import Difference
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
 from cmm_uq.artefacts.error_maps.squareness import squareness_data
 from cmm_uq.artefacts.error_maps.words import next_words
-from cmm_uq.certificate.results_file import (
-    effect_data,
-    false_alarms,
-    finding_data,
-    head,
-    improvement_data,
-    quantity_data,
-)
+from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
+from cmm_uq.certificate.results.plain import quantity_data
 
 
 def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:

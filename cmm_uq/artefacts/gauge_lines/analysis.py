@@ -7,14 +7,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.measurement_lines import position_on, share_of_travel
-from cmm_uq.analysis.conformity.plans import ISO_10360_2
+from cmm_uq.analysis.conformity.plans import ISO_10360_2, position_on, share_of_travel
 from cmm_uq.artefacts.gauge_lines.lines import GaugeLine, lines_of
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.base.messages import Text
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.stating import AtLeast
+from cmm_uq.certificate.result import AtLeast, Result
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.combinations import uncertainty_of_sum
 from cmm_uq.maths.inference.doubt import Doubt

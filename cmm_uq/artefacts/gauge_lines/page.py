@@ -14,8 +14,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.plots import length_plot
-from cmm_uq.certificate.residual_volume import residual_volume
+from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating
 from cmm_uq.maths.uncertainty.rounding import rounded

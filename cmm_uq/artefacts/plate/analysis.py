@@ -11,7 +11,7 @@ from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.results_file import quantity_data
+from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.machine.physics.rigid_body import SCALE
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

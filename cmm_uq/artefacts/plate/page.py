@@ -12,8 +12,8 @@ from cmm_uq.base.messages import Text, Verbatim, day, number, say, sentences
 from cmm_uq.base.units import PPM, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.outcome import Page
+from cmm_uq.certificate.plots.vectors import vector_plot
 from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.vector_plot import vector_plot
 from cmm_uq.certificate.wording import expanded
 from cmm_uq.maths.uncertainty.rounding import alike, rounded
 

@@ -10,8 +10,8 @@ from cmm_uq.base.messages import Number, Verbatim, number, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Section, Table
-from cmm_uq.certificate.plots import curve_with_band, length_plot
-from cmm_uq.certificate.stated import SIGN
+from cmm_uq.certificate.plots.residuals import curve_with_band, length_plot
+from cmm_uq.certificate.sections.results import SIGN
 from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.maths.uncertainty.rounding import rounded
 

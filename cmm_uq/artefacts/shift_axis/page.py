@@ -10,11 +10,11 @@ from cmm_uq.artefacts.shifting.facts import shift_facts
 from cmm_uq.artefacts.shifting.page import artefact_section, figures_section, method_section, summary_of
 from cmm_uq.base.messages import Number, Text, Verbatim, in_a_row, number, plural, say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.as_found_section import Left
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.in_short import Summary
-from cmm_uq.certificate.plots import curve_with_band
-from cmm_uq.certificate.warning import not_converged
+from cmm_uq.certificate.plots.residuals import curve_with_band
+from cmm_uq.certificate.sections.results import Left
+from cmm_uq.certificate.sections.warnings import not_converged
+from cmm_uq.certificate.wording import Summary
 from cmm_uq.machine.physics.rigid_body import SCALE
 from cmm_uq.maths.uncertainty.rounding import figure, nominal, rounded, significant
 

@@ -8,7 +8,8 @@ from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
 from cmm_uq.artefacts.shift_axis.curve import Curve
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.results_file import covariance_data, head, quantity_data
+from cmm_uq.certificate.results.contents import covariance_data, head
+from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.jobs.verdicts import NO_VERDICTS
 from cmm_uq.machine.physics.rigid_body import SCALE
 from cmm_uq.maths.inference.ensembles import Chains

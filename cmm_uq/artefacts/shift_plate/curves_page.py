@@ -10,9 +10,9 @@ from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, after, number,
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Column, Plot, Section, Table
-from cmm_uq.certificate.plots import curve_with_band
-from cmm_uq.certificate.stated import SIGN
-from cmm_uq.certificate.vector_plot import vector_plot
+from cmm_uq.certificate.plots.residuals import curve_with_band
+from cmm_uq.certificate.plots.vectors import vector_plot
+from cmm_uq.certificate.sections.results import SIGN
 from cmm_uq.maths.uncertainty.rounding import rounded
 
 EVERY = 4

@@ -11,10 +11,10 @@ from cmm_uq.artefacts.shifting.page import artefact_section, figures_section, me
 from cmm_uq.base.messages import Number, Text, Verbatim, after, commas, listed, number, plural, say, sentences, signed
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.as_found_section import Left
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.in_short import Summary
-from cmm_uq.certificate.warning import not_converged
+from cmm_uq.certificate.sections.results import Left
+from cmm_uq.certificate.sections.warnings import not_converged
+from cmm_uq.certificate.wording import Summary
 from cmm_uq.maths.uncertainty.rounding import rounded
 
 

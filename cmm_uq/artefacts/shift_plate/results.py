@@ -8,7 +8,8 @@ from cmm_uq.artefacts.shift_axis.results import curve_data, sampling_data
 from cmm_uq.artefacts.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.base.points import AXES
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
-from cmm_uq.certificate.results_file import covariance_data, head, quantity_data
+from cmm_uq.certificate.results.contents import covariance_data, head
+from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.jobs.verdicts import NO_VERDICTS
 
 

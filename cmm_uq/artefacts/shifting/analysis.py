@@ -13,13 +13,12 @@ from cmm_uq.artefacts.shifting.correction_table import table_text
 from cmm_uq.artefacts.shifting.facts import shift_facts
 from cmm_uq.artefacts.shifting.page import table_file
 from cmm_uq.base.messages import Text, Verbatim, names, say
-from cmm_uq.certificate.as_found_section import as_found_data, as_found_section
 from cmm_uq.certificate.certificate import certificate_of
-from cmm_uq.certificate.clauses import clauses_data
-from cmm_uq.certificate.completeness import formal_warnings
+from cmm_uq.certificate.clauses import clauses_data, formal_warnings
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
-from cmm_uq.certificate.posterior_file import posterior_file
+from cmm_uq.certificate.results.plain import posterior_file
+from cmm_uq.certificate.sections.results import as_found_data, as_found_section
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.posterior import Progress
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.stating import Stating
+from cmm_uq.certificate.result import StatedUncertainty
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
@@ -111,9 +111,9 @@ class ShiftFound(ABC):
         )
 
     @cached_property
-    def stating(self) -> Stating:
+    def stating(self) -> StatedUncertainty:
         """How quantities are stated: not below the laboratory's capability."""
-        return Stating.of(self.job)
+        return StatedUncertainty.of(self.job)
 
     def stated_along(self, curve: Along, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
         """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel.

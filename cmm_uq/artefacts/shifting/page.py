@@ -6,12 +6,11 @@ from collections.abc import Iterable, Sequence
 
 from cmm_uq.artefacts.shifting.facts import shift_facts
 from cmm_uq.base.messages import Text, Verbatim, day, number, say
-from cmm_uq.certificate.as_found_section import Left
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
-from cmm_uq.certificate.in_short import Summary, figure_row
 from cmm_uq.certificate.origin import file_name
-from cmm_uq.certificate.stated import SIGN, stated_table
-from cmm_uq.certificate.traceability_section import artefact_rows, certificate_rows, traceability_section
+from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
+from cmm_uq.certificate.sections.traceability import artefact_rows, certificate_rows, traceability_section
+from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Chains
 from cmm_uq.maths.uncertainty.rounding import nominal, significant

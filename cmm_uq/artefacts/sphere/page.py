@@ -10,7 +10,7 @@ from cmm_uq.base.messages import Number, Text, number, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Plot, Section, Table
 from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.plots import length_plot, volume_plot
+from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, numbered
 from cmm_uq.maths.uncertainty.rounding import alike, rounded

@@ -16,8 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.stating import AtLeast
+from cmm_uq.certificate.result import AtLeast, Result
 from cmm_uq.certificate.wording import refusal
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise

@@ -9,7 +9,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolon
 from cmm_uq.base.units import ARCSECOND, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.outcome import Page
-from cmm_uq.certificate.plots import length_plot
+from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, expanded
 from cmm_uq.maths.uncertainty.rounding import rounded

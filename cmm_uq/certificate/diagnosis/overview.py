@@ -10,17 +10,16 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, commas, day, lines, say, semicolons
-from cmm_uq.certificate.against import VERDICTS as AGAINST
-from cmm_uq.certificate.against import contained
 from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.effect_words import effect_of, size_of, title_of, titles
-from cmm_uq.certificate.in_short import Summary, Verdict
 from cmm_uq.certificate.result import Diagnosed
-from cmm_uq.certificate.where_section import by_columns, place_words
-from cmm_uq.certificate.withheld import other_periods
-from cmm_uq.certificate.withheld import sentences as withheld_sentences
-from cmm_uq.certificate.wording import probability
+from cmm_uq.certificate.sections.findings import VERDICTS as AGAINST
+from cmm_uq.certificate.sections.findings import contained, other_periods
+from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
+from cmm_uq.certificate.sections.where import by_columns, place_words
+from cmm_uq.certificate.wording import Headline as Verdict
+from cmm_uq.certificate.wording import Summary, probability
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.rounding import alike

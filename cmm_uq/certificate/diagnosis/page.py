@@ -12,7 +12,6 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, OmittedEffect
 from cmm_uq.base.messages import Text, Verbatim, commas, day, names, number, say, sentences
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.against import contained, corrections, simulation_section
 from cmm_uq.certificate.diagnosis.overview import (
     ambiguous,
     held_out,
@@ -25,21 +24,24 @@ from cmm_uq.certificate.diagnosis.overview import (
     verdict_of,
 )
 from cmm_uq.certificate.diagnosis.sections import costs_section, next_section, unseen_section
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, size_of, title_of, titles
-from cmm_uq.certificate.improvement_table import improvement_table
-from cmm_uq.certificate.lettering import lettered_in
-from cmm_uq.certificate.origin import came_about
+from cmm_uq.certificate.origin import came_about, program
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.plots import length_plot, residual_plot
-from cmm_uq.certificate.program import program
+from cmm_uq.certificate.plots.residuals import length_plot, residual_plot
+from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Diagnosed
-from cmm_uq.certificate.results_file import diagnosis_data, head
-from cmm_uq.certificate.where_section import where_section
-from cmm_uq.certificate.withheld import other_periods
-from cmm_uq.certificate.withheld import sentences as withheld_sentences
+from cmm_uq.certificate.results.contents import diagnosis_data, head
+from cmm_uq.certificate.sections.findings import (
+    contained,
+    corrections,
+    improvement_table,
+    other_periods,
+    simulation_section,
+)
+from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
+from cmm_uq.certificate.sections.where import where_section
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
-from cmm_uq.certificate.working_page import working_page
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise

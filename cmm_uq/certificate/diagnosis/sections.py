@@ -30,9 +30,9 @@ from cmm_uq.base.messages import (
 from cmm_uq.base.units import Unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import parameter_title, title_of, titles
-from cmm_uq.certificate.plan_picture import placing_pictures
-from cmm_uq.certificate.quantity_data import quantity_data
+from cmm_uq.certificate.plots.plans import placing_pictures
 from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.measurement import ARTEFACT

@@ -1,23 +1,26 @@
 """Administrative data of a digital certificate: from the job; what it does not state says so.
 
+Administrative data of a digital certificate: from the job; what it does not state says so.
+
 A recording that nobody measured, a draft and an interim check are no certificates: their identifier begins with that, in
 capitals, their laboratory is named as nobody, and no word of conformity is said.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.languages.language import ENGLISH, Code
+from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.messages import Day, Number, Text, Verbatim, say
 from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
-from cmm_uq.certificate.digital_certificate.words import NOT_STATED, SayIn, one_line, rich_of, words_of
 from cmm_uq.certificate.origin import BANNERS
-from cmm_uq.certificate.reissue import Comparison
-from cmm_uq.certificate.traceability_section import claimed
+from cmm_uq.certificate.results.reissue import Reissue as Comparison
+from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.dcc.administrative import (
     Contact,
     CoreData,
@@ -35,8 +38,55 @@ from cmm_uq.jobs.dcc.administrative import (
 )
 from cmm_uq.jobs.dcc.quantities import RealList
 from cmm_uq.jobs.dcc.results import Statement
+from cmm_uq.jobs.dcc.texts import Rich, Said, Words
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
+
+SayIn = Callable[[Text], Mapping[str, str]]
+"""A text by language, ISO 639-1."""
+
+NOT_STATED = say("not stated")
+
+
+def speaking(code: Code) -> SayIn:
+    """What says a text in a language, and in English beside it."""
+
+    def say_in(text: Text) -> Mapping[str, str]:
+        codes = (code,) if code == ENGLISH else (code, ENGLISH)
+        return {one: str.__str__(said_in(text, one)) for one in codes}
+
+    return say_in
+
+
+def said(text: str, say_in: SayIn) -> tuple[Said, ...]:
+    """In each language; without one where nobody may translate it."""
+    if isinstance(text, Text) and not isinstance(text, Verbatim | Number | Day):
+        return tuple(Said(spoken, language) for language, spoken in say_in(text).items())
+    return (Said(str.__str__(text)),)
+
+
+def words_of(text: str, say_in: SayIn) -> Words:
+    return Words(said(text, say_in))
+
+
+def rich_of(texts: Iterable[str], say_in: SayIn) -> Rich:
+    """Paragraphs: all of one language, then all of the next."""
+    found: dict[str | None, list[Said]] = {}
+    for text in texts:
+        for one in said(text, say_in):
+            found.setdefault(one.language, []).append(one)
+    return Rich(contents=tuple(one for spoken in found.values() for one in spoken))
+
+
+def english(texts: Iterable[str]) -> Rich:
+    """Sentences of results.json, which is English in every language."""
+    return Rich(contents=tuple(Said(text, "en") for text in texts))
+
+
+def one_line(text: str) -> str:
+    """A text for an element that takes no spaces at its ends."""
+    return " ".join(str.__str__(text).split())
+
 
 UNKNOWN_COUNTRY = "ZZ"
 """Of no country: ISO 3166-1 leaves this code to users, and CLDR takes it for an unknown one."""
@@ -49,10 +99,7 @@ _NOBODY = say("nobody: nothing is certified")
 class Mark:
     """Why this is no certificate.
 
-    Parameters
-    ----------
-    word : that its identifier begins with.
-    banner : what is said of it.
+    ``word``: that its identifier begins with; ``banner``: what is said of it.
     """
 
     word: str
@@ -69,7 +116,6 @@ def mark_of(job: Job) -> Mark | None:
 
 
 def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
-    """Identifier, languages and dates."""
     facts = job.facts.job
     number, mark = one_line(facts.number or facts.id), mark_of(job)
     known = [
@@ -96,7 +142,6 @@ def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
 
 
 def items(job: Job, say_in: SayIn) -> Items:
-    """The machine."""
     machine = job.facts.machine
     serial = Identification(
         issuer="manufacturer",
@@ -118,7 +163,6 @@ def items(job: Job, say_in: SayIn) -> Items:
 
 
 def _travel(job: Job, say_in: SayIn) -> list[PrimitiveQuantity]:
-    """Lowest and highest scale reading of each axis."""
     found = []
     for axis in "xyz":
         travel = getattr(job.facts.machine.travel_mm, axis)
@@ -161,7 +205,6 @@ def persons(job: Job, say_in: SayIn) -> tuple[Person, ...]:
 
 
 def customer(job: Job, say_in: SayIn) -> Contact:
-    """For whom it was measured."""
     return _contact(job.facts.job.customer, job.facts.job.address, say_in)
 
 
@@ -214,7 +257,6 @@ def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tu
 
 
 def ref_types(say_in: SayIn) -> tuple[RefTypeDefinition, ...]:
-    """Whose names the refTypes are."""
     return (
         RefTypeDefinition(
             name=words_of(say("Good practice of the DCC: names that all fields of calibration share"), say_in),
@@ -236,6 +278,5 @@ def _contact(name: str, address: str, say_in: SayIn) -> Contact:
 
 
 def _location(address: str, say_in: SayIn) -> Location:
-    """As it is written: a job does not part street and city."""
     lines = [Verbatim(line.strip()) for line in address.splitlines() if line.strip()]
     return Location(further=(rich_of(lines or (NOT_STATED,), say_in),))

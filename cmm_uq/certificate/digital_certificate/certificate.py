@@ -15,9 +15,10 @@ from scipy import special
 
 from cmm_uq.base.languages.language import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.certificate.as_json import as_json
 from cmm_uq.certificate.clauses import certifies
 from cmm_uq.certificate.digital_certificate.administration import (
+    NOT_STATED,
+    SayIn,
     core_data,
     customer,
     formal_statements,
@@ -26,15 +27,23 @@ from cmm_uq.certificate.digital_certificate.administration import (
     mark_of,
     persons,
     ref_types,
+    speaking,
+    words_of,
 )
 from cmm_uq.certificate.digital_certificate.conformity import evidence, of_tolerances, statements
 from cmm_uq.certificate.digital_certificate.figures import Figures
 from cmm_uq.certificate.digital_certificate.measurement import conditions, equipment, metadata, methods, software
-from cmm_uq.certificate.digital_certificate.shapes import decimal, is_quantity, plain_name
-from cmm_uq.certificate.digital_certificate.uncertainty import P95
-from cmm_uq.certificate.digital_certificate.units import dsi_of, product, without_unit
-from cmm_uq.certificate.digital_certificate.words import NOT_STATED, SayIn, speaking, words_of
+from cmm_uq.certificate.digital_certificate.quantities import (
+    P95,
+    decimal,
+    dsi_of,
+    is_quantity,
+    plain_name,
+    product,
+    without_unit,
+)
 from cmm_uq.certificate.origin import file_name
+from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.jobs.dcc.certificate import Administrative, Certificate
 from cmm_uq.jobs.dcc.quantities import Column, Covariance, Ellipsoid, ExpandedList, RealList
 from cmm_uq.jobs.dcc.results import Data, Measurement, Quantity, Result
@@ -64,16 +73,8 @@ _MOST = 40
 
 def digital_certificate(
     results: Mapping[str, Any], job: Job, *, html: bytes | None, file: bytes | None = None
-) -> Certificate:  # fmt: skip
-    """The certificate, in the language that results.json names, and in English.
-
-    Parameters
-    ----------
-    results : as results.json has them.
-    job : whose they are.
-    html : the human-readable copy, which the certificate carries.
-    file : results.json itself, where it is at hand.
-    """
+) -> Certificate:
+    """The certificate, in the language that results.json names, and in English."""
     say_in = speaking(results["job"].get("language", ENGLISH))
     real, decided = certifies(job), results.get("conformity", ())
     figures = Figures(say_in, free(results), of_tolerances(Verdicts.of_results(results), say_in, certifies=real))
@@ -130,7 +131,6 @@ def free(results: Mapping[str, Any]) -> frozenset[str]:
 
 
 def _results(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> list[Result]:
-    """Every part of results.json that is one of the machine."""
     keys = [key for key in (*_TITLES, *results) if key in results and key not in _NOT_STATED_THERE]
     found = []
     for key in dict.fromkeys(keys):

@@ -14,10 +14,9 @@ from typing import Any
 
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import UNITS
+from cmm_uq.certificate.digital_certificate.administration import SayIn, english, one_line, rich_of, words_of
 from cmm_uq.certificate.digital_certificate.figures import Figures, Part
-from cmm_uq.certificate.digital_certificate.shapes import decimal
-from cmm_uq.certificate.digital_certificate.units import ONE, dsi_of, ratio
-from cmm_uq.certificate.digital_certificate.words import SayIn, english, one_line, rich_of, words_of
+from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, dsi_of, ratio
 from cmm_uq.certificate.wording import stated_row, stated_value
 from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Real, RealList
 from cmm_uq.jobs.dcc.results import Data, Quantity, QuantityList, Result, Statement
@@ -46,13 +45,7 @@ _P_TWICE = Decimal("0.9545")
 
 
 def of_tolerances(verdicts: Verdicts, say_in: SayIn, *, certifies: bool) -> Mapping[str, Statement]:
-    """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result.
-
-    Parameters
-    ----------
-    verdicts : of results.json.
-    certifies : whether anything is certified; otherwise no word of the schema is said.
-    """
+    """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result."""
     return {one.name: _of_tolerance(one, say_in, certifies=certifies) for one in verdicts if not one.by}
 
 
@@ -78,11 +71,7 @@ def statements(
 ) -> tuple[Statement, ...]:
     """A statement for each decision of results.json.
 
-    Parameters
-    ----------
-    decided : its ``conformity``.
-    figures : makes the quantities.
-    certifies : whether anything is certified; otherwise no word of the schema is said.
+    ``decided``: its ``conformity``.
     """
     return tuple(_statement(i, one, say_in, figures, certifies=certifies) for i, one in enumerate(decided))
 
@@ -183,7 +172,6 @@ def evidence(
 def _values(
     path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool
 ) -> Iterator[Part]:
-    """A table of all, a word of the schema for each row."""
     if not errors:
         return
     below = (*path, "errors")
@@ -197,9 +185,7 @@ def _values(
         id=figures.id_of((*below, "error_um")), name=words_of(say("Value"), say_in), ref_type=("basic_measurementError",),
         value=RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
     )  # fmt: skip
-    others = [
-        {key: value for key, value in one.items() if key not in ("error_um", "u_um", "U_um")} for one in errors
-    ]  # fmt: skip
+    others = [{key: value for key, value in one.items() if key not in ("error_um", "u_um", "U_um")} for one in errors]
     rest = [part for table in figures.parts(below, others) if isinstance(table, QuantityList) for part in table.parts]
     words = tuple(IN_THE_SCHEMA[one["outcome"]] for one in errors)
     outcomes = Statement(conformity_list=words, ref_type=("basic_conformity",)) if certifies else None

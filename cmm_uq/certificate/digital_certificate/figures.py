@@ -14,28 +14,32 @@ from typing import Any
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import Unit
-from cmm_uq.certificate.digital_certificate.shapes import (
+from cmm_uq.certificate.digital_certificate.administration import SayIn, english, rich_of, words_of
+from cmm_uq.certificate.digital_certificate.quantities import (
+    ONE,
+    P95,
     are_numbers,
     decimal,
     decimals,
+    dsi_of,
+    expanded_of,
+    interval_of,
+    intervals_of,
     is_budget,
     is_curve,
     is_matrix,
     is_number,
     is_quantity,
+    named_unit,
     plain_cell,
     plain_name,
-)
-from cmm_uq.certificate.digital_certificate.uncertainty import (
-    P95,
-    expanded_of,
-    interval_of,
-    intervals_of,
+    product,
+    ratio,
     spread_of,
     symmetric,
+    unit_of,
+    without_unit,
 )
-from cmm_uq.certificate.digital_certificate.units import ONE, dsi_of, named_unit, product, ratio, unit_of, without_unit
-from cmm_uq.certificate.digital_certificate.words import SayIn, english, rich_of, words_of
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.jobs.dcc.administrative import Characters
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
@@ -56,11 +60,9 @@ _NO_RESULT = ("noise", "least_squares")
 class Figures:
     """Makes quantities.
 
-    Parameters
-    ----------
-    say_in : a text in the languages of the certificate.
-    free : paths of estimates that the recording does not determine: what is known of them is no result.
-    stated : what is stated of estimates, ``scale_x.ppm``; it stands with each.
+    ``say_in``: a text in the languages of the certificate; ``free``: paths of estimates that the recording does not
+    determine: what is known of them is no result; ``stated``: what is stated of estimates, ``scale_x.ppm``; it stands
+    with each.
     """
 
     def __init__(
@@ -70,14 +72,6 @@ class Figures:
         self._ids: set[str] = set()
 
     def parts(self, path: Path, value: Any, above: Unit | None = None) -> Iterator[Part]:
-        """What stands under a path.
-
-        Parameters
-        ----------
-        path : keys of results.json, of lists the index.
-        value : that stands there.
-        above : unit that a key above names.
-        """
         if value is None or value in ({}, []):
             return
         unit = unit_of(path[-1], above) if not path[-1].isdecimal() else above or ONE
@@ -93,7 +87,6 @@ class Figures:
             yield from self._group(path, value, named_unit(path[-1]) or above)
 
     def id_of(self, path: Path) -> str:
-        """An id that no other part has."""
         wanted = plain_name(".".join(path))
         wanted = found = wanted if wanted[0].isalpha() or wanted[0] == "_" else f"_{wanted}"
         count = 1
@@ -104,7 +97,6 @@ class Figures:
         return found
 
     def title(self, path: Path) -> Text:
-        """A quantity in words."""
         if path[-1] in TITLES:
             return TITLES[path[-1]]
         if len(path) > 1 and effect_of(path[-2]) is not None:
@@ -137,7 +129,6 @@ class Figures:
                 yield from self.parts((*path, key), further, unit)
 
     def _group(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
-        """What belongs together."""
         if is_budget(data):
             inner = list(self._budget(path, data))
         elif is_matrix(data):
@@ -233,7 +224,6 @@ class Figures:
             yield self._quantity((*path, str(i)), RealList(values=decimals(row), units=elements))
 
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Part]:
-        """A budget of uncertainty: what is combined, and its lines."""
         unit = dsi_of(data["unit"])
         stated = expanded_of(data)
         value = Real(value=decimal(data["value"]), unit=unit, uncertainty=stated) if data["value"] is not None else None
@@ -267,7 +257,6 @@ class Figures:
 
 
 def _texts(values: Sequence[Any]) -> Any:
-    """Words as a list, or paragraphs where one has spaces."""
     texts = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
     if all(text and text.split() == [text] for text in texts):
         return Characters(tuple(texts))
@@ -275,7 +264,6 @@ def _texts(values: Sequence[Any]) -> Any:
 
 
 def _ref_type(path: Path, value: Any) -> tuple[str, ...]:
-    """What the good practice of the DCC calls it."""
     if path[-1] == "interval95":
         return ("cmm_coverageInterval",)
     if not isinstance(value, Real | RealList) or path[0] in _NO_RESULT:

@@ -8,10 +8,17 @@ from typing import Any
 
 from cmm_uq.base.messages import Text, Verbatim, day, say
 from cmm_uq.base.units import MICROMETRE, UNITS, Unit
-from cmm_uq.certificate.conditions import TEMPERATURES
-from cmm_uq.certificate.digital_certificate.uncertainty import P_STANDARD
-from cmm_uq.certificate.digital_certificate.words import NOT_STATED, SayIn, english, one_line, rich_of, words_of
-from cmm_uq.certificate.stated import SIGN, UNCERTAINTY
+from cmm_uq.certificate.certificate import TEMPERATURES
+from cmm_uq.certificate.digital_certificate.administration import (
+    NOT_STATED,
+    SayIn,
+    english,
+    one_line,
+    rich_of,
+    words_of,
+)
+from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
+from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.artefact import CertificateFile
 from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.dcc.administrative import Hash, Identification, PrimitiveQuantity, Software, Somebody
@@ -97,7 +104,6 @@ def _reference(
     say_in: SayIn,
     quantities: tuple[PrimitiveQuantity, ...],
 ) -> Equipment:
-    """A measurement standard, with its certificate."""
     return Equipment(
         name=words_of(Verbatim(name), say_in), certificate=_certificate(job, chain, say_in),
         identifications=_serial(serial, say_in), quantities=quantities, ref_type=("basic_normalUsed",),
@@ -142,7 +148,6 @@ def _paper(number: str, say_in: SayIn) -> Hash:
 def _certified(
     owner: str, name: Text, length: float | None, u_um: float | None, cte: float, say_in: SayIn
 ) -> Iterator[PrimitiveQuantity]:
-    """Length and expansion as the job states them."""
     if length is not None:
         u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
         stated = (

@@ -16,10 +16,9 @@ from cmm_uq.analysis.parts.outlines import outline
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
-from cmm_uq.certificate.lettering import lettered
-from cmm_uq.certificate.measured import width_mm
-from cmm_uq.certificate.plan_picture import DEPTH
-from cmm_uq.certificate.plot_style import INK, MUTED, TINY, WIDTH_MM, new_figure
+from cmm_uq.certificate.plots.labels import width_mm
+from cmm_uq.certificate.plots.plans import DEPTH
+from cmm_uq.certificate.plots.style import INK, MUTED, TINY, WIDTH_MM, lettered, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

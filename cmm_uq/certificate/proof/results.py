@@ -10,11 +10,11 @@ import numpy as np
 
 from cmm_uq.base.messages import NOTHING, Verbatim, say
 from cmm_uq.certificate.document import Standing
-from cmm_uq.certificate.in_short import Summary, Verdict
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.proof.page import conclusion_of, often_words, proof_document, warnings_of
 from cmm_uq.certificate.proof.words import DiagnosisProof, in_words, limits, standing
-from cmm_uq.certificate.results_file import head
+from cmm_uq.certificate.results.contents import head
+from cmm_uq.certificate.wording import Headline, Summary
 from cmm_uq.laboratory.proving.answers import RECORDS, TRUTH
 from cmm_uq.laboratory.proving.cases import KINDS, micrometres
 from cmm_uq.laboratory.proving.judgement import (
@@ -198,7 +198,7 @@ def proof_summary(proof: DiagnosisProof) -> Summary:
     judgement = proof.judgement
     words: dict[str, tuple[str, Standing]] = {MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad")}
     verdicts = tuple(
-        Verdict(
+        Headline(
             *words[one.standing],
             one.what,
             (in_words(one.rate), say("asked for: {limits}", limits=limits(one)), standing(one)),

@@ -7,7 +7,7 @@ import numpy as np
 from cmm_uq.base.messages import DASH, NOTHING, Text, commas, names, number, say, semicolons
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
-from cmm_uq.certificate.plot_style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, house_style, new_figure
+from cmm_uq.certificate.plots.style import ACCENT, BAND, INK, MUTED, bars, dots, drawn, house_style, new_figure
 from cmm_uq.certificate.proof.words import FAULT_WORDS, DiagnosisProof
 from cmm_uq.laboratory.proving.rates import LARGEST, OFTEN, DetectionCurve, Rate, Tenth
 from cmm_uq.laboratory.proving.reach import DRAWN, NO_TRAVEL, TAKEN, TOO_SMALL, UNRECORDED, Reach

@@ -10,8 +10,7 @@ from dataclasses import replace
 from math import isclose
 from typing import Any
 
-from cmm_uq.analysis.conformity.decision import Decision, decide
-from cmm_uq.analysis.conformity.risk import Known, global_risks
+from cmm_uq.analysis.conformity.decision import Decision, PriorKnowledge, decide, global_risks
 from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import NOTHING, Verbatim
@@ -111,10 +110,10 @@ def _decided(error: Mapping[str, Any], rule: Rule, prior: Any, *, signed: bool, 
                    standing=error["standing"], set_aside=error.get("set_aside", False))  # fmt: skip
 
 
-def _known(prior: Any, limit: float) -> Known | None:
+def _known(prior: Any, limit: float) -> PriorKnowledge | None:
     if prior is None:
         return None
-    return Known(prior["mean_um"], prior["sd_um"] or (prior["share_of_limit"] or 0.0) * limit)
+    return PriorKnowledge(prior["mean_um"], prior["sd_um"] or (prior["share_of_limit"] or 0.0) * limit)
 
 
 def _error(error: Mapping[str, Any], decided: Decided, entry: Mapping[str, Any]) -> Iterator[Wrong]:

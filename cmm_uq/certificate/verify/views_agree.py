@@ -68,7 +68,7 @@ def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
     page : of this version of the package.
     name : of its file.
     """
-    from cmm_uq.certificate.html import style_sheet
+    from cmm_uq.certificate.render.html import style_sheet
 
     inquiry.looked("files")
     should = style_sheet(page.title, page.banner, page.language)

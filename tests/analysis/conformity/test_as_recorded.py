@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.analysis.conformity.as_recorded import LeftOut, numbered
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings, numbered
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts, kind_named
@@ -33,7 +33,7 @@ UNDER = replace(recorded.STATED, uncertainty=recorded.STATED.uncertainty.model_c
 
 def decided(
     points: Points, facts: ArtefactFacts, under: Circumstances = UNDER, aside: Sequence[int] = (), **wish: Any
-) -> Statement:  # fmt: skip
+) -> Statement:
     """A recording screened as every command does, and decided."""
     kind = kind_named(facts.kind)
     assert kind is not None
@@ -45,7 +45,7 @@ def decided(
     accuracy = {} if lengths is None else {
         name: Quantity.of_draws(np.full(100, value), "µm", float(value)) for name, value in figures(lengths).items()
     }  # fmt: skip
-    left_out = LeftOut.of(points, recording.findings, observe)
+    left_out = OutsideReadings.of(points, recording.findings, observe)
     facts_of = ConformityFacts.model_validate(wish)
     return statement(facts_of, artefact, accuracy, "[[conformity]] 1", [LENGTHS, BARS, FORMS], None, under, left_out)
 

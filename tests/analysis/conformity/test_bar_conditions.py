@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.analysis.conformity.bar_conditions import most_apart
-from cmm_uq.analysis.conformity.plan_conditions import conditions
+from cmm_uq.analysis.conformity.plan_conditions import conditions, most_apart
 from cmm_uq.analysis.conformity.plans import BarPlan
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Machine, Points

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.analysis.conformity.decision import decide
+from cmm_uq.analysis.conformity.decision import PriorKnowledge, decide
 from cmm_uq.analysis.conformity.limits import Limits, judge
-from cmm_uq.analysis.conformity.risk import Known
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.conformity import (
     FalseAccept,
@@ -86,7 +85,7 @@ def test_of_a_zone_the_upper_limit_alone_has_a_guard_band(rule: Rule) -> None:
 @pytest.mark.parametrize("zone", [False, True])
 def test_with_a_prior_too(rule: Rule, zone: bool) -> None:
     """Weighted draws and the normal posterior; the other method is an integral over panels, for Z540.3."""
-    prior = Known(0.0, 0.05)
+    prior = PriorKnowledge(0.0, 0.05)
     limits = Limits(None, 0.1, NORMAL, zone, prior) if zone else Limits(-0.1, 0.1, NORMAL, zone, prior)
     for deviation in (d for d in DEVIATIONS if d >= 0 or not zone):
         found = judge(limits, rule, deviation)
@@ -162,8 +161,10 @@ def test_a_zone_that_was_measured_better_than_its_errors_is_accepted_by_its_prob
     assert (known.outcome, known.accepted) == ("pass", (None, 0.0))
 
 
-@pytest.mark.parametrize("prior", [None, Known(0.0, 1e6 * U)], ids=["without a prior", "that says nothing"])
-def test_a_zone_that_was_measured_much_better_than_its_errors_may_be_as_large_as_these(prior: Known | None) -> None:
+@pytest.mark.parametrize("prior", [None, PriorKnowledge(0.0, 1e6 * U)], ids=["without a prior", "that says nothing"])
+def test_a_zone_that_was_measured_much_better_than_its_errors_may_be_as_large_as_these(
+    prior: PriorKnowledge | None,
+) -> None:
     """Less than zero by 3 u, which one draw in 700 is: a normal distribution of mean 3 u on both sides of zero."""
     limits = Limits(None, 1.2 * U, NORMAL, zone=True, prior=prior)
     found = judge(limits, "ISO 14253-1", -3 * U)

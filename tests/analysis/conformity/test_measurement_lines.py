@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.conformity.measurement_lines import (
-    FACE_DIAGONALS,
-    crossed_travel,
-    position_of,
-    position_on,
-    share_of_travel,
-)
+from cmm_uq.analysis.conformity.plans import FACE_DIAGONALS, crossed_travel, position_of, position_on, share_of_travel
 from cmm_uq.base.points import Machine
 from tests.recordings import TRAVEL
 

@@ -102,8 +102,7 @@ def test_without_the_package_it_is_unknown(bar: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("where", "told"),
-    [("nowhere:STANDARD", "fails with ModuleNotFoundError"), ("math:pi", "is no Standard but float")],
+    ("where", "told"), [("nowhere:STANDARD", "fails with ModuleNotFoundError"), ("math:pi", "is no Standard but float")]
 )
 def test_a_broken_package_is_named(where: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     describe(tmp_path / "site", "odd-standards", "1.0", {"cmm_uq.standards": {"odd": where}})

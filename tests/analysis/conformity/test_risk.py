@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.analysis.conformity.risk import Known, acceptance_limit, global_risks
+from cmm_uq.analysis.conformity.decision import PriorKnowledge, acceptance_limit, global_risks
 
-PRIOR = Known(0.0, 5.0)
+PRIOR = PriorKnowledge(0.0, 5.0)
 
 
 def test_prior_and_measurement_add_their_precisions() -> None:
     """Prior 0 ± 4, measured 10 ± 3: weight 16/25, 6.4 ± 2.4 (a 3-4-5 triangle)."""
-    found = Known(0.0, 4.0).after(10.0, 3.0)
+    found = PriorKnowledge(0.0, 4.0).after(10.0, 3.0)
     assert (found.mean, found.sd) == pytest.approx((6.4, 2.4))
 
 
@@ -24,7 +24,7 @@ def test_prior_and_measurement_add_their_precisions() -> None:
 def test_probabilities_within_and_beyond_are_those_of_the_standard_library(
     mean: float, sd: float, limit: float
 ) -> None:
-    known, about = Known(mean, sd), NormalDist(mean, sd)
+    known, about = PriorKnowledge(mean, sd), NormalDist(mean, sd)
     inside = about.cdf(limit) - about.cdf(-limit)
     assert known.within(limit, signed=True) == pytest.approx(inside, abs=1e-12)
     assert known.beyond(limit, signed=True) == pytest.approx(1 - inside, abs=1e-12)
@@ -43,7 +43,7 @@ def test_global_risks_are_those_of_drawn_items(acceptance: float, u: float, mean
     readings = items + random.normal(0.0, u, len(items))
     accepted = (np.abs(readings) if signed else readings) <= acceptance
     conforming = np.abs(items) <= 10.0
-    found = global_risks(acceptance, 10.0, u, Known(mean, 5.0), signed=signed)
+    found = global_risks(acceptance, 10.0, u, PriorKnowledge(mean, 5.0), signed=signed)
     assert found.consumer == pytest.approx(float((accepted & ~conforming).mean()), abs=5e-4)
     assert found.producer == pytest.approx(float((~accepted & conforming).mean()), abs=1.5e-3)
 
@@ -63,4 +63,4 @@ def test_the_acceptance_limit_keeps_the_share_that_was_asked_for(signed: bool) -
 
 def test_the_acceptance_limit_is_never_beyond_the_limit_and_may_not_exist() -> None:
     assert acceptance_limit(0.5, 10.0, 2.0, PRIOR, signed=True) == 10.0
-    assert acceptance_limit(0.01, 10.0, 40.0, Known(30.0, 5.0), signed=False) is None
+    assert acceptance_limit(0.01, 10.0, 40.0, PriorKnowledge(30.0, 5.0), signed=False) is None

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy import optimize, stats
 
-from cmm_uq.analysis.conformity.decision import decide
-from cmm_uq.analysis.conformity.risk import Known
+from cmm_uq.analysis.conformity.decision import PriorKnowledge, decide
 from cmm_uq.jobs.conformity import ConformityFacts, PosteriorProbability, Rule, UncertaintyRatio, UnconditionalRisk
 
 LIMIT, U = 10.0, 1.0
-PRIOR = Known(0.0, 6.0)
+PRIOR = PriorKnowledge(0.0, 6.0)
 STEP = 0.01 * U
 
 
@@ -103,14 +102,16 @@ def test_z540_3_turns_at_the_share_of_wrongly_accepted_items(rule: Rule, share: 
 
 def test_two_percent_of_all_items_is_not_two_percent_of_this_one() -> None:
     """With most items well inside, Z540.3 accepts at the limit itself, where this item's own risk is one half."""
-    inside = Known(0.0, 4.0)
+    inside = PriorKnowledge(0.0, 4.0)
     assert decide(LIMIT, U, LIMIT, "Z540.3", signed=True, prior=inside).outcome == "pass"
     assert decide(LIMIT, U, LIMIT, "ANSI/NCSL Z540.3", signed=True, prior=inside).guard_band == 0.0
 
 
 def test_a_prior_changes_the_probability_and_not_what_iso_14253_decides() -> None:
     """Measured 8.5 ± 1 against 10: 93.3 %, undecided; with errors of 0 ± 3 beforehand 7.65 ± 0.949, 99.3 %."""
-    alone, known = (decide(8.5, U, LIMIT, "ISO 14253-1:2017", signed=True, prior=p) for p in (None, Known(0.0, 3.0)))
+    alone, known = (
+        decide(8.5, U, LIMIT, "ISO 14253-1:2017", signed=True, prior=p) for p in (None, PriorKnowledge(0.0, 3.0))
+    )
     assert (alone.outcome, known.outcome) == ("undecided", "undecided")
     assert alone.probability_conforming == pytest.approx(stats.norm.cdf(1.5), abs=1e-9)
     assert known.probability_conforming == pytest.approx(stats.norm(7.65, np.sqrt(0.9)).cdf(10.0), abs=1e-9)
@@ -142,7 +143,9 @@ def test_nearer_to_zero_is_never_judged_worse_and_nothing_beyond_the_limit_passe
     one: float, other: float, u: float, sd: float, rule: Rule, signed: bool
 ) -> None:
     near, far = sorted((one, other))
-    found = [decide(value, u, LIMIT, rule, signed=signed, prior=Known(0.0, sd)).outcome for value in (near, far)]
+    found = [
+        decide(value, u, LIMIT, rule, signed=signed, prior=PriorKnowledge(0.0, sd)).outcome for value in (near, far)
+    ]
     assert RANK.index(found[0]) <= RANK.index(found[1])
     for value, outcome in zip((near, far), found, strict=True):
         assert value <= LIMIT or outcome not in ("pass", "conditional pass")

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from cmm_uq.analysis.conformity.plan_conditions import sphere_points
 from cmm_uq.analysis.conformity.plans import SpherePlan
-from cmm_uq.analysis.conformity.sphere_conditions import sphere_points
 from cmm_uq.base.points import Points
 
 
@@ -32,7 +32,7 @@ X, Y, Z = np.eye(3).tolist()
 
 def test_every_sphere_is_counted_and_named_by_its_measurement() -> None:
     assert missing(SpherePlan(3, 90.0), [X, Y, Z], [X, Y], [X, Y, Z, Z]) == [
-        "3 points on the sphere of measurement 4 (2 recorded, 2 different)",
+        "3 points on the sphere of measurement 4 (2 recorded, 2 different)"
     ]
     assert missing(SpherePlan(3, 90.0), [X, Y, Z], [X, Y], copies=[1]) == []
 

@@ -187,9 +187,7 @@ def test_what_is_not_stated_is_no_larger_than_a_laboratory_may_have_it() -> None
     """Of 500 mm of steel at 22 °C: 0.3 K is 1.725 µm, 10⁻⁶/K over 2 K 1 µm; alignment and fixturing are 1 µm each."""
     warm = gauge()
     warm.points.columns["temp_artefact_c"][:] = 22.0
-    alone = {
-        "temperature": 500e3 * 11.5e-6 * 0.3, "expansion": 500e3 * 2 * 1e-6, "alignment": 1.0, "fixturing": 1.0,
-    }  # fmt: skip
+    alone = {"temperature": 500e3 * 11.5e-6 * 0.3, "expansion": 500e3 * 2 * 1e-6, "alignment": 1.0, "fixturing": 1.0}
     keys = {"temperature": "u_temperature_k", "expansion": "u_cte_per_k", "alignment": "u_alignment_um",
             "fixturing": "u_fixturing_um"}  # fmt: skip
     for line, u in alone.items():

@@ -21,7 +21,7 @@ from cmm_uq.certificate.diagnosis.sections import costs_data, costs_section
 from cmm_uq.certificate.document import Table
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.result import Diagnosed, Result
-from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import EVERY, effects
 from tests.artefacts.reading import tables

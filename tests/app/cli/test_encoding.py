@@ -16,7 +16,7 @@ from cmm_uq.app.cli import terminal as encoding
 from cmm_uq.app.commands.plans.plan import plan_summary
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import Unit
-from cmm_uq.certificate.in_short import Summary
+from cmm_uq.certificate.wording import Summary
 from tests.conftest import ROOT
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.certificate import fonts
+from cmm_uq.certificate.plots import style as fonts
 from tests.app.cli.process import run
 from tests.certificate.test_translatable import MODEL
 

@@ -13,7 +13,7 @@ from rich.cells import cell_len
 from cmm_uq.app.cli.summary import COLOURS, Layout
 from cmm_uq.app.cli.terminal import Line, folded
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.certificate.in_short import Summary, Verdict
+from cmm_uq.certificate.wording import Headline, Summary
 from tests.artefacts.simulated import outcome
 from tests.conftest import ROOT
 
@@ -83,7 +83,7 @@ def test_the_tenth_remark_is_on_the_screen_only_when_asked_for() -> None:
 
 
 def test_words_that_steer_a_terminal_are_shown_as_escapes() -> None:
-    told = Summary(Verbatim("machine\x1b[31m"), verdicts=(Verdict("PASS", "good", Verbatim("a\x07"), ()),))
+    told = Summary(Verbatim("machine\x1b[31m"), verdicts=(Headline("PASS", "good", Verbatim("a\x07"), ()),))
     assert text(Layout(80).screen(told)) == ["PASS  a\\x07", "machine\\x1b[31m"]
 
 

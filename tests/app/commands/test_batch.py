@@ -62,7 +62,9 @@ def test_a_batch_writes_what_report_writes_whatever_the_number_of_workers(tmp_pa
 
 def test_figures_alone_are_the_same_and_nothing_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     job = small_job(tmp_path, "plane")
-    monkeypatch.setattr("cmm_uq.certificate.plot_style.new_figure", lambda height_mm: pytest.fail("a picture is drawn"))
+    monkeypatch.setattr(
+        "cmm_uq.certificate.plots.style.new_figure", lambda height_mm: pytest.fail("a picture is drawn")
+    )
     found = reported((str(job), dict(read_job(job).inputs)), (0, True))
     assert list(found) == ["results.json"]
 

@@ -15,7 +15,7 @@ from cmm_uq.app.commands.jobs.check import Problem, check_job
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import write_report
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.completeness import formal_warnings
+from cmm_uq.certificate.clauses import formal_warnings
 from tests.app.cli.process import run
 from tests.conftest import MACHINE_JOBS, ROOT
 

@@ -16,8 +16,8 @@ from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.results_file import head
-from cmm_uq.certificate.traceability_section import traceability_section
+from cmm_uq.certificate.results.contents import head
+from cmm_uq.certificate.sections.traceability import traceability_section
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.recording import read_recording
 from tests.conftest import ROOT

@@ -10,8 +10,8 @@ import pytest
 
 from cmm_uq.app.serve.checks_page import FileMatch, look_up, number_in, verdict
 from cmm_uq.app.serve.exchange import UploadedFile
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.laboratory.records import open_records
 from tests.app.serve.laboratory import files
 from tests.certificate.samples import document_of

@@ -17,7 +17,7 @@ from cmm_uq.artefacts.digitizer.plan import THREE as PLANNED
 from cmm_uq.artefacts.digitizer.plan import scan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
-from cmm_uq.certificate.summary import summary
+from cmm_uq.certificate.sections.first_page import summary
 from cmm_uq.machine.physics.digitizer import euler_313
 from tests.artefacts.digitizer.aligned import OFFSET, THREE
 from tests.artefacts.reading import number

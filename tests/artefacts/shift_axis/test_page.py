@@ -13,7 +13,7 @@ from cmm_uq.app.commands.analysis import analyse, outcome_of
 from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
 from cmm_uq.artefacts.shift_axis.results import shift_results
 from cmm_uq.certificate.document import Document, Plot
-from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import number, tables
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT

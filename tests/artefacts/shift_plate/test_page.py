@@ -14,7 +14,7 @@ from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
 from cmm_uq.artefacts.shift_plate.plane import estimate_plane
 from cmm_uq.artefacts.shift_plate.results import plane_shift_results
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Table
-from cmm_uq.certificate.results_file import as_json
+from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import number, tables
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT

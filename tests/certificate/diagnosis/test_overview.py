@@ -17,9 +17,9 @@ from cmm_uq.base.messages import say
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
 from cmm_uq.certificate.diagnosis.page import diagnosis_document
 from cmm_uq.certificate.document import Document, Overview, Plot, Table
-from cmm_uq.certificate.html import render_html
+from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.result import Diagnosed
-from cmm_uq.certificate.where_section import place_words, region_words
+from cmm_uq.certificate.sections.where import place_words, region_words
 from cmm_uq.machine.physics.catalogue import EVERY
 from tests.artefacts.simulated import diagnosed
 from tests.certificate.saying import leaves

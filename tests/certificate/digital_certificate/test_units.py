@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.units import UNITS, unit
-from cmm_uq.certificate.digital_certificate.units import dsi_of, product, ratio, unit_of
+from cmm_uq.certificate.digital_certificate.quantities import dsi_of, product, ratio, unit_of
 
 UNIT = st.sampled_from(sorted(UNITS))
 

@@ -15,11 +15,10 @@ from axe_playwright_python.sync_playwright import Axe
 from pypdf import PdfReader
 
 from cmm_uq.certificate.document import Document, Overview, Table
-from cmm_uq.certificate.fleet.data import fleet_csv, fleet_data
-from cmm_uq.certificate.fleet.page import fleet_document
-from cmm_uq.certificate.fleet.summary import fleet_summary
-from cmm_uq.certificate.html import render_html
-from cmm_uq.certificate.pdf import render_pdf
+from cmm_uq.certificate.pages.fleet import fleet_document
+from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data, fleet_summary
+from cmm_uq.certificate.render.html import render_html
+from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.laboratory.due.fleet import FleetResult
 from tests.certificate.fleets import alone, many, two
 from tests.certificate.saying import strangers
@@ -84,11 +83,7 @@ def test_one_table_has_all_values_and_how_many_machines_matter() -> None:
     """Day 0 and the 365 days after it have one crossing each."""
     (row,) = tables(fleet_document(many()))[ALL_VALUES].rows
     assert row == ("Scale (a.ppm)", "3000", "0.5 ± 0.2 ppm/year", "40", "20", "365")
-    assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == (
-        "not compared",
-        "–",
-        "–",
-    )
+    assert tables(fleet_document(alone()))[ALL_VALUES].rows[0][3:] == ("not compared", "–", "–")
 
 
 def test_ten_times_the_machines_make_neither_the_page_nor_the_terminal_longer() -> None:

@@ -10,7 +10,7 @@ from cmm_uq.app.commands import report
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.verify_again import again
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.results_file import false_alarms
+from cmm_uq.certificate.results.contents import false_alarms
 from cmm_uq.certificate.verify.given import Given
 from tests.conftest import ROOT
 

@@ -19,12 +19,12 @@ from tests.conftest import ROOT
 from tests.recordings import TRAVEL
 
 PACKAGE = ROOT / "cmm_uq"
-DEFINE = {f"physics/{name}.py" for name in (
+DEFINE = {f"machine/physics/{name}.py" for name in (
     "rigid_body", "drives", "thermal", "probing", "reversal", "scales", "warming", "stylus", "scanning",
     "own_errors", "own_states",
 )}  # fmt: skip
 """Modules of the effects' own classes."""
-BEGIN = re.compile(r"jobs/beginning|kinds/\w+/begin")
+BEGIN = re.compile(r"jobs/beginning|artefacts/\w+/begin")
 """Modules of what a new job names for its reader to change, in text that any job.toml may have."""
 
 FAMILIES = {re.sub(r"(_[xyz]{1,2})+$", "", name) for name in EVERY}

@@ -22,7 +22,9 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, 
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.reissue import KEY, Comparison, Difference
+from cmm_uq.certificate.results.reissue import KEY
+from cmm_uq.certificate.results.reissue import ChangedFigure as Difference
+from cmm_uq.certificate.results.reissue import Reissue as Comparison
 from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.job import Job

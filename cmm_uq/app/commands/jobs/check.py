@@ -27,8 +27,8 @@ from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.notebook import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.clauses import Clause, certifies, clauses, missing
-from cmm_uq.certificate.completeness import contradictions
+from cmm_uq.certificate.clauses import Requirement as Clause
+from cmm_uq.certificate.clauses import certifies, clauses, contradictions, missing
 from cmm_uq.jobs.file_names import inside
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import MEASURED
@@ -158,9 +158,12 @@ def _of_a_part(path: Path) -> bool:
 
 def _check_part(folder: Path, path: Path) -> JobCheck:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
-    from cmm_uq.analysis.parts.methods.of_job import lacking
-    from cmm_uq.analysis.parts.setup import refuse_out_of_reach, refuse_unfit
-    from cmm_uq.app.commands.parts.machine import refuse_machine
+    from cmm_uq.app.commands.part_machine import refuse_machine
+    from cmm_uq.app.commands.part_methods import lacking
+    from cmm_uq.app.commands.part_plan import (  # the virtual measurement, which no other job needs
+        refuse_out_of_reach,
+        refuse_unfit,
+    )
 
     wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():

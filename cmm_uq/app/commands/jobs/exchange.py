@@ -15,7 +15,7 @@ from cmm_uq.base.files.limits import DCC_BYTES, TABLE_BYTES
 from cmm_uq.base.output.new_file import refuse_taken, write_new
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.qif_file import qif
+from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.dcc import Certificate, read
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.importing.imported import Imported, imported

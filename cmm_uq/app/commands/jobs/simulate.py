@@ -24,7 +24,7 @@ from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.program import program
+from cmm_uq.certificate.origin import program
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.origin import PLANNED, first_line

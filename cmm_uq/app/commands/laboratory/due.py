@@ -193,9 +193,9 @@ class _Reading:
 def write_due(found: WhatIsDue, folder: Path, *, force: bool = False) -> dict[str, Path]:
     """Write ``due.html`` and ``due.json``, all or none."""
     from cmm_uq.base.output import Owner, staged
-    from cmm_uq.certificate.due_page import due_document
-    from cmm_uq.certificate.html import render_html
-    from cmm_uq.certificate.results_file import as_json
+    from cmm_uq.certificate.pages.due import due_document
+    from cmm_uq.certificate.render.html import render_html
+    from cmm_uq.certificate.results.plain import as_json
 
     with staged(folder, Owner("due", "records"), force=force, expected=FILES) as place:
         page = render_html(due_document(found.items, found.on, found.within)).encode()

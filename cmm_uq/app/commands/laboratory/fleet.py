@@ -109,10 +109,10 @@ class _Columns:
 def write_fleet(found: FleetResult, folder: Path, *, force: bool = False) -> dict[str, Path]:
     """Write ``fleet.html``, ``fleet.json`` and ``fleet.csv``, all or none."""
     from cmm_uq.base.output import Owner, staged
-    from cmm_uq.certificate.fleet.data import fleet_csv, fleet_data
-    from cmm_uq.certificate.fleet.page import fleet_document
-    from cmm_uq.certificate.html import render_html
-    from cmm_uq.certificate.results_file import as_json
+    from cmm_uq.certificate.pages.fleet import fleet_document
+    from cmm_uq.certificate.pages.fleet_summary import fleet_csv, fleet_data
+    from cmm_uq.certificate.render.html import render_html
+    from cmm_uq.certificate.results.plain import as_json
 
     with staged(folder, Owner("fleet", "records"), force=force, expected=FILES) as place:
         page = render_html(fleet_document(found)).encode()

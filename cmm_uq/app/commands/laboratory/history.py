@@ -35,10 +35,9 @@ def history_of(
 def write_history(found: MachineHistory, folder: Path, *, force: bool = False) -> dict[str, Path]:
     """Write ``history.html`` and ``history.json``, all or none."""
     from cmm_uq.base.output import Owner, staged
-    from cmm_uq.certificate.history_page import history_document
-    from cmm_uq.certificate.history_words import history_data
-    from cmm_uq.certificate.html import render_html
-    from cmm_uq.certificate.results_file import as_json
+    from cmm_uq.certificate.pages.history import history_data, history_document
+    from cmm_uq.certificate.render.html import render_html
+    from cmm_uq.certificate.results.plain import as_json
 
     with staged(folder, Owner("history", found.machine.serial), force=force, expected=FILES) as place:
         page = render_html(history_document(found)).encode()

@@ -30,10 +30,9 @@ from cmm_uq.app.commands.plans.words import (
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, names, number, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.plan_picture import gain_plot, placing_pictures
-from cmm_uq.certificate.program import program
-from cmm_uq.certificate.working_page import working_page
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
+from cmm_uq.certificate.origin import program
+from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
 from cmm_uq.maths.inference.linear_model import Unknown
 
 SHOWN = 6

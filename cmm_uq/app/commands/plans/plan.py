@@ -15,10 +15,11 @@ from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.languages.language import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.plugins import naming_package
-from cmm_uq.certificate.in_short import Figure, Summary, Verdict
-from cmm_uq.certificate.lettering import lettered_in
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.results_file import head
+from cmm_uq.certificate.plots.style import lettered_in
+from cmm_uq.certificate.results.contents import head
+from cmm_uq.certificate.wording import Figure, Summary
+from cmm_uq.certificate.wording import Headline as Verdict
 from cmm_uq.jobs.job import Job
 
 TO_FILL_IN = "plan.csv"

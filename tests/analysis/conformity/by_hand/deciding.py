@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.analysis.conformity.as_recorded import LeftOut
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.app.commands.analysis import analyse_job
@@ -28,7 +28,7 @@ def decided(files: Mapping[str, bytes]) -> Statement:
     return statement(
         job.facts.conformity[0], model.artefact,
         {"b89_range_um": Quantity(value, 1.0, (value - 2.0, value + 2.0), unit("µm"))}, "[[conformity]] 1", kind.tested, None,
-        job.circumstances, LeftOut.of(job.points, findings, made),
+        job.circumstances, OutsideReadings.of(job.points, findings, made),
     )  # fmt: skip
 
 

@@ -1,1 +1,0 @@
-"""The page of a fleet of machines: their factors beside each other, and what they have in common."""

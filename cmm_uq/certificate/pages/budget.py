@@ -1,0 +1,104 @@
+"""The uncertainty budget of a measurement model, as a page."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cmm_uq import __version__
+from cmm_uq.base.messages import Text, Verbatim, commas, foreign, say
+from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.plots.residuals import budget_bars
+from cmm_uq.maths.uncertainty.budget import HEADINGS, Budget
+from cmm_uq.maths.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
+
+if TYPE_CHECKING:
+    from cmm_uq.maths.uncertainty.evaluation import Evaluation, Stated
+    from cmm_uq.maths.uncertainty.model_file import ModelFile
+    from cmm_uq.maths.uncertainty.ready_budget import ReadyBudget
+
+_TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
+
+
+def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name: str) -> Document:
+    asked = evaluation.request
+    summary = Table(
+        say("Results"),
+        _columns(SUMMARY),
+        tuple(summary_rows(evaluation)),
+        (
+            say(
+                "Intervals are for a coverage probability of {coverage:g} %; the shortest one where the "
+                "method is Monte Carlo.",
+                coverage=100 * asked.coverage,
+            ),
+        ),
+    )
+    expressions = Facts(tuple(
+        (Verbatim(output), say("{output} = {text}", output=Verbatim(output), text=Verbatim(text)))
+        for output, text in _expressions(file).items()
+    ))  # fmt: skip
+    described = Facts(tuple((foreign(what), foreign(text)) for what, text in file.descriptions.items()))
+    model: tuple[Block, ...] = tuple(facts for facts in (expressions, described) if facts.rows)
+    sections = [Section(say("Measurement model"), model), Section(say("Results"), (summary,))]
+    sections += [
+        Section(say("Budget of {output}", output=Verbatim(output)), _budget(evaluation, output, stated))
+        for output, stated in evaluation.stated.items()
+    ]
+    return Document(
+        title=say("Uncertainty budget"),
+        number=Verbatim(file.title),
+        subject=say("Evaluated {how} from {name}", how=file.how, name=Verbatim(name)),
+        issuer=(),
+        particulars=(Facts(((say("File"), Verbatim(name)), (say("SHA-256"), Verbatim(file.sha256)))),),
+        warnings=(),
+        sections=tuple(sections),
+        statements=(),
+        signatures=(),
+        attachments=(Verbatim(name), Verbatim("results.json")),
+        produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=asked.seed),
+        end=say("End of budget"),
+    )
+
+
+def _expressions(file: ModelFile | ReadyBudget) -> dict[str, str]:
+    return {output: expression.text for output, expression in file.expressions.items()}
+
+
+def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block, ...]:
+    budget = stated.budget
+    blocks: list[Block] = [Paragraph(_sentence(stated.reason), tone="note")]
+    if budget.statement:
+        blocks.append(Paragraph(budget.statement, tone="note"))
+    blocks += budget_blocks(Verbatim(output), budget)
+    rows = tuple(comparison_rows(evaluation, output))
+    if len(rows) > 1:
+        blocks.append(
+            Table(
+                say("The methods beside each other for {output}", output=Verbatim(output)), _columns(COMPARISON), rows
+            )
+        )
+    return (*blocks, Paragraph(statement(evaluation, output)))
+
+
+def _sentence(reason: Text) -> Text:
+    return say("{reason:capital}", reason=reason) if reason.endswith(".") else say("{reason:capital}.", reason=reason)
+
+
+def budget_blocks(measurand: Text, budget: Budget) -> list[Block]:
+    """A budget as a table, and as a picture when it has more than one line."""
+    table = Table(say("Contributions to {measurand}", measurand=measurand), _columns(HEADINGS), tuple(budget.as_text()))
+    shares = [(line.name, share) for depth, line, share in budget.flat() if depth == 0 and share]
+    if len(shares) < 2:
+        return [table]
+    told = commas(say("{name} {share:.0f} %", name=name, share=100 * share) for name, share in shares)
+    picture = budget_bars(
+        [name for name, _ in shares],
+        [share for _, share in shares],
+        caption=say("Share of each contribution in the variance of {measurand}.", measurand=measurand),
+        alternative=say("Shares: {shares}.", shares=told),
+    )
+    return [table, picture]
+
+
+def _columns(headings: tuple[Text, ...]) -> tuple[Column, ...]:
+    return tuple(Column(heading, numeric=heading not in _TEXT) for heading in headings)

@@ -1,0 +1,282 @@
+"""The page of a fleet: of however many machines, models and places those that matter."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Sequence
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, number, plural, say
+from cmm_uq.base.points import Ints
+from cmm_uq.base.units import unit_as_written
+from cmm_uq.certificate.document import Block, Column, Document, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.pages.fleet_summary import (
+    called,
+    counted,
+    date_of,
+    digits,
+    fleet_overview,
+    fleet_warnings,
+    group_words,
+    machines_of,
+    per_year,
+    signed_rate,
+    usual_rate,
+)
+from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, house_style, new_figure
+from cmm_uq.laboratory.due.drift import PARTS
+from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetValue, HyperParameter, UsualRate
+
+
+def fleet_plot(
+    rows: Sequence[UsualRate], names: Sequence[Text], *, axis: Text, caption: Text, alternative: Text
+) -> Plot:
+    rate, low, high = (np.array([getattr(row, name) for row in rows]) for name in ("rate", "lower", "upper"))
+    at = np.arange(len(rows), dtype=np.float64)
+    with house_style():
+        height = 14 + 5.5 * len(rows)
+        figure = new_figure(height)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height)
+        ax.axvline(0, color=INK, lw=0.7, zorder=1)
+        gaps = np.full(len(rows), np.nan)
+        ax.plot(np.column_stack([low, high, gaps]).ravel(), np.column_stack([at, at, gaps]).ravel(), lw=1.6, color=ACCENT,
+                solid_capstyle="butt", zorder=2)  # fmt: skip
+        dots(ax, rate, at, 4.0, ACCENT)
+        ax.set_yticks(at, names)
+        ax.set(xlabel=axis)
+        ax.invert_yaxis()
+        ax.tick_params(left=False)
+        ax.spines["left"].set_visible(False)
+        return drawn(figure, caption, alternative)
+
+
+MOST_GROUPS = 12
+"""Models and places of a value, those with most machines."""
+
+MOST_MACHINES = 15
+"""Machines of a value that do not belong, that are beyond their limit, and that cross it soonest: so many each."""
+
+SPREADS: dict[str, Text] = {
+    "rate_sd": say("Rates of machines of one model and place differ by"),
+    "model_sd": say("Rates of models differ by"),
+    "place_sd": say("Rates of places differ by"),
+    "walk": say("Wandering adds in a year"),
+    "first_sd": say("Errors at the first certificate"),
+    "as_left_sd": say("Errors after an adjustment"),
+    "steps_per_year": say("Steps in a year"),
+    "step_sd": say("Size of a step"),
+}
+
+
+def all_values(found: FleetResult) -> Table:
+    """A row a value: what is usual, and how many machines matter."""
+    until = found.in_a_year
+    columns = (
+        Column(say("Value"), numeric=False), Column(say("Machines")), Column(say("Average drift, U (95 %)"), numeric=False),
+        Column(say("Unlike the fleet")), Column(say("Beyond the limit")), Column(say("Beyond within a year")),
+    )  # fmt: skip
+    rows = tuple(
+        (
+            called(of), number(len(of.members)), usual_rate(of),
+            number(int((~of.belongs).sum())) if of.compared else say("not compared"), *_due(of, until),
+        )
+        for of in found.values
+    )  # fmt: skip
+    note = say(
+        "Beyond: at a machine's last certificate, and by {day}, a year after the newest of all, each with a probability of "
+        "50 % or more.", day=date_of(until),
+    )  # fmt: skip
+    return Table(say("What is usual, and how many machines matter"), columns, rows, (note,))
+
+
+def _due(of: FleetValue, until: float) -> tuple[Text, Text]:
+    if of.fleet.estimates.crossing is None:
+        return DASH, DASH
+    return number(int(of.beyond.sum())), number(int(of.crosses_by(until).sum()))
+
+
+def groups_shown(of: FleetValue) -> tuple[UsualRate, ...]:
+    """The average machine, and the models and places with most machines, in their order."""
+    average, *groups = of.fleet.usual
+    most = sorted(groups, key=lambda each: -each.machines)[:MOST_GROUPS]
+    return average, *(each for each in groups if each in most)
+
+
+def usual_table(of: FleetValue) -> Table:
+    spec, shown = digits(of), groups_shown(of)
+    columns = (
+        Column(say("Machines"), numeric=False), Column(say("Number")), Column(say("Rate"), per_year(of)),
+        Column(say("U (95 %)"), per_year(of)),
+    )  # fmt: skip
+    rows = tuple(
+        (group_words(each), number(each.machines), signed_rate(each.rate, spec), number(1.96 * each.u, spec))
+        for each in shown
+    )
+    notes: list[Text] = [say("A model at the fleet's average place; a place for the fleet's average machine.")]
+    left = len(of.fleet.usual) - len(shown)
+    if left:
+        notes.append(plural(
+            left, one=say("One more model or place has fewer machines; fleet.json has all."),
+            many=say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
+        ))  # fmt: skip
+    return Table(say("Usual drift"), columns, rows, tuple(notes))
+
+
+def outsiders(of: FleetValue) -> Block:
+    """Machines that do not belong, the clearest first; or that there are none, or that nobody can know."""
+    if not of.compared:
+        return Paragraph(say("Not enough history to compare machines: two at least need certificates of two days."))
+    which = np.flatnonzero(~of.belongs)
+    if not len(which):
+        return Paragraph(say("No machine drifts unlike the others."))
+    e, spec = of.fleet.estimates, digits(of)
+    shown = which[np.argsort(e.p[which], kind="stable")][:MOST_MACHINES]
+    columns = (*_own(of), Column(say("Expected"), per_year(of)), Column(say("p")))
+    rows = tuple((*_own_row(of, i), signed_rate(e.expected[i], spec), number(e.p[i], ".2g")) for i in map(int, shown))
+    note = say(
+        "Compared with what all other machines let expect, before its own certificates; of all machines and values named so, "
+        "about {part:.0f} % are by chance (Benjamini and Hochberg).", part=100 * FALSE_DISCOVERIES,
+    )  # fmt: skip
+    left = () if len(shown) == len(which) else (_left_out(len(shown), len(which)),)
+    return Table(say("Machines that do not belong"), columns, rows, (note, *left))
+
+
+def soonest(of: FleetValue) -> Table:
+    """Machines beyond their limit, and those that cross it soonest; where none does, those that drift fastest."""
+    N, shown = len(of.members), _soonest(of)
+    columns = (
+        *_own(of), Column(say("Limit crossed"), numeric=False), Column(say("90 % from"), numeric=False),
+        Column(say("90 % to"), numeric=False),
+    )  # fmt: skip
+    notes: list[Text] = [
+        say("Rate with the fleet as prior: little history of its own is filled up from models and places like it.")
+    ]
+    caption: Text = say("Machines")
+    if len(shown) < N:
+        crossing = np.isfinite(of.median[shown]).all()
+        caption = (
+            say("Machines beyond their limit, and those that cross it soonest")
+            if crossing
+            else say("Machines that drift fastest")
+        )
+        notes.append(_left_out(len(shown), N))
+    return Table(caption, columns, tuple((*_own_row(of, i), *_crossed(of, i)) for i in map(int, shown)), tuple(notes))
+
+
+def _soonest(of: FleetValue) -> Ints:
+    """Rows of the machines, those farthest beyond their limit first."""
+    crossing = of.fleet.estimates.crossing
+    limit = np.array([member.limit or np.inf for member in of.members])
+    excess = np.zeros(len(limit)) if crossing is None else np.abs(crossing.level) / limit
+    when = np.where(of.beyond, -excess, of.crosses)
+    order = np.lexsort((-np.abs(of.fleet.estimates.rate), when, ~of.beyond))
+    beyond, ahead = order[of.beyond[order]], order[~of.beyond[order]]
+    if len(order) > MOST_MACHINES and np.isfinite(of.median).any():
+        ahead = ahead[np.isfinite(of.median[ahead])]
+    return np.concatenate([beyond[:MOST_MACHINES], ahead[:MOST_MACHINES]])
+
+
+def _left_out(shown: int, total: int) -> Text:
+    return say("{count} of {total} machines; fleet.json and fleet.csv have all.", count=shown, total=total)
+
+
+def _own(of: FleetValue) -> tuple[Column, ...]:
+    return (
+        Column(say("Machine"), numeric=False), Column(say("Model"), numeric=False), Column(say("Place"), numeric=False),
+        Column(say("Certificates")), Column(say("Rate, U (95 %)"), per_year(of)),
+    )  # fmt: skip
+
+
+def _own_row(of: FleetValue, i: int) -> tuple[Text, ...]:
+    e, member, spec = of.fleet.estimates, of.members[i], digits(of)
+    return (
+        Verbatim(member.machine), Verbatim(member.model) if member.model else DASH,
+        Verbatim(member.place) if member.place else DASH, number(len(member.history.day)),
+        say("{rate} ± {U}", rate=signed_rate(e.rate[i], spec), U=number(1.96 * e.u_rate[i], spec)),
+    )  # fmt: skip
+
+
+def _crossed(of: FleetValue, i: int) -> tuple[Text, Text, Text]:
+    """Median day, and the ends of the interval."""
+    crossing = of.fleet.estimates.crossing
+    if crossing is None or of.members[i].limit is None:
+        return DASH, DASH, DASH
+    if of.beyond[i]:
+        return say("already"), DASH, DASH
+    one = crossing.one(i)
+    low, middle, high = (_day(one.quantile(part)) for part in PARTS)
+    return middle, low, high
+
+
+def _day(when: dt.date | None) -> Text:
+    return say("not in 40 years") if when is None else day(when)
+
+
+def spreads_table(of: FleetValue) -> Table:
+    columns = (Column(say("Quantity"), numeric=False), Column(say("Median")), Column(say("95 % interval"), numeric=False),
+               Column(say("Unit"), numeric=False))  # fmt: skip
+    return Table(say("How machines differ"), columns, tuple(_spread(of, each) for each in of.fleet.spreads))
+
+
+def _spread(of: FleetValue, each: HyperParameter) -> tuple[Text, ...]:
+    own = unit_as_written(of.unit)
+    units = {"rate_sd": per_year(of), "model_sd": per_year(of), "place_sd": per_year(of), "steps_per_year": NOTHING}
+    return (
+        SPREADS[each.name], number(each.median, ".2g"),
+        say("{low} to {high}", low=number(each.lower, ".2g"), high=number(each.upper, ".2g")), units.get(each.name, own),
+    )  # fmt: skip
+
+
+def fleet_document(found: FleetResult) -> Document:
+    """The page of a fleet, as of its newest certificate."""
+    return Document(
+        title=say("Drift of a fleet"),
+        number=date_of(found.newest),
+        subject=say(
+            "{machines}, {values}",
+            machines=counted(len(machines_of(found))),
+            values=plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values))),
+        ),
+        issuer=(),
+        particulars=(),
+        warnings=fleet_warnings(found),
+        sections=(
+            Section(say("All values"), (all_values(found),)),
+            *(Section(called(of), _blocks(of)) for of in found.values),
+        ),
+        statements=(),
+        signatures=(),
+        attachments=(Verbatim("fleet.json"), Verbatim("fleet.csv")),
+        produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=found.seed),
+        end=say("End of page"),
+        overview=fleet_overview(found),
+    )
+
+
+def _blocks(of: FleetValue) -> tuple[Block, ...]:
+    shown = groups_shown(of)
+    picture = fleet_plot(
+        shown, [group_words(each) for each in shown], axis=say("Rate in {unit}, with 95 % interval", unit=per_year(of)),
+        caption=say("Usual drift of models and places."),
+        alternative=say("Average machine: {rate}.", rate=usual_rate(of)),
+    )  # fmt: skip
+    return (
+        usual_table(of),
+        picture,
+        outsiders(of),
+        soonest(of),
+        spreads_table(of),
+        Paragraph(_sampled(of), tone="note"),
+    )
+
+
+def _sampled(of: FleetValue) -> Text:
+    chains = of.fleet.chains
+    return say(
+        "Hyper-parameters sampled by {sampler} from {machines}: R-hat at most {rhat}, at least {ess} effective samples, "
+        "{steps} steps.", sampler=Verbatim(chains.sampler), machines=counted(of.fleet.learnt_from),
+        rhat=number(chains.rhat_max, ".3f"), ess=number(chains.ess_min, ".0f"), steps=chains.steps,
+    )  # fmt: skip

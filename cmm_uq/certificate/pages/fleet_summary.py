@@ -1,0 +1,303 @@
+"""A fleet in words and as data: which machines matter, and how sure that is.
+
+A fleet for other programs: ``fleet.json``, whose ``prior`` is all that is needed to judge a further machine by it.
+
+``fleet.csv`` has its machines alone, for a spreadsheet.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import io
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cmm_uq import __version__
+from cmm_uq.base.files.cells import FORMULA
+from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, commas, day, number, plural, say, signed
+from cmm_uq.base.units import unit_as_written
+from cmm_uq.certificate.document import Overview, Standing
+from cmm_uq.certificate.wording import Headline as Verdict
+from cmm_uq.certificate.wording import Summary
+from cmm_uq.laboratory.due.fleet import FleetResult, FleetValue, UsualRate, seen_again
+
+MOST_SERIALS = 12
+"""Machines in a line."""
+
+
+def counted(count: int) -> Text:
+    return plural(count, one=say("one machine"), many=say("{count} machines", count=count))
+
+
+def serials(machines: Iterable[str]) -> Text:
+    """Machines by name, the first of very many; nothing of none."""
+    named = sorted(set(machines))
+    shown = commas([Verbatim(each) for each in named[:MOST_SERIALS]])
+    left = len(named) - MOST_SERIALS
+    return say("{shown} and {count} more", shown=shown, count=left) if left > 0 else shown if named else NOTHING
+
+
+def date_of(ordinal: float) -> Text:
+    """A day."""
+    return day(dt.date.fromordinal(int(ordinal)))
+
+
+def called(of: FleetValue) -> Text:
+    return say("{quantity} ({name})", quantity=Verbatim(of.quantity), name=Verbatim(of.name))
+
+
+def group_words(each: UsualRate) -> Text:
+    if each.kind == "fleet":
+        return say("Average machine")
+    name = Verbatim(each.name) if each.name else say("not stated")
+    return say("Model {name}", name=name) if each.kind == "model" else say("Place {name}", name=name)
+
+
+def per_year(of: FleetValue) -> Text:
+    return say("{unit}/year", unit=unit_as_written(of.unit) or Verbatim("1"))
+
+
+def digits(of: FleetValue) -> str:
+    """Format of rates: two digits of the usual standard uncertainty of a machine's."""
+    u = float(np.median(of.fleet.estimates.u_rate))
+    return f".{int(np.clip(1 - np.floor(np.log10(u)), 0, 9))}f" if u > 0 else ".3g"
+
+
+def signed_rate(rate: float, spec: str) -> Number:
+    text = format(rate, spec)
+    return number(0.0, spec) if float(text) == 0 else signed(rate, spec)
+
+
+def rate_words(rate: float, U: float, of: FleetValue) -> Text:
+    spec = digits(of)
+    return say("{rate} ± {U} {unit}", rate=signed_rate(rate, spec), U=number(U, spec), unit=per_year(of))
+
+
+def usual_rate(of: FleetValue) -> Text:
+    average = of.fleet.usual[0]
+    return rate_words(average.rate, 1.96 * average.u, of)
+
+
+MOST_VERDICTS = 6
+"""Machines and values that a terminal names as unlike their fleet."""
+
+
+def fleet_overview(found: FleetResult) -> Overview:
+    """What comes before everything else on the page."""
+    word, standing = _verdict(found)
+    rows = (
+        (say("Compared"), _compared(found)),
+        (say("Unlike the fleet"), serials(_unlike(found))),
+        (say("Beyond a limit"), serials(_beyond(found))),
+        (say("Beyond by {day}", day=date_of(found.in_a_year)), serials(_soon(found))),
+    )
+    return Overview(word, standing, tuple(row for row in rows if row[1]))
+
+
+def fleet_summary(found: FleetResult) -> Summary:
+    """The same for a terminal; models and places are its details."""
+    word, standing = _verdict(found)
+    outsiders = sorted(found.outsiders, key=lambda each: float(each[0].fleet.estimates.p[each[1]]))
+    verdicts = tuple(
+        Verdict("DIFFERS", "open", say("machine {serial}", serial=Verbatim(of.members[i].machine)), (_differs(of, i),))
+        for of, i in outsiders[:MOST_VERDICTS]
+    )
+    none = Verdict("ALIKE" if found.compared else "UNKNOWN", standing, word, (_compared(found),))
+    left = len(outsiders) - MOST_VERDICTS
+    more = say("{count} more values of machines differ, less clearly: fleet.json has all", count=left)
+    return Summary(
+        subject=counted(len(machines_of(found))), verdicts=verdicts or (none,),
+        figures=tuple((_group(of), usual_rate(of), _counts(of, found.in_a_year)) for of in found.values),
+        remarks=(*((more,) if left > 0 else ()), *_due(found)),
+        details=tuple(
+            (say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(each)),
+             rate_words(each.rate, 1.96 * each.u, of), counted(each.machines))
+            for of in found.values for each in of.fleet.usual[1:]
+        ),
+        warnings=fleet_warnings(found),
+    )  # fmt: skip
+
+
+def machines_of(found: FleetResult) -> set[str]:
+    return {member.machine for of in found.values for member in of.members}
+
+
+def _named(of: FleetValue, which: NDArray[np.bool_]) -> Iterable[str]:
+    return (of.members[i].machine for i in np.flatnonzero(which))
+
+
+def _unlike(found: FleetResult) -> set[str]:
+    return {name for of in found.values for name in _named(of, ~of.belongs)}
+
+
+def _beyond(found: FleetResult) -> set[str]:
+    return {name for of in found.values for name in _named(of, of.beyond)}
+
+
+def _soon(found: FleetResult) -> set[str]:
+    """That are not beyond a limit yet, and will be beyond one within a year."""
+    crossing = {name for of in found.values for name in _named(of, of.crosses_by(found.in_a_year))}
+    return crossing - _beyond(found)
+
+
+def _verdict(found: FleetResult) -> tuple[Text, Standing]:
+    """Good only where nothing is left to do: a machine that drifts as all do may be beyond its limit with all."""
+    if not found.compared:
+        return say("Not enough history to compare machines"), "unknown"
+    unlike = len(_unlike(found))
+    if not unlike:
+        due = _beyond(found) or _soon(found)
+        return say("No machine drifts unlike its fleet"), "open" if due else "good"
+    told = plural(
+        unlike, one=say("One machine drifts unlike its fleet"),
+        many=say("{count} machines drift unlike their fleet", count=unlike),
+    )  # fmt: skip
+    return told, "open"
+
+
+def _compared(found: FleetResult) -> Text:
+    again = {member.machine for of in found.values for member in of.members if seen_again(member)}
+    return plural(
+        len(again), one=say("one machine of {total} has certificates of two days", total=len(machines_of(found))),
+        many=say("{count} machines of {total} have certificates of two days", count=len(again),
+                 total=len(machines_of(found))),
+    )  # fmt: skip
+
+
+def _due(found: FleetResult) -> tuple[Text, ...]:
+    beyond, soon = len(_beyond(found)), len(_soon(found))
+    are = plural(
+        beyond, one=say("One machine is beyond a limit"), many=say("{count} machines are beyond a limit", count=beyond)
+    )
+    will = say("{machines:capital} will probably be beyond a limit by {day}", machines=counted(soon),
+               day=date_of(found.in_a_year))  # fmt: skip
+    return (*((are,) if beyond else ()), *((will,) if soon else ()))
+
+
+def _group(of: FleetValue) -> Text:
+    return say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(of.fleet.usual[0]))
+
+
+def _counts(of: FleetValue, until: float) -> Text:
+    unlike, beyond, soon = (int(which.sum()) for which in (~of.belongs, of.beyond, of.crosses_by(until)))
+    parts = [
+        counted(len(of.members)),
+        *([say("{count} unlike the fleet", count=unlike)] if unlike else []),
+        *([say("{count} beyond the limit", count=beyond)] if beyond else []),
+        *([say("{count} within a year", count=soon)] if soon else []),
+    ]
+    return commas(parts)
+
+
+def _differs(of: FleetValue, i: int) -> Text:
+    e = of.fleet.estimates
+    return say(
+        "{quantity}: {rate}, where the others let expect {expected} (p = {p})", quantity=Verbatim(of.quantity),
+        rate=rate_words(e.rate[i], 1.96 * e.u_rate[i], of), expected=rate_words(e.expected[i], 1.96 * e.u_expected[i], of),
+        p=number(e.p[i], ".1g"),
+    )  # fmt: skip
+
+
+def fleet_warnings(found: FleetResult) -> tuple[Text, ...]:
+    """What the reader must know before using a figure."""
+    return tuple(text for of in found.values for text in _warnings(of))
+
+
+def _warnings(of: FleetValue) -> list[Text]:
+    told: list[Text] = []
+    if not of.fleet.chains.converged:
+        told.append(say("{value}: the sampling did not converge (R-hat {rhat}); take its figures as rough",
+                        value=called(of), rhat=number(of.fleet.chains.rhat_max, ".3f")))  # fmt: skip
+    if of.left_out:
+        told.append(plural(
+            of.left_out,
+            one=say("{value}: one certificate states no uncertainty and cannot be weighed", value=called(of)),
+            many=say("{value}: {count} certificates state no uncertainty and cannot be weighed", value=called(of),
+                     count=of.left_out),
+        ))  # fmt: skip
+    if len(of.members) == 1:
+        told.append(say("{value}: one machine is no fleet; what machines have in common is assumed, not learnt",
+                        value=called(of)))  # fmt: skip
+    again = sum(seen_again(member) for member in of.members)
+    if not again:
+        told.append(say("{value}: no machine has certificates of two days; drift is assumed, not learnt",
+                        value=called(of)))  # fmt: skip
+    elif again == 1 < len(of.members):
+        told.append(say("{value}: only one machine has certificates of two days; no other shows a drift to compare it with",
+                        value=called(of)))  # fmt: skip
+    return told
+
+
+SCHEMA = "cmm-uq/fleet/1"
+
+
+def fleet_data(found: FleetResult) -> dict[str, Any]:
+    """All that was found, rates per year in the unit of the value."""
+    return {
+        "schema": SCHEMA, "software": {"name": "cmm-uq", "version": __version__}, "seed": found.seed,
+        "values": [_value(each) for each in found.values],
+    }  # fmt: skip
+
+
+def _value(of: FleetValue) -> dict[str, Any]:
+    fleet, chains = of.fleet, of.fleet.chains
+    return {
+        "name": of.name, "quantity": of.quantity, "unit": of.unit, "machines": _machines(of),
+        "certificates_left_out": of.left_out, "compared": of.compared,
+        "usual": [
+            {"kind": each.kind, "name": each.name, "machines": each.machines, "rate": each.rate, "u": each.u,
+             "lower": each.lower, "upper": each.upper}
+            for each in fleet.usual
+        ],
+        "spreads": [
+            {"name": each.name, "median": each.median, "lower": each.lower, "upper": each.upper} for each in fleet.spreads
+        ],
+        "convergence": {
+            "converged": chains.converged, "rhat_max": chains.rhat_max, "ess_min": chains.ess_min, "steps": chains.steps,
+            "sampler": chains.sampler, "machines": fleet.learnt_from,
+        },
+        "prior": fleet.data(),
+    }  # fmt: skip
+
+
+def _machines(of: FleetValue) -> list[dict[str, Any]]:
+    e = of.fleet.estimates
+    return [
+        {
+            "machine": member.machine, "model": member.model, "place": member.place,
+            "certificates": len(member.history.day), "rate": float(e.rate[i]), "u": float(e.u_rate[i]),
+            "expected": float(e.expected[i]), "u_expected": float(e.u_expected[i]), "p": float(e.p[i]),
+            "belongs": bool(of.belongs[i]), "limit": member.limit,
+            "crossing": None if e.crossing is None or member.limit is None else e.crossing.one(i).data(),
+        }
+        for i, member in enumerate(of.members)
+    ]  # fmt: skip
+
+
+def fleet_csv(data: Mapping[str, Any]) -> bytes:
+    """A row a machine and value, of what :func:`fleet_data` gave; rates per year in the unit of the row.
+
+    A name that a spreadsheet would compute has an apostrophe before it, as a spreadsheet marks text.
+    """
+    rows = [
+        {"value": of["name"], "quantity": of["quantity"], "unit": of["unit"], **one} | (one["crossing"] or {})
+        for of in data["values"]
+        for one in of["machines"]
+    ]
+    text = io.StringIO()
+    columns = [*(name for name in rows[0] if name not in ("crossing", *_CROSSING)), *_CROSSING]
+    writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: _cell(cell) for name, cell in row.items()} for row in rows)
+    return text.getvalue().encode()
+
+
+_CROSSING = ("last", "day_5", "day_50", "day_95", "already", "within_a_year")
+
+
+def _cell(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell

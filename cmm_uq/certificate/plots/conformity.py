@@ -1,0 +1,140 @@
+"""Errors against their limits, and parameters against their tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.messages import NOTHING, Text, say, semicolons
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    BAND,
+    DIVERGING,
+    INK,
+    MUTED,
+    TINY,
+    bars,
+    dots,
+    drawn,
+    finite,
+    house_style,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def trumpet(
+    length_mm: ArrayLike, error_um: ArrayLike, *, limit_um: ArrayLike, acceptance_um: Sequence[float | None],
+    expanded_um: ArrayLike, outside: ArrayLike, quantity: Text, caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
+    """Errors against their limits on both sides of zero.
+
+    ``length_mm, error_um``: (m,) of each length; ``limit_um``: (m,) its limit; ``acceptance_um``: (m,) largest size
+    that is accepted; ``None`` where none is; ``expanded_um``: (m,) expanded uncertainty of each error, k = 2;
+    ``outside``: (m,) errors to be marked: those that are not accepted.
+    """
+    x = finite("length_mm", length_mm, (None,))
+    y, top, U = (finite(name, values, x.shape) for name, values in
+                 (("error_um", error_um), ("limit_um", limit_um), ("expanded_um", expanded_um)))  # fmt: skip
+    accepted = np.array([np.nan if value is None else value for value in acceptance_um], dtype=np.float64)
+    marked = np.asarray(outside, dtype=bool)
+    size = float(np.clip(45.0 / len(x) ** 0.6, 1.6, 4.0))
+    with house_style():
+        figure = new_figure(76)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.082, right=0.985, bottom=0.145, top=0.91)
+        _limits(ax, x, top, accepted)
+        ax.axhline(0, color=INK, lw=0.7, zorder=1)
+        bars(ax, x, y - U, y + U, max(0.28 * size, 0.6), MUTED)
+        dots(ax, x[~marked], y[~marked], size, ACCENT)
+        ax.plot(x[marked], y[marked], ls="", marker="x", ms=size + 2.5, mec=DIVERGING[-1], mew=1.3, zorder=4)
+        ax.set(xlabel=say("Length / mm"), ylabel=quantity, xlim=(0.0, 1.04 * float(x.max())))
+        ax.margins(y=0.08)
+        ax.grid(axis="y")
+        figure.text(0.985, 0.975, _legend(accepted, U, marked=bool(marked.any())), ha="right", va="top",
+                    fontsize=TINY, color=MUTED)  # fmt: skip
+        return drawn(figure, caption, alternative)
+
+
+def _limits(ax: Axes, x: Floats, top: Floats, accepted: Floats) -> None:
+    """±MPE as lines, what lies between it and the acceptance limit as bands; level where only one length is there."""
+    length, first = np.unique(x, return_index=True)
+    limit, inner = top[first], accepted[first]
+    if len(length) == 1:
+        length, limit, inner = np.array([0.0, length[0]]), np.repeat(limit, 2), np.repeat(inner, 2)
+    for side in (1.0, -1.0):
+        known = np.isfinite(inner) & (inner < limit - 1e-9)
+        ax.fill_between(length, side * np.where(known, inner, limit), side * limit, color=BAND, lw=0, zorder=0)
+        ax.plot(length, side * limit, color=INK, lw=1.1, zorder=2)
+        ax.plot(length, side * np.where(known, inner, np.nan), color=INK, lw=0.7, ls=(0, (4, 3)), zorder=2)
+
+
+def _legend(accepted: Floats, expanded: Floats, *, marked: bool) -> Text:
+    parts = [
+        say("lines: ±MPE"),
+        say("dashed: limits of acceptance, with the guard band between") if np.isfinite(accepted).any() else NOTHING,
+        say("bars: U (k = 2)") if expanded.any() else NOTHING,
+        say("crosses: not accepted") if marked else NOTHING,
+    ]
+    return semicolons([part for part in parts if part])
+
+
+_FARTHEST = 3.0
+"""Times the tolerance that the picture reaches; what lies beyond is drawn at its edge with its figure."""
+
+_MANY = 8
+"""Rows beyond which they stand closer together."""
+
+
+def tolerance_plot(
+    names: Sequence[Text], ratio: ArrayLike, low: ArrayLike, high: ArrayLike, *, caption: Text, alternative: Text
+) -> Plot:
+    """Parameters over their tolerances, one row each: inside the band is inside the tolerance.
+
+    ``ratio``: (n,) estimate over tolerance, signed; ``low, high``: (n,) ends of its coverage interval over the
+    tolerance.
+    """
+    value = finite("ratio", ratio, (len(names),))
+    ends = finite("low", low, value.shape), finite("high", high, value.shape)
+    rows = np.arange(len(value), dtype=np.float64)
+    reach = float(np.clip(1.15 * max(np.abs(ends[0]).max(), np.abs(ends[1]).max()), 1.3, _FARTHEST))
+    out = np.minimum(np.abs(ends[0]), np.abs(ends[1])) > 1
+    out &= np.sign(ends[0]) == np.sign(ends[1])
+    with house_style():
+        height = 14 + (5.5 if len(value) <= _MANY else 4.5) * len(value)
+        figure = new_figure(height)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height)
+        ax.axvspan(-1, 1, color=BAND, lw=0, zorder=0)
+        ax.axvline(0, color=INK, lw=0.7, zorder=1)
+        for chosen, colour in ((~out, ACCENT), (out, DIVERGING[-1])):
+            inside = np.clip(value[chosen], -reach, reach)
+            gaps = np.full(int(chosen.sum()), np.nan)
+            across = np.column_stack([*(np.clip(end[chosen], -reach, reach) for end in ends), gaps]).ravel()
+            up = np.column_stack([rows[chosen], rows[chosen], gaps]).ravel()
+            ax.plot(across, up, lw=1.6, color=colour, solid_capstyle="butt", zorder=2)
+            if colour == ACCENT:
+                dots(ax, inside, rows[chosen], 4.0, colour)
+            else:
+                ax.plot(inside, rows[chosen], ls="", marker="x", ms=6.0, mec=colour, mew=1.6, zorder=4)
+        for row in np.flatnonzero(np.abs(value) > reach):
+            side = np.sign(value[row])
+            text = f"{value[row]:+.1f}".replace("-", "−")
+            ax.annotate(text, (side * reach, row), (-6 * side, 4), textcoords="offset points",
+                        ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
+        ax.set_yticks(rows, names)
+        ax.set(
+            xlim=(-1.02 * reach, 1.02 * reach),
+            xlabel=say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)"),
+        )
+        ax.invert_yaxis()
+        ax.tick_params(left=False)
+        ax.spines["left"].set_visible(False)
+        return drawn(figure, caption, alternative)

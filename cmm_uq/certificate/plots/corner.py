@@ -1,0 +1,273 @@
+"""The posterior distribution of several parameters: each density, and each pair.
+
+The posterior as a corner: every parameter's density, and how each pair goes together.
+
+All panels live in one set of axes and every line style is one path: an eight-parameter corner is a few dozen vector
+objects, where a grid of axes with points would be thousands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots.labels import width_mm
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    INK,
+    MUTED,
+    SMALL,
+    TINY,
+    WIDTH_MM,
+    drawn,
+    finite,
+    house_style,
+    lettered,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.path import Path
+
+READABLE = 12
+"""Most parameters that one corner shows."""
+
+_BINS = 36
+_MASSES = (0.95, 0.5)  # probability inside the outer and the inner contour
+_SCALE = 0.9  # part of a panel's place that it fills
+_HEADROOM = 0.92  # part of a panel's height that its density fills
+_LEFT, _BELOW, _ABOVE = 14.0, 11.0, 4.5  # least room for figures and names, mm
+_HEIGHT = 80.0  # of all panels, mm, as long as none is smaller than 10 mm: text and tables stand on the same page
+_SLANT = 40  # of the figures under the panels, degrees
+
+
+def corner_plot(
+    samples: ArrayLike,
+    names: Sequence[Text],
+    *,
+    units: Sequence[Text] | None = None,
+    estimates: ArrayLike | None = None,
+    intervals95: ArrayLike | None = None,
+    priors: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Marginal and pairwise posterior densities.
+
+    ``samples``: (n, d) draws. Beyond twelve parameters the twelve with the strongest correlations are shown, and the;
+    ``names, units``: (d,) words over the densities; ``estimates``: (d,) drawn as lines and crosses; the medians where
+    left out; ``intervals95``: (d, 2) shaded; between the 2.5 % and 97.5 % quantiles where left out; ``priors``: by
+    parameter, (x, density) of its prior, dashed in grey.
+    """
+    draws = finite("samples", samples, (None, len(names)))
+    if len(draws) < 2 or not len(names):
+        raise CmmUqError("the picture of a posterior needs at least two draws of one parameter")
+    chosen = _most_correlated(draws)
+    if len(chosen) < len(names):
+        caption = say(
+            "{caption} The {count} of {total} parameters that are correlated most are shown.",
+            caption=caption,
+            count=len(chosen),
+            total=len(names),
+        )
+    kept = draws[:, chosen]
+    ranges = _ranges(kept)
+    middle = np.median(draws, axis=0) if estimates is None else finite("estimates", estimates, (len(names),))
+    between = (
+        np.quantile(draws, [0.025, 0.975], axis=0).T
+        if intervals95 is None
+        else finite("intervals95", intervals95, (len(names), 2))
+    )
+    with house_style():
+        panels = _Panels(ranges, kept)
+        panels.densities(middle[chosen], between[chosen])
+        for k, parameter in enumerate(chosen):
+            if priors and parameter in priors:
+                panels.prior(k, *priors[parameter])
+        panels.pairs(middle[chosen])
+        panels.frames()
+        panels.words([_label(names[c], units[c] if units else NOTHING) for c in chosen])
+        return drawn(panels.figure, caption, alternative)
+
+
+def _label(name: Text, unit: Text) -> Text:
+    return say("{name} / {unit}", name=name, unit=unit) if unit else name
+
+
+def _most_correlated(draws: Floats) -> NDArray[np.intp]:
+    dimension = draws.shape[1]
+    if dimension <= READABLE:
+        return np.arange(dimension)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        correlation = np.nan_to_num(np.abs(np.corrcoef(draws.T)))
+    np.fill_diagonal(correlation, 0.0)
+    return np.sort(np.argsort(-correlation.max(axis=0), kind="stable")[:READABLE])
+
+
+def _ranges(draws: Floats) -> Floats:
+    """(d, 2) from the 0.15 to the 99.85 % quantile, widened by a sixteenth; never empty."""
+    low, high = np.quantile(draws, [0.0015, 0.9985], axis=0)
+    room = np.where(high > low, (high - low) / 16, np.maximum(np.abs(high), 1.0) * 1e-6)
+    return np.column_stack([low - room, high + room]).astype(np.float64)
+
+
+def _smooth(counts: Floats) -> Floats:
+    """Counts along one or two axes smoothed by a Gaussian that is wider the fewer they are (Scott's n^(−1/6))."""
+    index = np.arange(_BINS)
+    width = np.clip(0.22 * _BINS * counts.sum() ** (-1 / 6), 0.8, 0.08 * _BINS)
+    kernel = np.exp(-0.5 * ((index[:, None] - index) / width) ** 2)
+    kernel /= kernel.sum(axis=0)
+    smoothed: Floats = kernel @ counts
+    return smoothed if counts.ndim == 1 else smoothed @ kernel.T
+
+
+def _levels(density: Floats) -> list[float]:
+    """Heights whose contours hold 95 % and 50 % of the probability."""
+    descending = np.sort(density.ravel())[::-1]
+    mass = np.cumsum(descending) / descending.sum()
+    return [float(descending[min(np.searchsorted(mass, inside), mass.size - 1)]) for inside in _MASSES]
+
+
+class _Panels:
+    """The panels on one set of axes: column j starts at x = j, row i of d at y = d − 1 − i; one unit is a panel."""
+
+    def __init__(self, ranges: Floats, draws: Floats) -> None:
+        self.ranges, self.count = ranges, len(ranges)
+        self.ticks = [
+            _ticks(low, high, most=1 if self.count > 5 else 2 if self.count > 3 else 4) for low, high in ranges
+        ]
+        longest = max(width_mm(text, TINY) for _, texts in self.ticks for text in texts)
+        self.left = max(_LEFT, longest + 3.0)
+        below = max(_BELOW, longest * np.sin(np.radians(_SLANT)) + 4.0)
+        self.panel_mm = min(30.0, (WIDTH_MM - self.left - 1) / self.count, max(_HEIGHT / self.count, 10.0))
+        height = self.count * self.panel_mm + below + _ABOVE
+        self.figure = new_figure(height)
+        ax = self.figure.add_axes((0, 0, 1, 1))
+        # the panels stand at the left, so that the last name, which begins over its own panel, has the room beside them
+        ax.set(xlim=np.array([-self.left, WIDTH_MM - self.left]) / self.panel_mm)
+        ax.set(ylim=np.array([-below, height - below]) / self.panel_mm)
+        ax.set_axis_off()
+        ax.set(xticks=[], yticks=[])  # not shown, but made and measured
+        self.ax: Axes = ax
+        relative = (draws - ranges[:, 0]) / np.ptp(ranges, axis=1)
+        self.bins = np.where((relative >= 0) & (relative < 1), np.floor(relative * _BINS).astype(np.intp), -1)
+
+    def across(self, column: int, values: ArrayLike) -> Floats:
+        """Values of a parameter as places along x in its column, never beyond its panel."""
+        low, high = self.ranges[column]
+        relative = (np.asarray(values, dtype=np.float64) - low) / (high - low)
+        return np.asarray(column + _SCALE * np.clip(relative, 0, 1))
+
+    def up(self, row: int, values: ArrayLike) -> Floats:
+        """Values of a parameter as places along y in its row."""
+        return np.asarray(self.across(row, values) - row + self.count - 1 - row)
+
+    def marginal(self, k: int) -> Floats:
+        index = self.bins[:, k]
+        return _smooth(np.bincount(index[index >= 0], minlength=_BINS).astype(np.float64))
+
+    def densities(self, estimates: Floats, intervals: Floats) -> None:
+        """Marginal density of each parameter, its interval shaded, its estimate a line."""
+        for k in range(self.count):
+            base = self.count - 1 - k
+            density = self.marginal(k)
+            x = k + _SCALE * (np.arange(_BINS) + 0.5) / _BINS
+            y = base + _HEADROOM * _SCALE * density / density.max()
+            inside = self.across(k, intervals[k])
+            within = np.concatenate([inside[:1], x[(x > inside[0]) & (x < inside[1])], inside[1:]])
+            under = np.concatenate([[base], np.interp(within, x, y), [base]])
+            self.ax.fill(within[[0, *range(len(within)), -1]], under, color=ACCENT, alpha=0.18, lw=0)
+            self.ax.plot(x, y, color=ACCENT, lw=1.1)
+            self.ax.plot(np.repeat(self.across(k, estimates[k]), 2), [base, base + _SCALE], color=INK, lw=0.7)
+
+    def prior(self, k: int, x: ArrayLike, density: ArrayLike) -> None:
+        """A prior density to the scale of the posterior's, as far as the panel goes."""
+        at = finite("prior", x, (None,))
+        heights = finite("prior density", density, at.shape)
+        posterior = self.marginal(k)
+        per_density = posterior.sum() * np.ptp(self.ranges[k]) / _BINS
+        grid = np.linspace(self.ranges[k, 0], self.ranges[k, 1], 64)
+        y = _HEADROOM * _SCALE * per_density / posterior.max() * np.interp(grid, at, heights, left=0, right=0)
+        base = self.count - 1 - k
+        self.ax.plot(self.across(k, grid), base + np.minimum(y, _SCALE), color=MUTED, lw=0.9, ls=(0, (3, 2)))
+
+    def pairs(self, estimates: Floats) -> None:
+        """Contours of 95 % and 50 % of every pair, and a cross at the estimate."""
+        from contourpy import FillType, contour_generator
+        from matplotlib.patches import PathPatch
+        from matplotlib.path import Path
+
+        areas: tuple[list[Path], list[Path]] = ([], [])
+        centres = (np.arange(_BINS) + 0.5) * _SCALE / _BINS
+        row_column = [(row, column) for row in range(self.count) for column in range(row)]
+        for row, column in row_column:
+            i, j = self.bins[:, row], self.bins[:, column]
+            good = (i >= 0) & (j >= 0)
+            counts = np.bincount(i[good] * _BINS + j[good], minlength=_BINS**2).reshape(_BINS, _BINS)
+            density = _smooth(counts.astype(np.float64))
+            lines = contour_generator(column + centres, self.count - 1 - row + centres, density,
+                                      fill_type=FillType.OuterCode)  # fmt: skip
+            for level, paths in zip(_levels(density), areas, strict=True):
+                paths.extend(Path(*outline) for outline in zip(*lines.filled(level, np.inf), strict=True))
+        for paths, alpha in zip(areas, (0.16, 0.34), strict=True):
+            if paths:
+                area = Path.make_compound_path(*paths)
+                # as a patch it would be measured, curve by curve, for limits that are fixed
+                self.ax.add_artist(PathPatch(area, facecolor=(ACCENT, alpha), edgecolor=ACCENT, linewidth=0.5))
+        x = np.array([self.across(column, estimates[column]) for _, column in row_column])
+        y = np.array([self.up(row, estimates[row]) for row, _ in row_column])
+        arm = 0.7 / self.panel_mm
+        self.strokes(np.append(x - arm, x), np.append(x + arm, x), np.append(y, y - arm), np.append(y, y + arm), INK)
+
+    def frames(self) -> None:
+        row, column = np.tril_indices(self.count)
+        x, y = column.astype(np.float64), self.count - 1.0 - row
+        self.strokes(np.append(x, x), np.append(x, x + _SCALE), np.append(y, y), np.append(y + _SCALE, y), MUTED)
+
+    def words(self, labels: Sequence[Text]) -> None:
+        """Ticks with their figures along the outer edges, and names with units over the densities."""
+        length, distance = 0.8 / self.panel_mm, 1.4 / self.panel_mm
+        for k, label in enumerate(labels):
+            values, texts = self.ticks[k]
+            x, y, edge = self.across(k, values), self.up(k, values), np.zeros(len(values))
+            self.strokes(x, x, edge, edge - length, MUTED)
+            if k:
+                self.strokes(edge, edge - length, y, y, MUTED)
+            for place, text in zip(x, texts, strict=True):
+                self.ax.text(place, -distance, text, ha="right", va="top", rotation=_SLANT, rotation_mode="anchor",
+                             fontsize=TINY)  # fmt: skip
+            for place, text in zip(y if k else (), texts, strict=bool(k)):
+                self.ax.text(-distance, place, text, ha="right", va="center", fontsize=TINY)
+            size = SMALL if self.count <= 8 else TINY
+            room = WIDTH_MM - self.left - k * self.panel_mm - 1
+            self.ax.text(k, self.count - k - 0.04, label, ha="left", va="bottom", fontweight="bold",
+                         fontsize=size * min(1.0, room / width_mm(lettered(label), size, "bold")))  # fmt: skip
+
+    def strokes(self, x0: Floats, x1: Floats, y0: Floats, y1: Floats, colour: str) -> None:
+        """Straight hairlines from (x0, y0) to (x1, y1), all in one path."""
+        gap = np.full(len(x0), np.nan)
+        x, y = np.column_stack([x0, x1, gap]), np.column_stack([y0, y1, gap])
+        self.ax.plot(x.ravel(), y.ravel(), color=colour, lw=0.6, solid_capstyle="butt")
+
+
+def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:
+    """Two or more round figures inside a range, about ``most``, and texts with the decimals that tell them apart."""
+    from matplotlib.ticker import MaxNLocator
+
+    room = 0.08 * (high - low)
+    for intervals in range(most, most + 6):
+        every = np.asarray(MaxNLocator(intervals, steps=[1, 2, 5, 10]).tick_values(low, high))
+        values = every[(every >= low + room) & (every <= high - room)]
+        if len(values) >= 2:
+            break
+    values = values[:: -(-len(values) // (most + 1))]
+    decimals = int(np.clip(np.ceil(-np.log10(every[1] - every[0]) - 1e-9), 0, 9))
+    return values, [f"{value:.{decimals}f}".replace("-", "−") for value in values]

@@ -1,0 +1,367 @@
+"""Lengths, residuals, error fields, curves and budgets as pictures.
+
+The pictures of a certificate: lengths by position, residuals in the volume, a curve with its band, a budget.
+
+Each function takes plain arrays and words and gives back a :class:`~cmm_uq.certificate.document.Plot`. Nothing is
+computed here but where the ink goes. The posterior's picture is in :mod:`cmm_uq.certificate.plots.corner`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, say, semicolons, signed
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots.labels import NAMES_MM, folded, shown, told, width_mm
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    BAND,
+    DIVERGING,
+    INK,
+    MUTED,
+    RULE,
+    SMALL,
+    TINY,
+    WIDTH_MM,
+    bars,
+    dots,
+    drawn,
+    finite,
+    house_style,
+    lettered,
+    new_figure,
+)
+from cmm_uq.certificate.result import Result
+from cmm_uq.maths.uncertainty.rounding import alike
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def length_plot(
+    position: ArrayLike,
+    before_um: ArrayLike,
+    after_um: ArrayLike,
+    *,
+    expanded_before_um: ArrayLike | float,
+    expanded_after_um: ArrayLike | float,
+    reference: Text,
+    reference_expanded_um: float = 0.0,
+    flagged: ArrayLike | None = None,
+    position_label: Text = say("Position of the bar"),
+    before_label: Text = say("Before the model"),
+    after_label: Text = say("After the fitted model"),
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Bar lengths by position, before and after the fitted model, as deviations from a reference length.
+
+    ``position``: (n,) number of each position; repeats carry the same number and are drawn side by side; ``before_um,
+    after_um``: (n,) length minus reference, µm; ``expanded_before_um, expanded_after_um``: (n,) or one for all,
+    expanded uncertainty of each length, µm; ``reference``: what zero is, with its figure, such as "certified length
+    404.2357 mm"; ``reference_expanded_um``: expanded uncertainty of the reference, µm: the half width of the band about
+    zero; ``flagged``: (n,) true where screening flagged the position.
+    """
+    series = ((before_label, before_um, expanded_before_um, MUTED), (after_label, after_um, expanded_after_um, ACCENT))
+    return _panels(position, series, (reference, reference_expanded_um), flagged, position_label, caption, alternative)
+
+
+def residual_plot(
+    position: ArrayLike,
+    residual_um: ArrayLike,
+    *,
+    expanded_um: ArrayLike | float,
+    reference: Text,
+    flagged: ArrayLike | None = None,
+    position_label: Text,
+    label: Text,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """The same in one panel, of what is not compared with anything."""
+    series = ((label, residual_um, expanded_um, ACCENT),)
+    return _panels(position, series, (reference, 0.0), flagged, position_label, caption, alternative)
+
+
+def _panels(
+    position: ArrayLike,
+    given: Sequence[tuple[Text, ArrayLike, ArrayLike | float, str]],
+    zero: tuple[Text, float],
+    flagged: ArrayLike | None,
+    position_label: Text,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Deviations with their expanded uncertainties by position, a panel a series."""
+    reference, reference_expanded_um = zero
+    count = np.asarray(given[0][1]).shape[0]
+    x = _side_by_side(finite("position", position, (count,)))
+    series = [(label, finite("deviation", values, (count,)), U, colour) for label, values, U, colour in given]
+    marked = np.zeros(count, dtype=bool) if flagged is None else np.asarray(flagged, dtype=bool)
+    rows = shown([values for _, values, _, _ in series], marked)
+    caption, x, marked = told(caption, len(rows), count), x[rows], marked[rows]
+    size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
+    with house_style():
+        two = len(series) == 2
+        figure = new_figure(84 if two else 62)
+        axes = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
+        figure.subplots_adjust(
+            left=0.082, right=0.995, bottom=0.105 if two else 0.16, top=0.945 if two else 0.92, hspace=0.27
+        )
+        for ax, (label, values, expanded, colour) in zip(axes, series, strict=True):
+            half = finite(
+                "expanded uncertainty", np.broadcast_to(np.asarray(expanded, dtype=float), (count,)), (count,)
+            )[rows]
+            values = values[rows]
+            ax.axhspan(-reference_expanded_um, reference_expanded_um, color=BAND, lw=0, zorder=0)
+            ax.axhline(0, color=INK, lw=0.7, zorder=1)
+            bars(ax, x, values - half, values + half, max(0.28 * size, 0.6), colour)
+            dots(ax, x, values, size, colour, hollow=colour == MUTED)  # the two series differ in grey too
+            _mark(ax, x[marked], values[marked], size)
+            ax.grid(axis="y")
+            ax.margins(y=0.08)
+            ax.set_ylabel(say("Deviation / µm"))
+            ax.set_title(label, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
+        for ax in axes[:-1]:
+            ax.tick_params(bottom=False)
+        axes[-1].set_xlabel(position_label)
+        room = 0.8 + 0.01 * float(np.ptp(x))
+        axes[-1].set_xlim(x.min() - room, x.max() + room)
+        _whole_numbers(axes[-1], x)
+        figure.align_ylabels(axes)
+        note = _legend(reference, reference_expanded_um, flagged=bool(marked.any()))
+        if width_mm(lettered(note), TINY) > _NOTE_MM:
+            figure.subplots_adjust(top=0.905 if two else 0.86)  # the note has a line of its own
+        figure.text(0.995, 0.985, note, ha="right", va="top", fontsize=TINY, color=MUTED)
+        return drawn(figure, caption, alternative)
+
+
+_NOTE_MM = 128.0
+"""Room of the note beside a title of thirty letters."""
+
+
+def _legend(reference: Text, band_um: float, *, flagged: bool) -> Text:
+    parts: list[Text] = [say("zero: {reference}", reference=reference)]
+    if band_um:
+        parts = [say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=band_um)]
+    marks = say("bars: U, rings: flagged by screening") if flagged else say("bars: U")
+    return semicolons((*parts, marks))
+
+
+def _side_by_side(position: Floats) -> Floats:
+    """Repeats of one position spread over 0.6 of the room that it has."""
+    _, inverse, counts = np.unique(position, return_inverse=True, return_counts=True)
+    order = np.argsort(inverse, kind="stable")
+    rank = np.empty(len(position))
+    rank[order] = np.arange(len(position)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return position + 0.6 * ((rank + 0.5) / counts[inverse] - 0.5)
+
+
+def _mark(ax: Axes, x: Floats, y: Floats, size: float) -> None:
+    if len(x):
+        ax.plot(x, y, ls="", marker="o", ms=size + 4, mfc="none", mec=DIVERGING[-1], mew=1.1, zorder=4)
+
+
+def _whole_numbers(ax: Axes, x: Floats) -> None:
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
+
+    ax.xaxis.set_major_locator(MultipleLocator(1) if np.ptp(x) <= 30 else MaxNLocator(12, integer=True))
+
+
+def volume_plot(
+    start_mm: ArrayLike,
+    residual_um: ArrayLike,
+    *,
+    end_mm: ArrayLike | None = None,
+    travel_mm: ArrayLike | None = None,
+    axis_labels: Sequence[Text] = (say("X / mm"), say("Y / mm"), say("Z / mm")),
+    quantity: Text = say("Residual / µm"),
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Residuals where they lie in the machine's volume, in three orthogonal projections to one scale.
+
+    Sign and size show twice: by colour, and by a dot that is full for a positive residual, hollow for a negative one,
+    and grows with it, so the picture also works in grey.
+
+    ``start_mm``: (n, 3) one end of each bar, or the points themselves; ``residual_um``: (n,) what is shown, in the unit
+    that ``quantity`` names; ``end_mm``: (n, 3) the other ends; none for points; ``travel_mm``: (3, 2) the machine's
+    volume in the same frame, drawn as an outline where given.
+    """
+    start = finite("start_mm", start_mm, (None, 3))
+    end = start if end_mm is None else finite("end_mm", end_mm, (len(start), 3))
+    residual = finite("residual_um", residual_um, (len(start),))
+    rows = shown([residual])
+    caption = told(caption, len(rows), len(residual))
+    start, end, residual = start[rows], end[rows], residual[rows]
+    box = None if travel_mm is None else finite("travel_mm", travel_mm, (3, 2))
+    limit = float(np.abs(residual).max(initial=0.0)) or 1.0
+    edges = limit * np.linspace(-1, 1, len(DIVERGING) + 1)
+    step = np.clip(np.searchsorted(edges, residual, side="right") - 1, 0, len(DIVERGING) - 1)
+    extremes_last = np.argsort(np.abs(np.arange(len(DIVERGING)) - len(DIVERGING) // 2), kind="stable")
+    everything = np.vstack([start, end] if box is None else [start, end, box.T])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    margin = 0.06 * float((high - low).max()) + 1e-9
+    low, high = low - margin, high + margin
+    with house_style():
+        figure, axes, scale_axes = _projections(high - low)
+        for ax, (a, b) in zip(axes, _PANELS, strict=True):
+            for index in extremes_last:
+                chosen = step == index
+                _members(ax, start[chosen][:, (a, b)], end[chosen][:, (a, b)], residual[chosen] / limit,
+                         DIVERGING[index], len(start))  # fmt: skip
+            if box is not None:
+                outline = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+                ax.plot(box[a][outline[:, 0]], box[b][outline[:, 1]], color=RULE, lw=0.7, zorder=0)
+            ax.set(xlabel=axis_labels[a], ylabel=axis_labels[b])
+            ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]))
+            ax.locator_params(nbins=4)
+        _colour_scale(scale_axes, edges, quantity)
+        return drawn(figure, caption, alternative)
+
+
+_PANELS = ((0, 1), (0, 2), (1, 2))
+
+
+def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
+    """Three panels side by side on one base line and to one scale, and a strip below for the colours."""
+    across, up = [spans[a] for a, _ in _PANELS], [spans[b] for _, b in _PANELS]
+    label, right, base = 14.0, 4.0, 25.0  # mm beside each panel, at the right edge, below the panels
+    scale = min((WIDTH_MM - 3 * label - right) / sum(across), 70.0 / max(up))
+    height = base + scale * max(up) + 2.0
+    figure = new_figure(height)
+    spare = (WIDTH_MM - 3 * label - right - scale * sum(across)) / 3
+    axes, x = [], label
+    for w, h in zip(across, up, strict=True):
+        axes.append(figure.add_axes((x / WIDTH_MM, base / height, scale * w / WIDTH_MM, scale * h / height)))
+        x += scale * w + label + spare
+    return figure, axes, figure.add_axes((0.28, 9.5 / height, 0.44, 2.6 / height))
+
+
+def _members(ax: Axes, start: Floats, end: Floats, relative: Floats, colour: str, total: int) -> None:
+    """Bars of one colour step, with dots at their middles in four sizes."""
+    width = float(np.clip(14 / np.sqrt(total), 0.7, 2.2))
+    gaps = np.full((len(start), 1), np.nan)
+    ax.plot(np.hstack([start[:, :1], end[:, :1], gaps]).ravel(), np.hstack([start[:, 1:], end[:, 1:], gaps]).ravel(),
+            color=colour, lw=width, solid_capstyle="round", zorder=2)  # fmt: skip
+    middle = (start + end) / 2
+    classes = np.minimum(np.floor(np.abs(relative) * 4), 3)
+    for size_class in np.unique(classes):
+        chosen = classes == size_class
+        size = float(np.clip(28 / np.sqrt(total), 1.4, 4.5)) * (0.6 + 0.4 * size_class)
+        for positive in (True, False):
+            some = chosen & ((relative >= 0) == positive)
+            if some.any():
+                dots(ax, middle[some, 0], middle[some, 1], size, colour, hollow=not positive)
+
+
+def _colour_scale(ax: Axes, edges: Floats, quantity: Text) -> None:
+    ax.bar(edges[:-1], 1, np.diff(edges), align="edge", color=DIVERGING, lw=0)
+    digits = max(0, 1 - int(np.floor(np.log10(edges[-1]))))
+    ax.set_xticks(edges, [f"{edge:+.{digits}f}".replace("-", "−") for edge in edges])
+    ax.set(xlim=(edges[0], edges[-1]), yticks=[])
+    ax.set_xlabel(say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=quantity), labelpad=2)
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+
+
+def curve_with_band(
+    x: ArrayLike,
+    y: ArrayLike,
+    expanded: ArrayLike,
+    *,
+    x_label: Text,
+    y_label: Text,
+    points: tuple[ArrayLike, ArrayLike] | None = None,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """A curve (n,) with the band of its expanded uncertainty (n,), and optional points that it was drawn through.
+
+    Labels carry their units, such as "Error / µm".
+    """
+    across = finite("x", x, (None,))
+    values = finite("y", y, across.shape)
+    half = finite("expanded uncertainty", expanded, across.shape)
+    with house_style():
+        figure = new_figure(72)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.105, right=0.975, bottom=0.14, top=0.97)  # room for ticks of six characters
+        around = np.append(values - half, (values + half)[::-1])
+        ax.fill(np.append(across, across[::-1]), around, color=ACCENT, alpha=0.16, lw=0)
+        ax.plot(across, values, color=ACCENT, lw=1.3)
+        ax.axhline(0, color=INK, lw=0.6, zorder=1)
+        if points is not None:
+            dots(ax, finite("points", points[0], (None,)), finite("points", points[1], (None,)), 2.5, MUTED)
+        ax.grid(axis="y")
+        ax.margins(x=0.01)
+        ax.set(xlabel=x_label, ylabel=y_label)
+        return drawn(figure, caption, alternative)
+
+
+def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
+    """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first."""
+    share = finite("shares", shares, (len(sources),))
+    if not len(share):
+        raise CmmUqError("a budget without a source has no picture")
+    order = np.argsort(-share, kind="stable")
+    rows = np.arange(len(order))
+    names = [folded(sources[index], NAMES_MM) for index in order]
+    with house_style():
+        height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
+        figure = new_figure(height)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height)
+        ax.barh(rows, share[order], 0.55, color=[ACCENT if value >= 0 else MUTED for value in share[order]], lw=0)
+        ax.axvline(0, color=MUTED, lw=0.6)
+        for row, value in zip(rows, share[order], strict=True):
+            text = say("{share} %", share=signed(100 * value, ".1f"))
+            ax.annotate(text, (max(value, 0), row), (4, 0), textcoords="offset points", va="center", color=INK)
+        ax.set_yticks(rows, [lines[0] if len(lines) == 1 else NOTHING for lines in names])
+        ax.set(xlim=(min(share.min() * 1.15, 0), max(share.max(), 1e-9) * 1.02), xticks=[])
+        ax.invert_yaxis()
+        ax.tick_params(left=False)
+        for place, lines in enumerate(names):
+            if len(lines) > 1:
+                _two_lines(ax, place, lines)
+        for side in ("bottom", "left"):
+            ax.spines[side].set_visible(False)
+        return drawn(figure, caption, alternative)
+
+
+def _two_lines(ax: Axes, row: int, lines: Sequence[Text]) -> None:
+    from matplotlib import rcParams
+
+    left = -rcParams["ytick.major.pad"] - rcParams["ytick.major.size"]
+    for line, up in zip(lines, (0.6, -0.6), strict=True):
+        ax.annotate(line, (0, row), (left, up * SMALL), xycoords=("axes fraction", "data"), textcoords="offset points",
+                    ha="right", va="center", fontsize=SMALL, color=INK)  # fmt: skip
+
+
+def residual_volume(result: Result, what: Text) -> Plot:
+    """Residuals of observations of one point each, or of pairs of points (drawn as bars), over the scale readings.
+
+    ``what``: the points in words, as ``faces``.
+    """
+    artefact, residuals = result.artefact, result.residuals / MICROMETRE
+    readings, travel = artefact.points.machine_xyz, artefact.points.machine.travel_mm
+    ends = readings[artefact.rows]
+    low, high = alike(residuals.min(), residuals.max())
+    return volume_plot(
+        ends[:, 0],
+        residuals,
+        end_mm=ends[:, -1] if ends.shape[1] > 1 else None,
+        travel_mm=travel if np.all(np.isfinite(travel)) else None,
+        caption=say("Residuals after the fitted model in the machine's volume (scale readings)."),
+        alternative=say(
+            "Three projections of the {what}; residuals of {low} to {high} µm.", what=what, low=low, high=high
+        ),
+    )

@@ -1,0 +1,328 @@
+"""The looks and lettering of all pictures, black and white first.
+
+The language of what is lettered in pictures: it is chosen before a document is composed, since a picture is drawn once.
+
+The texts of a document are said in a language when all is composed (``in_language``); a picture's are part
+of it by then, with the room that they need.
+
+The look of every picture: one accent colour, quiet axes, and SVG that both views can take as it is.
+
+Text stays text in the SVG, without a font of its own. The browser then sets it in the page's face and the PDF in the
+document's, and it can be searched and copied; outlines would make the three pictures of a ballbar certificate half as
+large again and look the same in both, but like neither. Room is measured with DejaVu Sans, which is wider than the faces
+that show it, so nothing runs into its neighbour (a test looks at that in a browser).
+Series are drawn as one compound path each, not as an object per point: 600 lengths are as light as twenty.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import replace
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.language import ENGLISH, LANGUAGES, Code
+from cmm_uq.base.languages.saying import Said, said_in
+from cmm_uq.base.messages import Text, Verbatim
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.document import Plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import Formatter
+
+JAPANESE = "IPAexGothic"
+"""Family that sets Japanese, under the IPA Font License 1.0, which allows it in documents."""
+_PACKAGE = "matplotlib_fontja"
+"""What it comes in; the package is not imported, since that would change matplotlib's settings."""
+
+
+def japanese_font() -> Path:
+    spec = find_spec(_PACKAGE)
+    for folder in (spec.submodule_search_locations or ()) if spec else ():
+        file = Path(folder) / "fonts" / "ipaexg.ttf"
+        if file.is_file():
+            return file
+    raise CmmUqError(
+        f"a document in Japanese needs the font {JAPANESE}, which is not installed",
+        fix="pip install 'cmm-uq[ja]', or ask for another language",
+    )
+
+
+def fonts_of(language: Code) -> list[Path]:
+    return [japanese_font()] if language == "ja" else []
+
+
+_LANGUAGE: ContextVar[Code] = ContextVar("language of pictures", default=ENGLISH)
+
+
+@contextmanager
+def lettered_in(language: Code) -> Iterator[None]:
+    """Pictures that are drawn meanwhile are lettered in a language."""
+    before = _LANGUAGE.set(language)
+    try:
+        yield
+    finally:
+        _LANGUAGE.reset(before)
+
+
+def lettered(text: Text) -> Text:
+    """A text as it will stand in the picture, for what goes by its length."""
+    return said_in(text, _LANGUAGE.get())
+
+
+def measuring_fonts() -> list[str]:
+    """Families that the room of a text is measured with."""
+    return ["DejaVu Sans", _known_to_matplotlib()] if _LANGUAGE.get() == "ja" else ["DejaVu Sans"]
+
+
+@cache
+def _known_to_matplotlib() -> str:
+    from matplotlib.font_manager import fontManager
+
+    fontManager.addfont(japanese_font())
+    fontManager.ttflist.append(
+        replace(fontManager.ttflist[-1], weight=700)
+    )  # its one weight serves bold lettering, too
+    return JAPANESE
+
+
+def letter(figure: Figure) -> None:
+    """Say every text of a figure in the language of pictures, figures of its ticks too."""
+    from matplotlib.text import Text as Lettering
+
+    code = _LANGUAGE.get()
+    if code == ENGLISH:
+        return
+    tickers = {id(axis.major): axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)}
+    for axis in tickers.values():  # panels may share theirs
+        axis.set_major_formatter(_localised()(axis.get_major_formatter(), code))
+    for found in figure.findobj(Lettering):
+        found.set_text(_said(found.get_text(), code))
+
+
+def _said(text: str, code: Code) -> Text:
+    """A message in the language; a plain string in a picture is a figure (a test holds pictures to that)."""
+    if isinstance(text, Text):
+        return said_in(text, code)
+    return Said(LANGUAGES[code].number(text), Verbatim(text))
+
+
+@cache
+def _localised() -> Callable[[Formatter, Code], Formatter]:
+    """The class of what says the texts of ticks, made when matplotlib is needed."""
+    from matplotlib.ticker import Formatter
+
+    class Localised(Formatter):
+        """Texts of another formatter, in a language."""
+
+        def __init__(self, own: Formatter, code: Code) -> None:
+            self.own, self.code = own, code
+
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return _said(self.own(x, pos), self.code)
+
+        def format_ticks(self, values: Any) -> list[str]:
+            return [_said(text, self.code) for text in self.own.format_ticks(values)]
+
+        def get_offset(self) -> str:
+            return _said(self.own.get_offset(), self.code)
+
+        def set_locs(self, locs: Any) -> None:
+            self.own.set_locs(locs)
+
+    return Localised
+
+
+INK = "#1b2328"
+"""Text and outlines; 15.9 : 1 on white."""
+MUTED = "#5a666e"
+"""Secondary text, and what was before; 5.9 : 1 on white."""
+RULE = "#d3dade"
+"""Hairlines."""
+TINT = "#eef4f6"
+"""A wash of the accent behind text."""
+ACCENT = "#0b5c7a"
+"""The one accent colour; 7.4 : 1 on white."""
+BAND = "#d5e4ea"
+"""A stronger wash, for bands behind data."""
+GOOD, OPEN, BAD = "#1f6b3a", "#8a5300", "#9c2420"
+"""A verdict: nothing to do, something to do, something wrong; white on them at least 6 : 1. A sign and words go with them."""
+COLOURS = {
+    "ink": INK, "muted": MUTED, "rule": RULE, "tint": TINT, "accent": ACCENT, "good": GOOD, "open": OPEN, "bad": BAD,
+    "unknown": MUTED,
+}  # fmt: skip
+"""The same, for the templates."""
+DIVERGING = ("#0b5c7a", "#3f86a0", "#86b1c2", "#c3ccd0", "#e0b48a", "#cc7f3c", "#a84e08")
+"""Negative to positive, parted by blue and orange, which every common kind of colour vision tells apart."""
+
+WIDTH_MM = 170.0
+"""Width of the text on the page (A4 with margins of 20 mm)."""
+SMALL, TINY = 7.5, 6.8
+"""Sizes of lettering, pt."""
+
+_SETTINGS = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "cmm_uq",
+    "path.simplify": False,
+    "text.parse_math": False,  # a dollar sign in a customer's column name is a dollar sign
+    "axes.unicode_minus": True,
+    "font.size": SMALL,
+    "text.color": INK,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.labelsize": SMALL,
+    "axes.labelpad": 4.0,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "grid.color": "#e6eaec",
+    "grid.linewidth": 0.5,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "axes.titley": 1.0,  # or matplotlib looks through all ticks for one that a title could touch; none is above
+    "legend.frameon": False,
+    "legend.fontsize": SMALL,
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Settings under which a figure is both built and written.
+
+    Characters that the measuring font lacks are no matter: the viewer's font draws them.
+    """
+    import matplotlib as mpl
+
+    with mpl.rc_context({**_SETTINGS, "font.family": measuring_fonts()}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        yield
+
+
+def new_figure(height_mm: float) -> Figure:
+    """An empty figure as wide as the page's text; never pyplot, so nothing global is left behind."""
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH_MM / 25.4, height_mm / 25.4), facecolor="none")
+    FigureCanvasSVG(figure)
+    return figure
+
+
+_NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
+_COORDINATES = re.compile(r'(?<= )(?:x|y|points|transform)="[^"]*"')
+_UNWANTED = re.compile(r'font-family: [^;"]*;? ?| transform="rotate\(-0 [^"]*"| xmlns:xlink="[^"]*"| version="1.1"')
+_TAG = re.compile(r"<[^>]*>")
+_ALONE = re.compile(r"M (\S+) (\S+)(?: L \1 \2| M \1 \2)+ ?")
+"""Dots in one place: a path without extent, which some viewers of PDF leave out."""
+
+
+def _shorter(number: re.Match[str]) -> str:
+    return _shorter_of(float(number[0]))
+
+
+def _shorter_of(value: float) -> str:
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text
+
+
+class _Words(dict[str, str]):
+    """Words of paths, shortened where they are numbers: that of a dot has each of them twice, that of a ring four times."""
+
+    def __missing__(self, word: str) -> str:
+        self[word] = shorter = _NUMBER.sub(_shorter, word)
+        return shorter
+
+    def path(self, data: str) -> str:
+        said = " ".join(map(self.__getitem__, data.split()))
+        alone = _ALONE.fullmatch(said)
+        return f"M {alone[1]} {alone[2]} L {_shorter_of(float(alone[1]) + 0.01)} {alone[2]}" if alone else said
+
+
+def as_svg(figure: Figure) -> str:
+    """The figure as one ``<svg>`` element: no prolog, no date, no unused ids, coordinates to 0.01 pt.
+
+    The same figure gives the same bytes on every run. The ids that stay (of clip paths and markers) are made unique
+    when several pictures share a page, see :mod:`cmm_uq.certificate.render.html`.
+    """
+    buffer = io.StringIO()
+    figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    svg = buffer.getvalue()
+    svg = re.sub(r"<style.*?</style>", "", svg[svg.index("<svg") :], count=1, flags=re.DOTALL)
+    used, words = set(re.findall(r'(?:url\(|href=")#([^)"]+)', svg)), _Words()
+
+    def clean(found: re.Match[str]) -> str:
+        before, path, after = found[0].partition(' d="')
+        data, _, after = after.partition('"')
+        return f'{plain(before)} d="{words.path(data)}"{plain(after)}' if path else plain(before)
+
+    def plain(tag: str) -> str:
+        tag = _UNWANTED.sub("", tag).replace("xlink:href", "href")
+        tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in used else "", tag)
+        tag = _COORDINATES.sub(lambda values: _NUMBER.sub(_shorter, values[0]), tag)
+        return re.sub(r"\s+", " ", tag).replace(' "', '"')
+
+    svg = re.sub(r">\s+<", "><", _TAG.sub(clean, svg))
+    while "<g></g>" in svg or "<defs></defs>" in svg:
+        svg = svg.replace("<g></g>", "").replace("<defs></defs>", "")
+    return svg.replace("<svg ", '<svg font-family="sans-serif" stroke-linejoin="round" ', 1).strip()
+
+
+def drawn(figure: Figure, caption: Text, alternative: Text) -> Plot:
+    """The figure as a block of a document, with the texts that are lettered in it."""
+    from matplotlib.text import Text as Lettering
+
+    letter(figure)
+    svg = as_svg(figure)
+    lettering = (found.get_text() for found in figure.findobj(Lettering))
+    return Plot(caption, alternative, svg, tuple(text for text in lettering if isinstance(text, Text) and text))
+
+
+def finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Floats:
+    """The values as floats of a shape (``None`` = any length), every one of them finite."""
+    array = np.asarray(values, dtype=np.float64)
+    fits = array.ndim == len(shape) and all(want in (None, got) for want, got in zip(shape, array.shape, strict=True))
+    if not fits:
+        raise CmmUqError(f"a plot needs {name} of shape {shape}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise CmmUqError(f"{name} holds a value that is not finite, so it cannot be plotted")
+    return array
+
+
+def dots(ax: Axes, x: Floats, y: Floats, size: float, colour: str, *, hollow: bool = False, zorder: float = 3) -> None:
+    """Round marks of ``size`` pt as one path: strokes of no length with round ends, which viewers draw as dots."""
+    gaps = np.full(len(x), np.nan)
+    across = np.column_stack([x, x, gaps]).ravel()
+    up = np.column_stack([y, y, gaps]).ravel()
+    ax.plot(across, up, lw=size, color=colour, solid_capstyle="round", zorder=zorder)
+    if hollow:
+        ax.plot(across, up, lw=size * 0.5, color="white", solid_capstyle="round", zorder=zorder + 0.01)
+
+
+def bars(ax: Axes, x: Floats, low: Floats, high: Floats, width: float, colour: str, zorder: float = 2) -> None:
+    """Vertical bars from ``low`` to ``high`` as one path of ``width`` pt."""
+    gaps = np.full(len(x), np.nan)
+    across = np.column_stack([x, x, gaps]).ravel()
+    ax.plot(across, np.column_stack([low, high, gaps]).ravel(), lw=width, color=colour,
+            solid_capstyle="butt", zorder=zorder)  # fmt: skip

@@ -1,0 +1,307 @@
+"""Residuals as arrows in projections of the measured volume."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cmm_uq.analysis.diagnosis.location import ResidualField
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots.labels import shown, told
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    BAND,
+    DIVERGING,
+    INK,
+    MUTED,
+    RULE,
+    TINY,
+    WIDTH_MM,
+    dots,
+    drawn,
+    finite,
+    house_style,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_ROUND = (1.0, 2.0, 5.0)
+
+
+def vector_plot(
+    position_mm: ArrayLike,
+    series: Sequence[tuple[Text, ArrayLike]],
+    *,
+    axis_labels: tuple[Text, Text] = (say("x / mm"), say("y / mm")),
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Vectors in a plane, one panel a series, all magnified alike, with a scale arrow of a round length.
+
+    ``position_mm``: (n, 2) where each vector stands; ``series``: title and (n, 2) vectors in µm; one to three of them.
+    """
+    place = finite("position_mm", position_mm, (None, 2))
+    vectors = [(title, finite("vectors", values, place.shape)) for title, values in series]
+    rows = shown([np.linalg.norm(values, axis=1) for _, values in vectors])
+    caption = told(caption, len(rows), len(place))
+    place, vectors = place[rows], [(title, values[rows]) for title, values in vectors]
+    longest = max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for _, values in vectors) or 1.0
+    low, high = place.min(axis=0), place.max(axis=0)
+    span = np.maximum(high - low, 1e-3 * float(np.ptp(place)) + 1.0)
+    factor = 0.14 * float(span.max()) / longest  # mm drawn for one µm
+    margin = 0.2 * float(span.max())
+    width = 170.0 / len(vectors)
+    height = min(22 + (width - 16) * float((span[1] + 2 * margin) / (span[0] + 2 * margin)), 150.0)
+    with house_style():
+        figure = new_figure(height)
+        axes = figure.subplots(1, len(vectors), squeeze=False, sharex=True, sharey=True)[0]
+        figure.subplots_adjust(left=0.085, right=0.995, bottom=12 / height, top=1 - 8 / height, wspace=0.08)
+        for ax, (title, values), colour in zip(axes, vectors, (MUTED, ACCENT, ACCENT), strict=False):
+            dots(ax, place[:, 0], place[:, 1], 2.0, RULE)
+            tips = place + factor * values
+            ax.quiver(*place.T, *(tips - place).T, angles="xy", scale_units="xy", scale=1, color=colour, width=0.006)
+            ax.set_title(title, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
+            ax.set_aspect("equal")
+            ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+            ax.set_xlabel(axis_labels[0])
+            ax.locator_params(nbins=5)
+        axes[0].set_ylabel(axis_labels[1])
+        unit = round_length(longest)
+        at = (high[0] + 0.9 * margin - factor * unit, low[1] - 0.75 * margin)
+        axes[-1].plot([at[0], at[0] + factor * unit], [at[1], at[1]], color=ACCENT, lw=1.6, solid_capstyle="butt")
+        axes[-1].annotate(
+            say("{length:g} µm", length=unit),
+            (at[0] + factor * unit / 2, at[1]),
+            (0, 3),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=TINY,
+        )
+        return drawn(figure, caption, alternative)
+
+
+def round_length(longest: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not longer than the longest vector."""
+    power = 10.0 ** np.floor(np.log10(longest))
+    return float(max(step * power for step in _ROUND if step * power <= longest))
+
+
+_PLANES = ((0, 1), (0, 2), (1, 2))
+_AXES = "XYZ"
+_TITLE = 56.0
+"""mm that the title of a column needs."""
+
+_LONGEST = 0.16
+"""Of the drawn width, the longest vector."""
+
+Shade = tuple[str, float, float]
+"""Axis, and the range of its reading that is shaded."""
+
+
+def residual_field_plot(
+    field: ResidualField,
+    expanded_um: Floats,
+    *,
+    titles: tuple[Text, Text] | tuple[Text],
+    shade: Shade | None = None,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """Vectors in the two planes that show most of them, a column before and a column after, all magnified alike.
+
+    What is longer than its expanded uncertainty is an arrow; what lies within it is a thin line without a head.
+
+    ``expanded_um``: (q,) expanded uncertainty of the length of each vector, µm.
+    """
+    place, limit = finite("place", field.place, (None, 3)), finite("expanded_um", expanded_um, (len(field.place),))
+    series = [finite("vectors", v, place.shape) for v in (field.before, field.after)[: len(titles)]]
+    rows = _rows(series, field.lengths)
+    caption = told(caption, len(rows), len(place))
+    place, limit, series = place[rows], limit[rows], [values[rows] for values in series]
+    planes = _planes(place, series[0])
+    longest = max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for values in series) or 1.0
+    low, high = place.min(axis=0), place.max(axis=0)
+    span = max(float((high - low).max()), 1.0)
+    factor = _LONGEST * span / longest  # mm drawn for one µm
+    low, high = low - 0.19 * span, high + 0.19 * span
+    colours = (DIVERGING[-1], ACCENT)
+    with house_style():
+        figure, axes = _panels(planes, len(titles), high - low)
+        for row, (a, b) in enumerate(planes):
+            for column, values in enumerate(series):
+                ax = axes[row][column]
+                _shaded(ax, shade, a, b)
+                if field.lengths:
+                    _lines(ax, place[:, (a, b)])
+                beyond = np.linalg.norm(values, axis=1) > limit
+                _vectors(ax, place[:, (a, b)], factor * values[:, (a, b)], beyond, colours[column])
+                ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
+                ax.locator_params(nbins=5)
+                ax.set_xlabel(say("{axis} / mm", axis=Verbatim(_AXES[a])), labelpad=1)
+                if not column:
+                    ax.set_ylabel(say("{axis} / mm", axis=Verbatim(_AXES[b])))
+                if not row:
+                    ax.set_title(
+                        titles[column], loc="left", fontsize=8, color=colours[column], fontweight="bold", pad=4
+                    )
+        _key(figure, axes[-1][0], factor, longest, float(np.median(limit)), colours[0])
+        return drawn(figure, caption, alternative)
+
+
+def _rows(series: list[Floats], lengths: bool) -> NDArray[np.int64]:
+    sizes = [np.linalg.norm(values, axis=1) for values in series]
+    if not lengths:
+        return shown(sizes)
+    chosen = shown([size[::2] for size in sizes])
+    return np.column_stack([2 * chosen, 2 * chosen + 1]).ravel()
+
+
+def _planes(place: Floats, vectors: Floats) -> list[tuple[int, int]]:
+    """The two planes that show most; one alone where the third direction has neither places nor vectors."""
+    span = np.ptp(place, axis=0)
+    content = np.sqrt(np.mean(vectors**2, axis=0))
+    weight = span / max(float(span.max()), 1e-9) + content / max(float(content.max()), 1e-9)
+    order = sorted(_PLANES, key=lambda plane: -(weight[plane[0]] + weight[plane[1]]))
+    third = weight[next(i for i in range(3) if i not in order[0])]
+    return order[:1] if third < 0.05 else order[:2]
+
+
+def _panels(planes: list[tuple[int, int]], columns: int, spans: Floats) -> tuple[Figure, list[list[Axes]]]:
+    """Panels to one scale, a row for each plane, above the room for the key."""
+    left, gap, right, label, top, base = 14.0, 12.0, 2.0, 9.0, 6.0, 11.0
+    wide = max(float(spans[a]) for a, _ in planes)
+    width = (WIDTH_MM - left - right - gap * (columns - 1)) / max(columns, 2)
+    scale = min(width / wide, 94.0 / sum(float(spans[b]) for _, b in planes))
+    heights = [scale * float(spans[b]) for _, b in planes]
+    height = top + base + sum(heights) + label * len(planes)
+    figure = new_figure(height)
+    axes, y = [], height - top
+    for (a, _), own in zip(planes, heights, strict=True):
+        y -= own
+        step = max(scale * wide, _TITLE) + gap
+        axes.append([
+            figure.add_axes(((left + column * step) / WIDTH_MM, y / height, scale * float(spans[a]) / WIDTH_MM, own / height))
+            for column in range(columns)
+        ])  # fmt: skip
+        y -= label
+    return figure, axes
+
+
+def _shaded(ax: Axes, shade: Shade | None, a: int, b: int) -> None:
+    if shade is None:
+        return
+    axis, low, high = shade
+    if axis == _AXES[a].lower():
+        ax.axvspan(low, high, color=BAND, lw=0, zorder=0)
+    elif axis == _AXES[b].lower():
+        ax.axhspan(low, high, color=BAND, lw=0, zorder=0)
+
+
+def _lines(ax: Axes, ends: Floats) -> None:
+    gaps = np.full((len(ends) // 2, 1), np.nan)
+    for_x, for_y = (np.hstack([ends[::2, i : i + 1], ends[1::2, i : i + 1], gaps]).ravel() for i in (0, 1))
+    ax.plot(for_x, for_y, color=RULE, lw=0.8, zorder=1)
+
+
+def _vectors(ax: Axes, place: Floats, way: Floats, beyond: NDArray[np.bool_], colour: str) -> None:
+    inside = ~beyond
+    gaps = np.full((int(inside.sum()), 1), np.nan)
+    tips = place + way
+    for_x, for_y = (np.hstack([place[inside, i : i + 1], tips[inside, i : i + 1], gaps]).ravel() for i in (0, 1))
+    ax.plot(for_x, for_y, color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
+    if beyond.any():
+        ax.quiver(*place[beyond].T, *way[beyond].T, angles="xy", scale_units="xy", scale=1, color=colour, units="width",
+                  width=0.006, headwidth=4, headlength=5, zorder=3)  # fmt: skip
+
+
+def _key(figure: Figure, ax: Axes, factor: float, longest: float, limit: float, colour: str) -> None:
+    """A round length to scale, and the expanded uncertainty to the same scale."""
+    x0, x1 = ax.get_xlim()
+    per_mm = ax.get_position().width / (x1 - x0)  # of the figure's width, a millimetre of the machine
+    unit = round_length(longest)
+    height_mm = float(figure.get_size_inches()[1]) * 25.4
+    y, left = 3.2 / height_mm, 14.0 / WIDTH_MM
+    from matplotlib.lines import Line2D
+
+    def bar(start: float, length: float, width: float, shade: str, text: Text) -> float:
+        end = start + length * factor * per_mm
+        figure.add_artist(Line2D([start, end], [y, y], color=shade, lw=width, solid_capstyle="butt"))
+        figure.text(end + 0.008, y, text, ha="left", va="center", fontsize=TINY, color=INK)
+        return end
+
+    end = bar(left, unit, 1.8, colour, say("{length:g} µm", length=unit))
+    if limit * factor * per_mm < 0.3:
+        bar(end + 0.14, limit, 0.8, MUTED, say("U = {limit:.2g} µm; within it a thin line without a head", limit=limit))
+    else:
+        figure.text(end + 0.14, y, say("U = {limit:.2g} µm, longer than any vector", limit=limit), va="center",
+                    fontsize=TINY, color=INK)  # fmt: skip
+
+
+def profile_plot(
+    curve: tuple[Floats, Floats, Floats],
+    data: tuple[Floats, Floats, Floats],
+    region: tuple[float, float],
+    *,
+    x_label: Text,
+    y_label: Text,
+    caption: Text,
+    alternative: Text,
+) -> Plot:
+    """A function with its band above, what each observation leaves below, the region where it matters shaded in both.
+
+    ``curve``: covariate, function in µm and its expanded uncertainty, each (p,); ``data``: lowest and highest covariate
+    of each observation, and its residual in µm, each (m,).
+    """
+    x = finite("x", curve[0], (None,))
+    y, half = (finite("curve", values, x.shape) for values in curve[1:])
+    low = finite("data", data[0], (None,))
+    high, residual = (finite("data", values, low.shape) for values in data[1:])
+    rows = shown([residual])
+    caption = told(caption, len(rows), len(low))
+    low, high, residual = low[rows], high[rows], residual[rows]
+    with house_style():
+        figure = new_figure(90)
+        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 0.8))
+        figure.subplots_adjust(left=0.105, right=0.985, bottom=0.115, top=0.94, hspace=0.22)
+        for ax in (above, below):
+            ax.axvspan(*_widened(region, x), color=BAND, lw=0, zorder=0)
+            ax.axhline(0, color=INK, lw=0.6, zorder=1)
+            ax.grid(axis="y")
+        above.fill(
+            np.append(x, x[::-1]), np.append(y - half, (y + half)[::-1]), color=ACCENT, alpha=0.18, lw=0, zorder=2
+        )
+        above.plot(x, y, color=ACCENT, lw=1.4, zorder=3)
+        above.set_ylabel(y_label)
+        above.set_title(say("What the observations show together, with U"), loc="left", fontsize=8, color=ACCENT,
+                        fontweight="bold", pad=4)  # fmt: skip
+        size = float(np.clip(60.0 / len(low) ** 0.75, 1.3, 3.6))
+        wide = high - low > 1e-3 * np.ptp(x)
+        if wide.any():
+            gaps = np.full(int(wide.sum()), np.nan)
+            below.plot(
+                np.column_stack([low[wide], high[wide], gaps]).ravel(),
+                np.column_stack([residual[wide], residual[wide], gaps]).ravel(), color=DIVERGING[-1], lw=0.6, zorder=2,
+            )  # fmt: skip
+        dots(below, 0.5 * (low + high), residual, size, DIVERGING[-1], hollow=True)
+        below.set(xlabel=x_label, ylabel=say("Residual / µm"))
+        below.set_title(say("What each observation leaves"), loc="left", fontsize=8, color=DIVERGING[-1],
+                        fontweight="bold", pad=4)  # fmt: skip
+        below.margins(x=0.02, y=0.1)
+        figure.align_ylabels((above, below))
+        return drawn(figure, caption, alternative)
+
+
+def _widened(region: tuple[float, float], x: Floats) -> tuple[float, float]:
+    """A region that would be too narrow to see, as a hundredth of the picture."""
+    middle, half = 0.5 * (region[0] + region[1]), 0.5 * (region[1] - region[0])
+    half = max(half, 0.005 * float(np.ptp(x)))
+    return middle - half, middle + half

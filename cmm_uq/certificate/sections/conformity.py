@@ -1,0 +1,287 @@
+"""Statements of conformity: decision, evidence, and the budget of the test uncertainty."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
+from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, number, plural, say, sentences, signed
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Column, Plot, Section, Table
+from cmm_uq.certificate.document import DecisionBlock as Decision
+from cmm_uq.certificate.plots.conformity import trumpet
+from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
+from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.maths.uncertainty.budget import Budget, Line
+from cmm_uq.maths.uncertainty.rounding import figure, limit_in_full, nominal, significant
+
+
+def budget_table(measurand: Text, budget: Budget) -> Table:
+    """What contributes and how much; a column, or a line, of which nothing is to be said is left out.
+
+    ``budget``: in mm or µm, of quantities alone.
+    """
+    scale = 1 / MICROMETRE if budget.unit == unit("mm") else 1.0
+    there = [(line, share) for line, share in zip(budget.lines, budget.shares, strict=True) if line.part]
+    turned = any(line.unit != budget.unit or line.sensitivity != 1.0 for line, _ in there)
+    several = len(there) > 1
+    columns = (
+        Column(say("Cause"), numeric=False),
+        *(
+            (Column(say("Standard uncertainty"), numeric=False), Column(say("Sensitivity"), numeric=False))
+            if turned
+            else ()
+        ),
+        Column(say("Contribution"), unit("µm")),
+        *((Column(say("Share")),) if several else ()),
+        Column(say("Origin"), numeric=False),
+    )
+    rows = tuple(
+        (
+            line.name,
+            *((_u(line), _sensitivity(line, scale)) if turned else ()),
+            significant(scale * line.contribution),
+            *((say("{share} %", share=signed(100 * share, ".1f")),) if several else ()),
+            line.origin,
+        )
+        for line, share in there
+    )
+    notes = [say("Combined: u = {u} µm.", u=significant(scale * budget.u))] if several else []
+    if absent := [line.name for line in budget.lines if not line.part]:
+        notes.append(say("Without a contribution, or not stated: {absent}.", absent=commas(absent)))
+    return Table(say("Contributions to {measurand}", measurand=measurand), columns, rows, tuple(notes))
+
+
+def _u(line: Line) -> Text:
+    factor, shown = _shown(line)
+    return say("{u} {unit}", u=significant((line.u or 0.0) * factor), unit=shown)
+
+
+def _sensitivity(line: Line, scale: float) -> Text:
+    """Change of the value, µm, by one unit of the quantity as it is shown."""
+    factor, shown = _shown(line)
+    per = figure(scale / factor * (line.sensitivity or 0.0))
+    return per if shown == unit("µm") else say("{per} µm per {unit}", per=per, unit=shown)
+
+
+def _shown(line: Line) -> tuple[float, Text]:
+    """By what a figure of the line is multiplied to be shown, and in which unit."""
+    if line.unit == unit("mm"):
+        return 1 / MICROMETRE, unit("µm")
+    if line.unit == unit("1/K"):
+        return 1e6, say("10⁻⁶ /K")
+    return 1.0, line.unit
+
+
+_LISTED = 250
+"""Rows of a table of errors; of more only those nearest to their limits are listed, results.json has all."""
+
+
+def conformity_section(statements: Sequence[Statement]) -> Section:
+    """Decisions first, what they rest on behind them."""
+    blocks: list[Block] = [decision_block(statement) for statement in statements]
+    for statement in statements:
+        if len(statement.errors) > 1:
+            blocks += _evidence(statement)
+        elif statement.budget is not None:
+            blocks.append(budget_table(_subject(statement), statement.budget))
+    return Section(say("Statements of conformity"), tuple(blocks))
+
+
+def decision_block(statement: Statement) -> Decision:
+    """One statement: what was compared with what, by which rule, and what follows."""
+    decision = statement.decision
+    value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
+    measured = say("{value} µm (k = 2)", value=value) if statement.u_um > 0 else say("{value} µm", value=value)
+    return Decision(
+        named(statement),
+        statement.quantity,
+        measured,
+        _limit(statement),
+        decision.rule,
+        statement.outcome,
+        sentences((*_what_follows(statement), *_chances(statement), *statement.remarks)),
+        statement.missing,
+    )
+
+
+def named(statement: Statement) -> Text:
+    """By what a statement is known: its standard and characteristic."""
+    standard = Verbatim(statement.facts.standard)
+    if not statement.characteristic:
+        return standard
+    return say("{standard}, {characteristic}", standard=standard, characteristic=Verbatim(statement.characteristic))
+
+
+def formula(facts: ConformityFacts) -> Text:
+    """The maximum permissible error as the job states it; L in mm, the result in µm."""
+    mpe = facts.mpe
+    if mpe is None:
+        return say("{limit} µm", limit=limit_in_full(facts.limit_um or 0.0))
+    if mpe.a_um is None or mpe.k is None:
+        return say("{b} µm", b=limit_in_full(mpe.b_um or 0.0))
+    line = say("({a} + L/{k}) µm", a=limit_in_full(mpe.a_um), k=limit_in_full(mpe.k))
+    if mpe.b_um is None:
+        return say("{line}, L in mm", line=line)
+    return say("the lesser of {line} and {b} µm, L in mm", line=line, b=limit_in_full(mpe.b_um))
+
+
+def _limit(statement: Statement) -> Text:
+    here = say("{limit} µm", limit=limit_in_full(statement.limit_um))
+    if statement.facts.mpe is None:
+        return here
+    length = statement.named.length_mm
+    if length is not None:
+        here = say("{limit} at L = {length} mm", limit=here, length=nominal(length))
+    return say("{here}; MPE = {formula}", here=here, formula=formula(statement.facts))
+
+
+def _what_follows(statement: Statement) -> list[Text]:
+    decision = statement.decision
+    said: list[Text] = []
+    if statement.outcome == "incomplete":
+        said.append(
+            say(
+                "The {measured} measured conform; the test lacks what is named as missing.", measured=statement.measured
+            )
+        )
+    if decision.guard_band is None:
+        said.append(say("The uncertainty is too large for any value to be accepted."))
+    elif decision.guard_band > 0:
+        said.append(say("The guard band is {guard_band} µm.", guard_band=significant(decision.guard_band)))
+    return said
+
+
+def _chances(statement: Statement) -> list[Text]:
+    decision, count = statement.decision, len(statement.errors)
+    said: list[Text] = []
+    if decision.probability_conforming is not None:
+        chance = probability(decision.probability_conforming)
+        said.append(say("Probability that the quantity is within the limit: {chance}.", chance=chance))
+    if statement.joint is not None and count > 1:
+        said.append(
+            say(
+                "Probability that all {count} are, with what they share, by the measurement alone: {chance}.", count=count,
+                chance=probability(statement.joint),
+            )
+        )  # fmt: skip
+    if statement.risks is not None:
+        said.append(
+            say(
+                "Of all such machines, by the prior stated, {consumer} would be wrongly accepted by this rule and {producer} "
+                "wrongly not accepted.",
+                consumer=probability(statement.risks.consumer), producer=probability(statement.risks.producer),
+            )
+        )  # fmt: skip
+    return said
+
+
+def _evidence(statement: Statement) -> list[Block]:
+    """Table of all errors, their picture where lengths differ, and the budget of the named one."""
+    blocks: list[Block] = []
+    if has_picture(statement):
+        blocks.append(picture(statement))
+    blocks.append(_table(statement))
+    if statement.budget is not None:
+        blocks.append(budget_table(_subject(statement), statement.budget))
+    return blocks
+
+
+def _subject(statement: Statement) -> Text:
+    return say("the uncertainty of the test value named, {standard}", standard=named(statement))
+
+
+def has_picture(statement: Statement) -> bool:
+    """Whether errors of several lengths stand against limits on both sides."""
+    drawn = {item.length_mm for item in statement.errors if not item.set_aside}
+    return statement.signed and len(drawn - {None}) > 1
+
+
+def picture(statement: Statement) -> Plot:
+    """Every error over its length, between the limits."""
+    items = [item for item in statement.errors if not item.set_aside]
+    far = len(statement.errors) - len(items)
+    beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)
+    count, outside = len(items), sum(not _accepted(item) for item in items)
+    return trumpet(
+        [item.length_mm or 0.0 for item in items], [item.error_um for item in items],
+        limit_um=[item.limit_um for item in items], acceptance_um=[_acceptance(item) for item in items],
+        expanded_um=[2 * item.u_um for item in items], outside=[not _accepted(item) for item in items],
+        quantity=say("Error / µm"),
+        caption=sentences((
+            say("{standard}: every error against ±MPE, {formula}, with the guard band.",
+                standard=named(statement), formula=formula(statement.facts)),
+            *((beyond,) if far else ()),
+        )),
+        alternative=say("{count} errors over length between the limits; {outside} of them are not accepted.",
+                        count=count, outside=outside),
+    )  # fmt: skip
+
+
+def _acceptance(item: Decided) -> float | None:
+    band = item.decision.guard_band
+    return None if band is None else max(0.0, item.limit_um - band)
+
+
+def _accepted(item: Decided) -> bool:
+    return item.decision.outcome in ("pass", "conditional pass") and not item.set_aside
+
+
+_STANDING = {"counts": NOTHING, "again": say("to be measured again"), "replaced": say("measured again")}
+
+
+def _table(statement: Statement) -> Table:
+    """Every error; those of one length in one measurement in one row, in the order of their repeats."""
+    rows = _together(statement.errors)
+    notes: list[Text] = [
+        plural(
+            len(statement.errors),
+            one=say("{count} value.", count=len(statement.errors)),
+            many=say("{count} values.", count=len(statement.errors)),
+        )
+    ]
+    if len(rows) > _LISTED:
+        rows = sorted(rows, key=lambda row: min(item.limit_um - abs(item.error_um) for item in row))[:_LISTED]
+        notes.append(say("The {count} rows nearest to their limits; results.json has all.", count=_LISTED))
+    lengths = any(item.length_mm is not None for item in statement.errors)
+    known = any(item.u_um > 0 for item in statement.errors)
+    columns = [
+        Column(say("Measurement"), numeric=False),
+        *((Column(say("Length"), unit("mm")),) if lengths else ()),
+        Column(say("Errors") if statement.signed else say("Values"), unit("µm"), numeric=False),
+        *((Column(say("U"), unit("µm")), Column(say("P"), numeric=False)) if known else ()),
+        Column(say("Limit"), unit("µm")), Column(say("Decision"), numeric=False),
+    ]  # fmt: skip
+    if known:
+        notes.append(
+            say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
+        )
+    title = say("All values decided by {standard}", standard=named(statement))
+    cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
+    return Table(title, tuple(columns), cells, tuple(notes))
+
+
+def _together(errors: Sequence[Decided]) -> list[list[Decided]]:
+    found: dict[tuple[int | None, float | None, float, float, str, bool], list[Decided]] = {}
+    for item in errors:
+        key = (item.measurement, item.length_mm, round(item.u_um, 9), item.limit_um, item.standing, item.set_aside)
+        found.setdefault(key, []).append(item)
+    return list(found.values())
+
+
+def _row(row: Sequence[Decided], *, lengths: bool, known: bool, signed_values: bool) -> tuple[Text, ...]:
+    worst = least_favourable([replace(item, standing="counts") for item in row])
+    chance, standing = worst.decision.probability_conforming, _STANDING[row[0].standing]
+    if worst.set_aside and not standing:
+        standing = say("set aside by the screening")
+    values = in_a_row(signed(item.error_um, "+.2f") if signed_values else number(item.error_um, ".2f") for item in row)
+    decision = OUTCOME_WORDS[worst.outcome]
+    return (
+        DASH if worst.measurement is None else number(worst.measurement),
+        *((DASH if worst.length_mm is None else nominal(worst.length_mm),) if lengths else ()),
+        values,
+        *((significant(2 * worst.u_um), DASH if chance is None else probability(chance)) if known else ()),
+        limit_in_full(worst.limit_um),
+        say("{decision}, {standing}", decision=decision, standing=standing) if standing else decision,
+    )

@@ -1,0 +1,198 @@
+"""The first page of a certificate and the summary on the terminal: every decision in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from cmm_uq.analysis.conformity.accuracy import TITLES
+from cmm_uq.analysis.conformity.decision import rule_words
+from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.base.messages import Text, Verbatim, commas, day, number, plural, say, semicolons
+from cmm_uq.certificate.document import Overview, Plot, Section, Table
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.sections.conformity import has_picture, named, picture
+from cmm_uq.certificate.wording import (
+    CERTAIN,
+    OUTCOME_WORDS,
+    Summary,
+    figure_row,
+    measured,
+    probability,
+    stated_row,
+    stated_value,
+    title_of,
+)
+from cmm_uq.certificate.wording import Headline as Verdict
+from cmm_uq.jobs.verdicts import GRAVEST, NONE, gravest, standing_of
+from cmm_uq.jobs.verdicts import Verdict as Stated
+from cmm_uq.jobs.verdicts import Verdict as Verdict_of_verdicts
+from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded, significant
+
+
+def summary(result: Result, warnings: Iterable[Text]) -> Summary:
+    """What was measured, the decisions, the figures, the warnings."""
+    facts = result.job.facts
+    subject = say(
+        "{machine}, {artefact:small}, {count} observations",
+        machine=Verbatim(facts.machine.name), artefact=result.artefact.title, count=len(result.residuals),
+    )  # fmt: skip
+    figures = [figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
+    figures += [
+        figure_row(size.title, result.sizes[size.name]) for size in result.artefact.sizes if size.role == "sought"
+    ]
+    for effect in result.model.effects:
+        for name, quantity in result.parameters[effect.name].items():
+            key = (effect.name, name)
+            figures.append(figure_row(title_of(key, result), quantity, known=key not in result.not_given))
+    remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
+    decided = tuple(
+        Verdict(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
+        for one, told in zip(result.verdicts, remarks, strict=True)
+    )
+    return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
+
+
+def subject_of(one: Stated) -> Text:
+    """What is decided: standard and characteristic, or a parameter with its tolerance."""
+    if one.by:
+        return say("{standard}, {what}", standard=Verbatim(one.by), what=Verbatim(one.name))
+    return say(
+        "{title}, tolerance {limit} {unit}", title=one.title, limit=limit_in_full(one.limit or 0.0), unit=one.unit
+    )
+
+
+def tolerances_of(result: Result) -> list[Stated]:
+    return [one for one in result.verdicts if not one.by]
+
+
+def _tolerance_remarks(one: Stated) -> list[Text]:
+    if one.value is None or one.U is None:
+        return list(one.missing)
+    value, U = rounded(one.value, one.U)
+    return [say("{value} ± {u} {unit}", value=value, u=U, unit=one.unit)]
+
+
+def _remarks(statement: Statement) -> list[Text]:
+    """Value, limit, uncertainty and probability of a statement; what its test lacks."""
+    value, _ = measured(statement)
+    chance = statement.decision.probability_conforming
+    told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=limit_in_full(statement.limit_um))]
+    if statement.u_um > 0:
+        told.append(say("test uncertainty U = {u} µm (k = 2)", u=significant(2 * statement.u_um)))
+    if chance is not None:
+        told.append(say("conforming with {chance}", chance=_chance(chance)))
+    if statement.outcome == "incomplete":
+        told = [say("the {measured} measured conform ({figures})", measured=statement.measured, figures=commas(told))]
+    if statement.missing:
+        told.append(say("missing: {what}", what=semicolons(statement.missing)))
+    return told
+
+
+def _chance(p: float) -> Text:
+    if p < CERTAIN:
+        return say("less than\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
+    if p > 1 - CERTAIN:
+        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
+    return probability(p)
+
+
+_MOST = 8
+"""Statements in the box; of more the gravest, all are behind the page."""
+
+_ROWS = 16
+"""Of a table that the first page has room for."""
+
+_WORDS: Mapping[str, Text] = {
+    "fail": say("Does not conform"),
+    "conditional fail": say("Does not conform, within the uncertainty of the measurement"),
+    "remeasure": say("Not decided: the standard asks for further readings"),
+    "undecided": say("Not decided: the value is nearer to its limit than its uncertainty"),
+    "incomplete": say("Incomplete: conformity is not stated"),
+    "conditional pass": say("Conforms, within the uncertainty of the measurement"),
+}
+
+
+def overview_of(result: Result) -> Overview | None:
+    """The verdict on the whole and each statement behind it; nothing where nothing is stated."""
+    verdicts = result.verdicts
+    if verdicts.overall == NONE:
+        return None
+    signed = {i: statement.signed for i, statement in enumerate(result.statements)}
+    rows = [(subject_of(one), _row(one, signed=signed.get(i, True))) for i, one in enumerate(verdicts)]
+    if len(rows) > _MOST:
+        order = sorted(range(len(rows)), key=lambda i: _gravity(verdicts[i].outcome))[:_MOST]
+        more = len(rows) - _MOST
+        rows = [
+            *(rows[i] for i in sorted(order)),
+            (say("Further statements"), say("{count}, behind this page", count=more)),
+        ]
+    return Overview(_verdict(verdicts), standing_of(verdicts.overall), (*rows, *_lacking(verdicts), *_rules(result)))
+
+
+def _gravity(outcome: str) -> int:
+    return GRAVEST.index(outcome) if outcome in GRAVEST else GRAVEST.index("undecided")
+
+
+def _verdict(verdicts: Sequence[Verdict_of_verdicts]) -> Text:
+    overall, count = gravest(one.outcome for one in verdicts), len(verdicts)
+    if overall == "pass":
+        return plural(
+            count, one=say("Conforms"), many=say("Conforms: all {count} statements of conformity", count=count)
+        )
+    words = _WORDS.get(overall, OUTCOME_WORDS.get(overall, say("Not decided")))
+    alike = sum(one.outcome == overall for one in verdicts)
+    if count == 1:
+        return words
+    return say("{words}: {alike} of {count} statements of conformity", words=words, alike=alike, count=count)
+
+
+def _row(one: Verdict_of_verdicts, *, signed: bool) -> Text:
+    if one.value is None:
+        outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
+        return say("{outcome}: not determined by this recording", outcome=outcome)
+    return stated_row(
+        one.outcome, stated_value(one.value, one.U, signed=signed), one.unit, one.limit if one.by else None
+    )
+
+
+def _lacking(verdicts: Sequence[Verdict_of_verdicts]) -> list[tuple[Text, Text]]:
+    """The first of what statements lack, and how much more there is."""
+    lacking = list(dict.fromkeys(what for one in verdicts if one.value is not None for what in one.missing))
+    if not lacking:
+        return []
+    shown = semicolons(lacking[:2])
+    return [(say("Missing"), shown if len(lacking) < 3 else say("{shown}; {count} more behind this page", shown=shown,
+                                                                 count=len(lacking) - 2))]  # fmt: skip
+
+
+def _rules(result: Result) -> list[tuple[Text, Text]]:
+    told = [rule_words(one.facts.rule) for one in result.statements]
+    if len(result.verdicts) > len(result.statements):
+        told.append(say("tolerances: the whole 95 % interval must lie within"))
+    return [(say("Decision rule"), semicolons(dict.fromkeys(told)))]
+
+
+def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:
+    """Sections with what of them the first page shows marked, and a picture taken there from where it stood.
+
+    That is the picture of the gravest statement that has one, else that of the tolerances; without any the main figures, where
+    the page has room for them.
+    """
+    shown = min((s for s in result.statements if has_picture(s)), key=lambda s: _gravity(s.outcome), default=None)
+    plot: Plot | None = None
+    if shown is not None:
+        plot = picture(shown)
+    elif len(result.verdicts) > len(result.statements):
+        plot = next((b for s in sections if s.title == _TOLERANCES for b in s.blocks if isinstance(b, Plot)), None)
+    if plot is None:
+        first, *others = (section for section in sections if section.blocks)
+        rows = sum(len(block.rows) for block in first.blocks if isinstance(block, Table))
+        return [replace(first, first=rows <= _ROWS), *others]
+    rest = [replace(section, blocks=tuple(b for b in section.blocks if not (isinstance(b, Plot) and b.svg == plot.svg)))
+            for section in sections]  # fmt: skip
+    title = named(shown) if isinstance(shown, Statement) else _TOLERANCES
+    return [Section(say("{what} against the limits", what=title), (plot,), first=True), *rest]
+
+
+_TOLERANCES = say("Tolerances by parameter")

@@ -1,0 +1,200 @@
+"""How the figures of a certificate were estimated: model, noise, sampler, convergence; and the posterior distribution."""
+
+from __future__ import annotations
+
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say
+from cmm_uq.certificate.document import Facts, Paragraph, Section
+from cmm_uq.certificate.plots.corner import corner_plot
+from cmm_uq.certificate.result import NoiseEstimate as Noise
+from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.wording import title_of
+from cmm_uq.machine.model.certified_places import CALIBRATION
+from cmm_uq.machine.model.measurement import ARTEFACT
+from cmm_uq.maths.inference.posterior import Posterior
+from cmm_uq.maths.uncertainty.rounding import alike
+
+_SHOWN = 0.8
+"""Probability from which a component is said to be there; beforehand it is at most one half."""
+
+_WIDER = 1.05
+
+
+def noise_found(noise: Noise, *, heavy_tails: bool) -> Text:
+    """What was found, what could not show, and what it does to the uncertainties.
+
+    ``heavy_tails``: whether the diagnosis found heavy tails, which are no component of the estimate.
+    """
+    there = _found(noise)
+    if heavy_tails:
+        there.append(say("heavier tails than those of the normal distribution that the estimate assumes"))
+    found: Text = (
+        say("independent readings, and {what}", what=listed(there))
+        if there
+        else say("independent readings, nothing else")
+    )
+    if noise.wider >= _WIDER:
+        found = say(
+            "{found}; standard uncertainties are up to {times:.2f} times those under white noise",
+            found=found, times=noise.wider,
+        )  # fmt: skip
+    hidden: list[Text] = []
+    if "placing" not in noise.components:
+        hidden.append(say("set-up offsets (no repeats)"))
+    hidden.append(
+        say("what had drifted before the first reading") if "slow" in noise.components else say("slow noise (no times)")
+    )
+    return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
+
+
+def _found(noise: Noise) -> list[Text]:
+    there: list[Text] = []
+    components = noise.components
+    if noise.axes_apart > _SHOWN:
+        x, y, z = (components[axis].size.value for axis in "xyz")
+        there.append(say("a scatter that differs by axis (X {x:.2g}, Y {y:.2g}, Z {z:.2g} µm)", x=x, y=y, z=z))
+    if noise.display_um:
+        there.append(say("the steps of the display, {step:.2g} µm", step=noise.display_um))
+    size = {name: components[name].size.value for name in ("placing", "growth", "slow") if name in components}
+    p = {name: components[name].probability for name in size}
+    if p.get("placing", 0.0) > _SHOWN:
+        there.append(
+            say(
+                "an offset of {size:.2g} µm of each set-up, shared by its repeats (probability {p:.2f})",
+                size=size["placing"], p=p["placing"],
+            )
+        )  # fmt: skip
+    if p.get("growth", 0.0) > _SHOWN:
+        there.append(
+            say(
+                "scatter that grows with length to {size:.2g} µm (probability {p:.2f})",
+                size=size["growth"],
+                p=p["growth"],
+            )
+        )
+    if p.get("slow", 0.0) > _SHOWN:
+        there.append(say("slow noise in time of {size:.2g} µm (probability {p:.2f})", size=size["slow"], p=p["slow"]))
+    return there
+
+
+def posterior_section(result: Result) -> Section:
+    """Every parameter's density, and each pair; without blocks where there are none."""
+    posterior = result.posterior
+    set_up = {(ARTEFACT, size.name) for size in result.artefact.sizes if size.role == "set-up"}
+    shown = [i for i, unknown in enumerate(posterior.unknowns) if unknown.key not in set_up]
+    if not shown:
+        return Section(say("Posterior distribution"), ())
+    titles, draws = [title_of(posterior.unknowns[i].key, result) for i in shown], result.values[:, shown]
+    plot = corner_plot(
+        draws, titles, units=[posterior.unknowns[i].unit for i in shown], estimates=draws.mean(axis=0),
+        caption=say("Posterior distribution: each parameter, and each pair.") if not result.averaged else say(
+            "Posterior distribution, averaged over {rivals} explanations that remain: each parameter, and each pair.",
+            rivals=result.averaged,
+        ),
+        alternative=say("Marginal and pairwise posterior densities of {names}.", names=listed(titles)),
+    )  # fmt: skip
+    return Section(say("Posterior distribution"), (plot,))
+
+
+def method(result: Result) -> Section:
+    ls, posterior, noise = result.least_squares, result.posterior, result.noise
+    sigma, (low, high) = noise.coordinate.value, noise.coordinate.interval95
+    spread = (
+        say(
+            "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals",
+            sigma=sigma,
+            low=low,
+            high=high,
+        )
+        if noise.stated_um is None
+        else say(
+            "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the stated {stated:.3g} µm and the residuals",
+            sigma=sigma,
+            low=low,
+            high=high,
+            stated=noise.stated_um,
+        )
+    )
+    if noise.p_value is not None:
+        spread = say("{spread}; residuals under the stated figure: p = {p:.2g}", spread=spread, p=noise.p_value)
+    sizes = say(
+        "{count}, {rank}, {condition:.3g}", count=ls.rank + ls.null_space.shape[1], rank=ls.rank, condition=ls.condition
+    )
+    sampler = say(
+        "{sampler}, seed {seed}, {count} draws",
+        sampler=Verbatim(posterior.sampler), seed=posterior.seed, count=len(posterior.draws),
+    )  # fmt: skip
+    rows = (
+        (say("Observations used"), number(len(ls.residuals))),
+        (say("Parameters, rank, condition number"), sizes),
+        (say("Degrees of freedom"), number(ls.degrees_of_freedom)),
+        (
+            say("Residual standard deviation"),
+            NOTHING if ls.residual_sd is None else say("{sd} µm", sd=alike(ls.residual_sd * 1e3)[0]),
+        ),
+        (say("Standard uncertainty of a coordinate"), spread),
+        (say("Noise"), noise_found(noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails)),
+        (say("Sampler"), sampler),
+        (say("Convergence"), _convergence(posterior)),
+        (say("Averaged"), _averaged(result)),
+        (say("Stated of the artefact"), _stated(result)),
+        (say("Calibrated lengths together"), _calibration(result)),
+    )
+    text = Paragraph(
+        say(
+            "{what} are estimated from the observations with a linear measurement "
+            "model, by least squares (orthogonal factorisation) and as a posterior distribution with "
+            "priors as wide as physics allows; the certified length enters with its uncertainty. The "
+            "attached job, recording and results.json suffice to run it again.",
+            what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
+        )
+    )
+    return Section(say("Method"), (text, Facts(tuple((label, value) for label, value in rows if value))))
+
+
+def _averaged(result: Result) -> Text:
+    """What the estimates are averaged over, if they are, and what is not averaged."""
+    if not result.averaged:
+        return NOTHING
+    return say(
+        "estimates, their covariance and draws are of the mixture of {rivals} explanations that remain, {count} draws, of "
+        "each as many as it is probable; residuals, noise, least squares and the sampler are of the named model, where what "
+        "it leaves out counts as noise",
+        rivals=result.averaged, count=len(result.values),
+    )  # fmt: skip
+
+
+def _stated(result: Result) -> Text:
+    """What is stated of the artefact's temperature, expansion, alignment and fixturing, and which figures it reaches."""
+    causes = [cause.name for cause in result.causes if cause.name != CALIBRATION]
+    if causes:
+        return say(
+            "the uncertainty stated of {causes} is in U of all estimates, of figures of lengths and of the slopes of lines, "
+            "as of an error that all set-ups share and as of one that each has by itself, whichever is larger; it is not in "
+            "residuals, noise, least squares and the diagnosis",
+            causes=listed(causes),
+        )
+    if not result.job.circumstances.uncertainty.of_artefact:
+        return NOTHING
+    return say("what is stated of temperature, expansion, alignment and fixturing changes none of the estimates here")
+
+
+def _calibration(result: Result) -> Text:
+    """How errors of several calibrated lengths are taken together."""
+    found = next((cause for cause in result.causes if cause.name == CALIBRATION), None)
+    if found is None:
+        return NOTHING
+    if found.apart is None:
+        return say("errors of the calibrated lengths are taken with the covariance that their certificate states")
+    return say(
+        "errors of the calibrated lengths are taken as of one cause and as of each place by itself; in every figure the "
+        "larger U stands"
+    )
+
+
+def _convergence(posterior: Posterior) -> Text:
+    return say(
+        "{reached}: at least {ess:.0f} effective samples in every parameter, rank-normalised R-hat {rhat:.4f}, "
+        "autocorrelation time {time:.1f} of {steps} steps",
+        reached=say("reached") if posterior.converged else say("NOT reached"),
+        ess=posterior.ess_min, rhat=posterior.rhat_max, time=posterior.autocorrelation_time, steps=posterior.steps,
+    )  # fmt: skip
