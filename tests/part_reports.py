@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.analysis.parts.reducing import Way, spread
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.ways import Way, spread
 from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.part import part_found
-from cmm_uq.app.commands.part_written import Asked, contents_of, found_of
+from cmm_uq.app.commands.parts.documents import Asked, contents_of, found_of
+from cmm_uq.app.commands.parts.part import part_found
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.part.measurement import PartFound
 from cmm_uq.certificate.verify.pdf_file import PdfFile
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.inference.least_squares import LeastSquares

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.analysis.parts.machine import MachineState, StatedNoise
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.placing import Pose
 from cmm_uq.analysis.parts.plan import Association, Characteristic, Feature, Nominal
 from cmm_uq.base.points import Floats, Machine

@@ -16,14 +16,13 @@ import numpy as np
 
 import cmm_uq
 from cmm_uq.analysis.parts.plan import Plan
+from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import AtPose
-from cmm_uq.app.commands.part_machine import machine_found
-from cmm_uq.app.commands.part_plan import circumstances_of, plan_of
+from cmm_uq.app.commands.parts.machine import machine_found
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.origin import SIMULATED
-from cmm_uq.jobs.part.beginning import TABLES
-from cmm_uq.jobs.part.job import read_part
+from cmm_uq.jobs.part.job import TABLES, read_part
 
 ROOT = Path(__file__).parents[2]
 FOLDER, MACHINE = ROOT / "examples" / "part-plate-simulated", ROOT / "examples" / "step-gauge-simulated"

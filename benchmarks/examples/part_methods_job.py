@@ -28,16 +28,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.examples.simulated_jobs import MACHINE, bryan
-from cmm_uq.analysis.parts.machine import MachineState, StatedNoise
-from cmm_uq.analysis.parts.of_form import forms
-from cmm_uq.analysis.parts.of_stylus import STYLUS
-from cmm_uq.analysis.parts.of_temperature import TEMPERATURE
+from cmm_uq.analysis.parts.causes.form import forms
+from cmm_uq.analysis.parts.causes.stylus import STYLUS
+from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
+from cmm_uq.analysis.parts.methods.of_job import methods_of
 from cmm_uq.analysis.parts.placing import Pose
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
 from cmm_uq.analysis.parts.result import evaluated
+from cmm_uq.analysis.parts.setup import forms_of, plan_of, surroundings_of
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
-from cmm_uq.app.commands.part_methods import methods_of
-from cmm_uq.app.commands.part_plan import forms_of, plan_of, surroundings_of
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.origin import SIMULATED

@@ -64,8 +64,8 @@ def case(seed: int, number: int) -> tuple[str, dict[str, bytes]]:
 
 def outcome(files: Mapping[str, bytes]) -> str:
     """``evaluated`` or ``refused``; else what went wrong."""
-    from cmm_uq.analysis.parts.evaluating import Evaluator
-    from cmm_uq.app.commands.part_plan import plan_of, refuse_unfit
+    from cmm_uq.analysis.parts.evaluation import Evaluator
+    from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
     from cmm_uq.base.errors import CmmUqError
     from cmm_uq.jobs.part.job import part_of
 

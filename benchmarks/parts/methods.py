@@ -21,16 +21,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.analysis.parts.by_calibrated_part import Calibrated, by_calibrated_part
-from cmm_uq.analysis.parts.by_orientations import Slopes, Standard, Standards, by_orientations
-from cmm_uq.analysis.parts.machine import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.of_machine import MACHINE
-from cmm_uq.analysis.parts.of_stylus import STYLUS
-from cmm_uq.analysis.parts.of_temperature import TEMPERATURE, Expansion, Surroundings
+from cmm_uq.analysis.parts.causes.machine import MACHINE
+from cmm_uq.analysis.parts.causes.stylus import STYLUS
+from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE, Expansion, Surroundings
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
+from cmm_uq.analysis.parts.methods.method import (
+    Calibrated,
+    Slopes,
+    Standard,
+    Standards,
+    by_calibrated_part,
+    by_orientations,
+)
+from cmm_uq.analysis.parts.methods.of_job import sensitivities
 from cmm_uq.analysis.parts.placing import Pose
 from cmm_uq.analysis.parts.plan import Characteristic, Plan, Stylus
 from cmm_uq.analysis.parts.result import evaluated
-from cmm_uq.analysis.parts.sensitivities import sensitivities
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.base.points import Floats, Machine
 from tests.parts_drawn import block, circle, spot

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.analysis.parts.machine import MachineState, StatedNoise
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.placing import Pose
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances

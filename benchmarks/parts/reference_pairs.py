@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.analysis.parts.evaluating import Evaluator, characteristics_of
+from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
 from cmm_uq.analysis.parts.plan import DIRECTED, FORMS, Characteristic, Feature, FeatureKind, Nominal, Plan
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association

@@ -15,7 +15,7 @@ import numpy as np
 
 from cmm_uq.analysis.parts.result import possible_interval
 from cmm_uq.base.points import Floats
-from tests.analysis.parts.test_inverting import WIDTHS, turned_round
+from tests.analysis.parts.test_zones import WIDTHS, turned_round
 
 TIMES = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0, 20.0)
 """True zones, of the uncertainty."""

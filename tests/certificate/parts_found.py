@@ -9,18 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.parts.budget import budget
-from cmm_uq.analysis.parts.displaced import displaced
-from cmm_uq.analysis.parts.machine import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.reducing import ways
+from cmm_uq.analysis.parts.budget import budget, displaced
+from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.result import conforming, evaluated, stated
+from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
-from cmm_uq.app.commands.part import COVERAGE, judged
-from cmm_uq.app.commands.part_plan import circumstances_of, plan_of
+from cmm_uq.analysis.parts.ways import ways
+from cmm_uq.app.commands.parts.part import COVERAGE, judged
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.part.found import Checked, PartFound, Standing, Unseen
+from cmm_uq.certificate.part.measurement import Checked, PartFound, Standing, Unseen
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source

@@ -27,7 +27,7 @@ CLOCKS = {
 READ = {
     "cmm_uq/base/output/staging.py": {"monotonic"}, "cmm_uq/base/output/interruption.py": {"monotonic"},
     "cmm_uq/app/commands/jobs/new.py": {"now"},
-    "cmm_uq/app/commands/new_part.py": {"now"},
+    "cmm_uq/app/commands/parts/new.py": {"now"},
     "cmm_uq/laboratory/live/instruments/source.py": {"time_ns"},
     "cmm_uq/laboratory/live/instruments/simulated_line.py": {"monotonic"},
     "cmm_uq/laboratory/records/entries.py": {"now"}, "cmm_uq/app/cli/records.py": {"now"},

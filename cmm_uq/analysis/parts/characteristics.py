@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.analysis.parts.associating import VALUES, Features
+from cmm_uq.analysis.parts.association import VALUES, Features
 from cmm_uq.analysis.parts.datums import BEST_FIT, Frame
 from cmm_uq.analysis.parts.plan import (
     DIRECTED,

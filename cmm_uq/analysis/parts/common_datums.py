@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.analysis.parts.associating import VALUES, Features, ProbedFeature
+from cmm_uq.analysis.parts.association import VALUES, Features, ProbedFeature
 from cmm_uq.analysis.parts.plan import Feature, FeatureKind, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

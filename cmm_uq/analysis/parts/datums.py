@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.analysis.parts.associating import Features
+from cmm_uq.analysis.parts.association import Features
 from cmm_uq.analysis.parts.plan import Feature, FeatureKind, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from cmm_uq.analysis.parts.budget import PLACE
-from cmm_uq.analysis.parts.of_form import FORM
-from cmm_uq.analysis.parts.of_machine import MACHINE, NOISE
-from cmm_uq.analysis.parts.of_stylus import STYLUS
-from cmm_uq.analysis.parts.of_temperature import TEMPERATURE
+from cmm_uq.analysis.parts.causes.form import FORM
+from cmm_uq.analysis.parts.causes.machine import MACHINE, NOISE
+from cmm_uq.analysis.parts.causes.stylus import STYLUS
+from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE
 from cmm_uq.analysis.parts.plan import FeatureKind
 from cmm_uq.base.messages import Text, Verbatim, say
 

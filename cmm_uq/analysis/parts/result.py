@@ -5,6 +5,8 @@ The width of a zone is never negative. Draws of its true value are quantiles of 
 Its value is the median of all, as often too large as too small, and zero where that is negative. Its interval lies between the
 tails of ``unified``: it holds as often however small the zone is, and is not empty because a measurement
 happened to be better than its errors. Probabilities are those of possible draws.
+
+How far measured points lie from the features that are associated with them: what of a part's form was seen.
 """
 
 from __future__ import annotations
@@ -16,11 +18,13 @@ from numpy.typing import NDArray
 
 from cmm_uq.analysis.conformity.limits import SCARCE
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.evaluating import characteristics_of
-from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.analysis.parts.unified import tails
+from cmm_uq.analysis.parts.evaluation import characteristics_of
+from cmm_uq.analysis.parts.plan import FEWEST as FEWEST_POINTS
+from cmm_uq.analysis.parts.plan import Feature, Plan
+from cmm_uq.analysis.parts.zones import tails
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
+from cmm_uq.maths.geometry.association import associate
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated
 
 FEWEST = 500
@@ -157,3 +161,34 @@ def within_bounds(together: float, each: Floats) -> float:
 def _share(inside: NDArray[np.bool_], possible: NDArray[np.bool_]) -> float:
     """Of the draws that are possible; of all, where these are few."""
     return float(np.mean(inside[possible] if np.count_nonzero(possible) >= FEWEST else inside))
+
+
+def deviations_of(plan: Plan, measured: Floats) -> Floats:
+    """(n,) signed distances of measured points (n, 3) from their least-squares features, out of the material, mm.
+
+    ``nan`` of features whose number of points alone determines them, which have no form.
+    """
+    found = np.full(len(measured), np.nan)
+    for feature in plan.features:
+        if len(feature.points) > FEWEST_POINTS[feature.kind]:
+            rows = plan.rows[feature.name]
+            found[rows] = _deviations(feature, measured[rows])
+    return found
+
+
+def _deviations(feature: Feature, points: Floats) -> Floats:
+    if feature.kind == "point":
+        return np.asarray(np.einsum("ni,ni->n", points - points.mean(axis=0), feature.normals))
+    if feature.kind == "line" and feature.nominal.direction is not None:
+        along = np.asarray(feature.nominal.direction)
+        out = feature.normals.mean(axis=0)
+        out = out - (out @ along) * along
+        out /= np.linalg.norm(out)
+        flat = np.column_stack([points @ along, points @ out])
+        flat -= flat.mean(axis=0)
+        across = np.linalg.svd(flat, full_matrices=False)[2][1]
+        return np.asarray(np.sign(across[1]) * (flat @ across))
+    if feature.kind == "plane":
+        return associate("plane", points, outward=feature.normals.mean(axis=0)).deviations
+    sign = -1.0 if feature.internal else 1.0
+    return np.asarray(sign * associate(feature.kind, points).deviations)

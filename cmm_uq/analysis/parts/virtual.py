@@ -4,7 +4,7 @@ The error is what is measured less what is true: of the nominal part, or, where 
 part with the form that was drawn. A characteristic that was measured as y is then y less the errors.
 
 What is never negative, such as a zone, is widened by errors whatever their sign. Where points were measured, its true value is
-inferred from what was measured by turning the measurement round (:mod:`cmm_uq.analysis.parts.inverting`).
+inferred from what was measured by turning the measurement round (:mod:`cmm_uq.analysis.parts.zones`).
 """
 
 from __future__ import annotations
@@ -17,21 +17,18 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes import Cause, Common, Drawn, normal
+from cmm_uq.analysis.parts.causes.cause import Cause, Common, Drawn, normal
+from cmm_uq.analysis.parts.causes.condensing import LARGE, condensed
+from cmm_uq.analysis.parts.causes.form import Form, forms, whole_surfaces
+from cmm_uq.analysis.parts.causes.machine import mean_errors, modelled, noise, not_modelled
+from cmm_uq.analysis.parts.causes.stylus import Qualified, styli
+from cmm_uq.analysis.parts.causes.surroundings import Beside, Surroundings, mean_expansion, temperatures
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.condensing import LARGE, condensed
-from cmm_uq.analysis.parts.evaluating import Evaluator, Known, Movement, characteristics_of
-from cmm_uq.analysis.parts.inverting import Inverse, alike, inverse, nodes_of
-from cmm_uq.analysis.parts.machine import MachineState
-from cmm_uq.analysis.parts.of_form import Form, forms, whole_surfaces
-from cmm_uq.analysis.parts.of_machine import mean_errors, modelled, noise, not_modelled
-from cmm_uq.analysis.parts.of_operator import Beside
-from cmm_uq.analysis.parts.of_stylus import styli
-from cmm_uq.analysis.parts.of_temperature import Surroundings, mean_expansion, temperatures
+from cmm_uq.analysis.parts.evaluation import Evaluator, Known, Movement, characteristics_of
+from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.placing import Pose, placed
 from cmm_uq.analysis.parts.plan import FORMS, Plan
-from cmm_uq.analysis.parts.qualifying import Qualified
-from cmm_uq.analysis.parts.trial_parts import trial_parts
+from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, trial_parts
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source

@@ -218,8 +218,8 @@ def part(
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
     from cmm_uq.app.api.outcomes import Part
-    from cmm_uq.app.commands.part_written import Asked, found_of
-    from cmm_uq.app.commands.part_written import in_language as told_in
+    from cmm_uq.app.commands.parts.documents import Asked, found_of
+    from cmm_uq.app.commands.parts.documents import in_language as told_in
     from cmm_uq.jobs.part.job import PartJob, read_part
 
     read = told_in(job if isinstance(job, PartJob) else read_part(Path(job)), language)

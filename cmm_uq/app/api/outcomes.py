@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from cmm_uq.app.commands.files import Form
-from cmm_uq.app.commands.part_written import written
+from cmm_uq.app.commands.parts.documents import written
 from cmm_uq.app.commands.plans.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
 from cmm_uq.app.commands.report import DIAGNOSE, REPORT
@@ -18,9 +18,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.notebook import html_table
 from cmm_uq.base.units import printed_unit
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.part.figures import part_summary
+from cmm_uq.certificate.part.measurement import PartFound
 from cmm_uq.certificate.part.results import part_results
-from cmm_uq.certificate.part.summary import part_summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.place import NONE

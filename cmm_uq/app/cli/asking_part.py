@@ -16,7 +16,7 @@ from cmm_uq.app.cli.terminal import say
 from cmm_uq.base.errors import CmmUqError
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.new_part_answers import Answers
+    from cmm_uq.app.commands.parts.new import Answers
 
 Value = TypeVar("Value")
 
@@ -26,8 +26,8 @@ _ANSWERS = {"y": True, "yes": True, "n": False, "no": False}
 
 def part_answers() -> Answers:
     """What the user says of a new job of a part."""
-    from cmm_uq.app.commands.new_part_answers import Answers, certificate_files
-    from cmm_uq.jobs.part.beginning import TABLES
+    from cmm_uq.app.commands.parts.new import Answers, certificate_files
+    from cmm_uq.jobs.part.job import TABLES
 
     part, stylus = TABLES["part"], TABLES["stylus"][0]
     found = Answers()

@@ -30,7 +30,7 @@ from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
-    from cmm_uq.app.commands.new_part_answers import Answers
+    from cmm_uq.app.commands.parts.new import Answers
     from cmm_uq.certificate.wording import Summary
     from cmm_uq.jobs.importing.keys import ImportKeys
     from cmm_uq.jobs.importing.recognised import Recognised
@@ -77,7 +77,7 @@ def new(
     """
     from cmm_uq.app.commands.jobs.folder import BUDGET
     from cmm_uq.app.commands.jobs.new import check_empty, known, titles, write_new
-    from cmm_uq.app.commands.new_part import PART
+    from cmm_uq.app.commands.parts.new import PART
 
     if not kind:
         if json:

@@ -43,7 +43,7 @@ def kinds(incomplete: str) -> list[str]:
     """What a new job can be, those of other packages too."""
     from cmm_uq.app.commands.jobs.folder import BUDGET, PLAN
     from cmm_uq.app.commands.jobs.new import known
-    from cmm_uq.app.commands.new_part import PART
+    from cmm_uq.app.commands.parts.new import PART
 
     return [name for name in (*known(), PLAN, PART, BUDGET) if name.startswith(incomplete)]
 

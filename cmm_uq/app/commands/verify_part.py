@@ -89,9 +89,9 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
     ------
     CmmUqError : they are no job of a part.
     """
-    from cmm_uq.app.commands.part_history import FILE as HISTORY
-    from cmm_uq.app.commands.part_machine import CALIBRATION, with_history
-    from cmm_uq.app.commands.part_written import in_language
+    from cmm_uq.app.commands.parts.documents import in_language
+    from cmm_uq.app.commands.parts.drift import FILE as HISTORY
+    from cmm_uq.app.commands.parts.machine import CALIBRATION, with_history
     from cmm_uq.jobs.part.job import part_of
 
     language = language_of(data)
@@ -107,7 +107,7 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
 
 def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str) -> None:
     from cmm_uq.analysis.parts.result import evaluated
-    from cmm_uq.app.commands.part_plan import plan_of
+    from cmm_uq.analysis.parts.setup import plan_of
     from cmm_uq.certificate.verify.part_job import check_part_job
 
     inquiry.looked("inputs")
@@ -127,7 +127,7 @@ def _check_machine(
     inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str, *, rerun: bool, trust: Iterable[Path] | None
 ) -> None:
     """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
-    from cmm_uq.app.commands.part_machine import attached_calibration, standing_of, verified
+    from cmm_uq.app.commands.parts.machine import attached_calibration, standing_of, verified
     from cmm_uq.certificate.verify.part_job import check_standing
     from cmm_uq.jobs.reading import sha256
 
@@ -202,8 +202,8 @@ def part_again(
     ------
     CmmUqError : they give nothing.
     """
-    from cmm_uq.app.commands.part_history import FILE as HISTORY
-    from cmm_uq.app.commands.part_written import Asked, contents_of, found_of
+    from cmm_uq.app.commands.parts.documents import Asked, contents_of, found_of
+    from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 
     said, simulation = data["machine"], data["simulation"]
     held = bool(said["signatures_held_to_trusted"])

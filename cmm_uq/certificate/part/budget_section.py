@@ -13,9 +13,9 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.part.budget_plot import shares_plots
 from cmm_uq.certificate.part.figures import Figures, by_margin, critical, figures_of
-from cmm_uq.certificate.part.found import PartFound, Unseen
+from cmm_uq.certificate.part.measurement import PartFound, Unseen
+from cmm_uq.certificate.part.plots import shares_plots
 
 DETAILED = 10
 """Characteristics whose budgets are listed line by line: those of least margin."""

@@ -10,7 +10,7 @@ from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import figures_of
-from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.part.measurement import PartFound
 
 
 def method_section(found: PartFound) -> Section:

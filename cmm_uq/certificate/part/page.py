@@ -1,8 +1,29 @@
-"""The page of a part: its characteristics with their uncertainty, what the limits make of them, and where it comes from."""
+"""A part's measurement in short: whether it conforms, where it is nearest to a limit, what its uncertainty comes from.
+
+The machine that measured a part: its certificate, how it was verified, and how its errors are drawn.
+
+The page of a part: its characteristics with their uncertainty, what the limits make of them, and where it comes from.
+"""
 
 from __future__ import annotations
 
-from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, names, say
+from collections.abc import Mapping, Sequence
+
+from cmm_uq.analysis.conformity.decision import Outcome
+from cmm_uq.base.messages import (
+    NOTHING,
+    Text,
+    Verbatim,
+    commas,
+    day,
+    names,
+    number,
+    plural,
+    say,
+    semicolons,
+    sentences,
+    signed,
+)
 from cmm_uq.certificate.certificate import (
     grouped,
     identified,
@@ -13,18 +34,197 @@ from cmm_uq.certificate.certificate import (
     statements_of,
 )
 from cmm_uq.certificate.clauses import DRAFT, Requirement, asked, not_stated, of_every_report
-from cmm_uq.certificate.document import Document, Facts
-from cmm_uq.certificate.part.budget_section import budget_section, unseen_section, ways_section
-from cmm_uq.certificate.part.found import PartFound
-from cmm_uq.certificate.part.machine_section import certificate_rows, machine_section
+from cmm_uq.certificate.document import Document, Facts, Overview, Paragraph, Section
+from cmm_uq.certificate.part.budget_section import (
+    best_words,
+    budget_section,
+    largest_words,
+    unseen_section,
+    unseen_words,
+    ways_section,
+)
+from cmm_uq.certificate.part.figures import Figures, critical, figures_of
+from cmm_uq.certificate.part.measurement import PartFound, Source, Standing
 from cmm_uq.certificate.part.method import method_section, not_covered_section, program_words
-from cmm_uq.certificate.part.methods import methods_section
-from cmm_uq.certificate.part.overview import overview_of, part_words
-from cmm_uq.certificate.part.pictured import errors_section, part_section
+from cmm_uq.certificate.part.other_methods import methods_section
+from cmm_uq.certificate.part.part_section import errors_section, part_section
 from cmm_uq.certificate.part.results_section import conformity_section, correlation_section, results_section
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
+from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.verdicts import gravest, standing_of
+
+
+def overview_of(found: PartFound) -> Overview:
+    """The first thing on the page."""
+    one = critical(found)
+    rows = (
+        (say("Part"), part_words(found)),
+        (say("Decision rule"), found.judged_by if any(found.judged) else NOTHING),
+        (say("Least margin") if found.nearest is not None else say("Tightest"), _least(one)),
+        (say("Probability"), _together(found)),
+        (say("Uncertainty"), largest_words(one) if found.budget.causes and one.stated.u else NOTHING),
+        (say("To reduce it"), best_words(one) if len(found.ways) > 1 else NOTHING),
+        (say("Not seen"), unseen_words(found) if found.unseen else NOTHING),
+        (say("Not covered"), _not_covered(found)),
+    )
+    return Overview(
+        verdict_words(found.outcomes, measured=found.measured is not None),
+        "unknown" if found.outcome is None else standing_of(found.outcome),
+        tuple(row for row in rows if row[1]),
+    )
+
+
+def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
+    """Whether the part conforms.
+
+    Parameters
+    ----------
+    outcomes : of the characteristics that were decided on.
+    measured : whether anything was.
+    """
+    outcome = gravest(outcomes)
+    if not outcomes:
+        return say("Measured: no limits to decide on") if measured else _UNMEASURED
+    all_ = len(outcomes)
+    if outcome == "pass":
+        return plural(all_, one=say("Conforms: its one limited characteristic is within its limits"),
+                      many=say("Conforms: all {count} limited characteristics are within limits", count=all_))  # fmt: skip
+    if outcome in ("fail", "conditional fail"):
+        out = sum(one in ("fail", "conditional fail") for one in outcomes)
+        told = plural(out, one=say("one of {all} characteristics is not", all=all_),
+                      many=say("{count} of {all} characteristics are not", count=out, all=all_))  # fmt: skip
+        if outcome == "conditional fail":
+            return say("Conditionally rejected: {told} within its limits with certainty", told=told)
+        return say("Does not conform: {told} within the limits", told=told)
+    if outcome == "conditional pass":
+        return say("Conditionally accepted: all values are within their limits, not all with their uncertainty")
+    open_ = sum(one == "undecided" for one in outcomes)
+    return plural(
+        open_, one=say("Undecided: one of {all} characteristics is too near to a limit", all=all_),
+        many=say("Undecided: {count} of {all} characteristics are too near to a limit", count=open_, all=all_),
+    )  # fmt: skip
+
+
+_UNMEASURED = say("Uncertainty of a planned measurement: nothing was measured")
+
+
+def part_words(found: PartFound) -> Text:
+    """Name, drawing, serial number."""
+    part = found.job.facts.part
+    drawing = say("drawing {number}", number=Verbatim(part.drawing)) if part.drawing else NOTHING
+    serial = say("serial number {number}", number=Verbatim(part.serial)) if part.serial else NOTHING
+    return commas(text for text in (Verbatim(part.name), drawing, serial) if text)
+
+
+def _least(one: Figures) -> Text:
+    """The characteristic nearest to a limit, or that takes most of its tolerance, with its figures."""
+    if not one.allowed:
+        return NOTHING
+    told = say("{what}: {result}; allowed {allowed}", what=one.titled, result=one.result, allowed=one.allowed)
+    margin = float(one.found.margins[one.place])
+    if one.found.nearest is not None:
+        inside = say("{told}, {times} u inside of the limit", told=told, times=number(margin, ".1f"))
+        return inside if margin >= 0 else say("{told}, {times} u outside of the limit", told=told,
+                                              times=number(-margin, ".1f"))  # fmt: skip
+    if not one.width > 0:
+        return told
+    return say("{told}; the 95 % interval takes {share} % of it", told=told,
+               share=signed(200 * one.expanded / one.width, ".0f"))  # fmt: skip
+
+
+def _together(found: PartFound) -> Text:
+    limited = sum(one is not None for one in found.judged)
+    if found.together is None or limited < 2:
+        return NOTHING
+    return say("{chance} that all {count} limits are kept", chance=probability(found.together), count=limited)
+
+
+def _not_covered(found: PartFound) -> Text:
+    told: list[Text] = []
+    left = found.job.facts.part.not_measured
+    if left:
+        told.append(say("Not measured: {names}.", names=commas(names(left))))
+    free = [one.titled for one in figures_of(found) if one.judged is None]
+    if free and len(free) < len(found.judged):
+        told.append(say("Without limits: {names}.", names=semicolons(free)))
+    return sentences(told)
+
+
+_SOURCES: Mapping[Source, Text] = {
+    "certificate": say("its certificate, with the recording of the calibration inside"),
+    "results": say("the figures and draws of its certificate, without the recording of the calibration"),
+    "job": say("the job of its calibration, analysed anew; no certificate is verified"),
+}
+
+
+def machine_section(found: PartFound) -> Section:
+    """What states the machine, and what of it was verified."""
+    standing = found.standing
+    rows = (
+        (say("Taken from"), _SOURCES[standing.source]),
+        *certificate_rows(standing),
+        (say("Files"), commas(names(standing.files))),
+        (say("Verified"), verified_words(standing)),
+        (say("Signatures"), say("by trusted certificates") if standing.trusted else say("not asked for")),
+        (say("Temperature of the scales at the calibration"), _celsius(standing.temperature_c)),
+        (say("Noise of a coordinate"), _noise(found)),
+    )
+    told = (standing.path, standing.drift)
+    return Section(
+        say("The machine and its certificate"),
+        (Facts(tuple(row for row in rows if row[1])), *(Paragraph(text) for text in told if text)),
+    )
+
+
+def certificate_rows(standing: Standing) -> tuple[tuple[Text, Text], ...]:
+    """Machine, number, issuer, date with its age, validity of the certificate."""
+    serial = say("serial number {serial}", serial=Verbatim(standing.serial)) if standing.serial else NOTHING
+    number_of = (
+        say("{number}, a draft", number=Verbatim(standing.number)) if standing.draft else Verbatim(standing.number)
+    )
+    return (
+        (say("Machine"), commas(text for text in (Verbatim(standing.machine), serial) if text)),
+        (say("Certificate of the machine"), number_of),
+        (say("Issued by"), Verbatim(standing.laboratory)),
+        (say("Calibrated on"), _calibrated(standing)),
+        (say("Valid until"), day(standing.valid_until) if standing.valid_until else NOTHING),
+    )
+
+
+def _calibrated(standing: Standing) -> Text:
+    days, date = standing.age.days, day(standing.date)
+    if not days:
+        return say("{date}, the day of the measurement", date=date)
+    age = plural(days, one=say("one day"), many=say("{count} days", count=days))
+    return say("{date}, {age} before", date=date, age=age)
+
+
+def verified_words(standing: Standing) -> Text:
+    """What was compared and what was not."""
+    done = [one for one in standing.checked if one.count]
+    if not done:
+        return say("no: analysed anew") if standing.source == "job" else say("no")
+    told = say(
+        "{count} comparisons of {sorts} sorts between its documents, figures, decisions and inputs, none of which failed",
+        count=sum(one.count for one in done), sorts=len(done),
+    )  # fmt: skip
+    again = say("computed again from its inputs") if standing.again else say("not computed again")
+    return say("{told}; {again}", told=told, again=again)
+
+
+def _celsius(value: float | None) -> Text:
+    return NOTHING if value is None else say("{value} °C", value=number(value, ".2f"))
+
+
+def _noise(found: PartFound) -> Text:
+    usual = found.given.machine.noise.usual_mm * 1e3
+    if not usual.any():
+        return NOTHING
+    return say("{x}, {y}, {z} µm along x, y, z", x=number(usual[0], ".2g"), y=number(usual[1], ".2g"),
+               z=number(usual[2], ".2g"))  # fmt: skip
+
 
 TITLE = say("Measurement report")
 PLANNED = say("Measurement uncertainty")

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cmm_uq.analysis.parts.evaluating import characteristics_of
+from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.base.messages import DASH, Text, number, say, signed
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.part.correlation_plot import correlation_plot
 from cmm_uq.certificate.part.figures import Figures, figures_of
-from cmm_uq.certificate.part.found import PartFound
-from cmm_uq.certificate.part.margin_plot import Margin, margin_plots
+from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.plots import Margin, correlation_plot, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 
 FEW = 8

@@ -15,7 +15,7 @@ from cmm_uq.jobs.part.job import PartJob
 
 if TYPE_CHECKING:
     from cmm_uq.base.points import Floats
-    from cmm_uq.certificate.part.found import Standing
+    from cmm_uq.certificate.part.measurement import Standing
 
 _OF_THE_MACHINE = (
     "source", "files", "number", "laboratory", "machine", "serial", "origin", "date", "age_days", "valid_until", "draft",

@@ -13,7 +13,7 @@ from typing import Any
 from cmm_uq.base.languages.saying import said_in
 from cmm_uq.base.messages import Text
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, Printed, Scale
-from cmm_uq.certificate.part.overview import verdict_words
+from cmm_uq.certificate.part.page import verdict_words
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.views_agree import squashed
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability

@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from cmm_uq.base.files.table import Length, Position, Table, Uncertainty
-from cmm_uq.jobs.part.feature import Association, Kind
-from cmm_uq.jobs.part.not_modelled import refuse_not_modelled
+from cmm_uq.jobs.part.feature import Association, Kind, refuse_not_modelled
 
 What = Literal[
     "size", "straightness", "flatness", "roundness", "cylindricity", "sphericity", "distance", "angle", "parallelism",

@@ -1,4 +1,7 @@
-"""From the folder of a part's job to a :class:`PartJob`."""
+"""From the folder of a part's job to a :class:`PartJob`.
+
+What a new job of a part begins with: a plate with a bore, on three datum planes; every figure is an example.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.content import text_of
@@ -17,13 +22,10 @@ from cmm_uq.base.points import Floats
 from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.logo import checked_logo
 from cmm_uq.jobs.origin import COMPENSATED, SIMULATED, check_examples, check_mark
-from cmm_uq.jobs.part.by_readings import OtherReadings, other_readings
 from cmm_uq.jobs.part.checks import check_names, check_plan
-from cmm_uq.jobs.part.file import PartFile
-from cmm_uq.jobs.part.located import Places
-from cmm_uq.jobs.part.measured import measured_points
 from cmm_uq.jobs.part.probed import Probed, probed
-from cmm_uq.jobs.part.tables import MachineStateFacts
+from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
+from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.reading import PART
 from cmm_uq.jobs.source import InFolder, InMemory, Source
 
@@ -177,3 +179,45 @@ def _read(source: Source, *, machine: bool) -> PartJob:
     others = other_readings(facts, features, places, recorded, wrong)
     wrong.refuse()
     return PartJob(folder, facts, tuple(features), inputs, measured, stated_by, others)
+
+
+_GRID = {"pattern": "grid", "rows": 3, "columns": 4, "margin_mm": 5.0}
+
+
+def _plane(
+    name: str, point: list[float], direction: list[float], along: list[float], length: float, width: float
+) -> Any:
+    return {
+        "name": name, "kind": "plane", "point_mm": point, "direction": direction, "along": along, "length_mm": length,
+        "width_mm": width, "strategy": _GRID,
+    }  # fmt: skip
+
+
+TABLES: Mapping[str, Any] = MappingProxyType({
+    "part": {"name": "Plate", "drawing": "", "cte_per_k": 11.5e-6, "u_cte_per_k": 0.5e-6},
+    "machine_state": {"certificate": "machine"},
+    "stylus": [
+        {"name": "down", "diameter_mm": 4.0, "offset_mm": [0.0, 0.0, -150.0], "u_diameter_um": 0.3, "lobing_um": 0.3},
+    ],
+    "feature": [
+        _plane("A", [60.0, 40.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], 120.0, 80.0),
+        _plane("B", [60.0, 0.0, -10.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], 120.0, 20.0),
+        _plane("C", [0.0, 40.0, -10.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 80.0, 20.0),
+        {
+            "name": "bore", "kind": "cylinder", "point_mm": [60.0, 40.0, -10.0], "direction": [0.0, 0.0, 1.0],
+            "diameter_mm": 30.0, "inner": True, "length_mm": 20.0,
+            "strategy": {"pattern": "sections", "sections": 3, "points": 8, "margin_mm": 4.0},
+        },
+    ],
+    "alignment": {"datums": ["A", "B", "C"]},
+    "environment": {"u_part_k": 0.1, "u_scales_k": 0.1},
+    "form": {"field_um": 1.0, "roughness_um": 0.2},
+    "characteristic": [
+        {"name": "1", "what": "size", "features": ["bore"], "lower_mm": 29.95, "upper_mm": 30.05},
+        {"name": "2", "what": "position", "features": ["bore"], "datums": ["A", "B", "C"], "tolerance_mm": 0.1},
+        {"name": "3", "what": "perpendicularity", "features": ["bore"], "datums": ["A"], "tolerance_mm": 0.05},
+        {"name": "4", "what": "flatness", "features": ["A"], "tolerance_mm": 0.02},
+        {"name": "5", "what": "distance", "features": ["bore", "B"], "lower_mm": 39.95, "upper_mm": 40.05},
+    ],
+})  # fmt: skip
+"""Tables of job.toml but ``[job]``."""

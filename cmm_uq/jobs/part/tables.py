@@ -1,19 +1,25 @@
-"""The other tables of a part's job: the part, the machine, styli, alignment, placing, surroundings, form, decision."""
+"""The tables of a part's job but features and characteristics, and the whole of its job.toml."""
 
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import Table, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.limits import INPUTS, LISTED
+from cmm_uq.base.files.table import Length, Limit, Table, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.toml_file import line_of
+from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.conformity import Prior, Rule, needs_prior
 from cmm_uq.jobs.identification import Identification
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.machine import Travel, check_carriages
 from cmm_uq.jobs.origin import MEASURED, Origin
-from cmm_uq.jobs.part.feature import Count
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.feature import Count, FeatureFacts, FormFacts
 
 Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]
 """A coefficient of expansion, 1/K: steel has 11.5e-6."""
@@ -200,3 +206,187 @@ class MeasuredFacts(Table):
     file: Name
     """CSV with the columns `feature`, `point` (1, 2, … in the order of the plan), `x_mm`, `y_mm`, `z_mm`: contact points in
     the frame of the part, the tip's radius taken off."""
+
+
+Seconds = Annotated[float, Field(gt=0, le=1e6)]
+
+
+class CalibratedFacts(Table):
+    """One ``[[by_calibrated_part.characteristic]]``."""
+
+    name: Name
+    """Name of the characteristic, as in `[[characteristic]]`."""
+    value_mm: Annotated[float, Field(ge=-1e7, le=1e7)] | None = None
+    """Its value on the calibrated part, of lengths and zones."""
+    u_um: Limit | None = None
+    """Standard uncertainty of that value."""
+    value_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
+    """Its value on the calibrated part, of angles."""
+    u_arcsec: Seconds | None = None
+    """Standard uncertainty of that angle."""
+    u_part_um: Uncertainty = 0.0
+    """Standard uncertainty by what differs between parts: form, roughness, elasticity."""
+    u_part_arcsec: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """The same, of an angle."""
+
+    @model_validator(mode="after")
+    def _one_unit(self) -> Self:
+        length, angle = (self.value_mm, self.u_um), (self.value_deg, self.u_arcsec)
+        if None in length and None in angle:
+            raise ValueError("give value_mm and u_um, or value_deg and u_arcsec of an angle, of its certificate")
+        if any(one is not None for one in length) and any(one is not None for one in angle):
+            raise ValueError("give either value_mm and u_um, or value_deg and u_arcsec")
+        return self
+
+    @property
+    def angle(self) -> bool:
+        """Whether it is stated as one."""
+        return self.value_deg is not None
+
+
+class CalibratedPartFacts(Table):
+    """``[by_calibrated_part]``: a calibrated part like this one, measured again and again (ISO 15530-3)."""
+
+    file: Name
+    """CSV with the column `cycle` (1, 2, …: the set-up), and `characteristic` with `value_mm` or `value_deg`, or else
+    `feature`, `point`, `x_mm`, `y_mm`, `z_mm`; with `repeat` where a set-up was measured several times."""
+    characteristic: Annotated[list[CalibratedFacts], Field(min_length=1, max_length=INPUTS.most)]
+    """What the certificate of the calibrated part states."""
+    certificate: str = ""
+    """Number of that certificate, and whose it is."""
+    corrected: bool = True
+    """Whether results of the part are corrected by the systematic error that the calibrated part shows."""
+    temperature_c: Temperature = REFERENCE_TEMPERATURE
+    """Mean temperature of the calibrated part."""
+    u_cte_per_k: SmallExpansion = 0.0
+    """Standard uncertainty of its coefficient of expansion, 1/K."""
+    same_procedure: bool | None = None
+    """Whether it was measured as the part is: the same points, styli, speeds, clamping."""
+    similar: bool | None = None
+    """Whether it is like the part: size within 10 % (25 mm below 250 mm), angles within 5°, form, roughness and material
+    alike."""
+    conditions_varied: bool | None = None
+    """Whether the repeats lie far enough apart to show what varies in use: times of day, temperatures, operators."""
+    substitution: bool | None = None
+    """Whether the part is measured in place of the calibrated part: where it lay, turned as it was, soon after it."""
+    place_varied: bool = False
+    """Whether it lay in another place in each set-up, as parts do."""
+    qualified_anew: bool = False
+    """Whether the styli were qualified anew for each set-up."""
+
+
+class LengthStandardFacts(Table):
+    """``[by_orientations.length_standard]``."""
+
+    length_mm: Length
+    """Calibrated length."""
+    u_um: Limit
+    """Standard uncertainty of the calibrated length."""
+    file: Name
+    """CSV with the columns `orientation`, `repeat`, `length_mm`: the standard as it was measured, best along directions of the
+    part's lengths."""
+    certificate: str = ""
+    """Number of its certificate, and whose it is."""
+    temperature_c: Temperature = REFERENCE_TEMPERATURE
+    """Its mean temperature."""
+    u_cte_per_k: SmallExpansion = 0.0
+    """Standard uncertainty of its coefficient of expansion, 1/K."""
+
+
+class ProbeStandardFacts(Table):
+    """One ``[[by_orientations.probe_standard]]``."""
+
+    stylus: str = ""
+    """Name of the stylus that measured it; may be left out where there is one."""
+    diameter_mm: Length
+    """Calibrated diameter."""
+    u_um: Limit
+    """Standard uncertainty of the calibrated diameter."""
+    inner: bool = False
+    """Whether it is a ring; else a sphere or a plug."""
+    file: Name
+    """CSV with the columns `orientation`, `repeat`, `diameter_mm`."""
+    certificate: str = ""
+    """Number of its certificate, and whose it is."""
+
+
+class OrientationsFacts(Table):
+    """``[by_orientations]``: the part in several orientations, with standards beside it (ISO/DTS 15530-2 as described)."""
+
+    file: Name
+    """CSV with the columns `orientation`, `repeat`, and `characteristic` with `value_mm` or `value_deg`, or else `feature`,
+    `point`, `x_mm`, `y_mm`, `z_mm` in the frame of the part."""
+    length_standard: LengthStandardFacts | None = None
+    """A calibrated length: what all orientations have in common, the scale of the machine, is taken from it."""
+    probe_standard: Annotated[list[ProbeStandardFacts], Field(max_length=INPUTS.most)] = []
+    """A calibrated ring, sphere or plug for each stylus: the size of the tip is taken from it."""
+    points_varied: bool = False
+    """Whether contact points were others in each orientation, so that the part's form is seen."""
+    place_varied: bool = True
+    """Whether the part lay in other places too."""
+    qualified_anew: bool = False
+    """Whether the styli were qualified anew for each orientation."""
+
+
+class PartFile(Table):
+    """All of a part's job.toml."""
+
+    job: PartJobFacts
+    """Identification, and free text for the certificate."""
+    laboratory: Laboratory = Laboratory()
+    """Who answers for the certificate."""
+    part: PartFacts
+    """What is measured."""
+    machine_state: MachineStateFacts
+    """The machine as its certificate states it."""
+    stylus: Annotated[list[StylusFacts], Field(min_length=1, max_length=INPUTS.most)]
+    """Styli that probe it, and what their qualification left uncertain."""
+    feature: Annotated[list[FeatureFacts], Field(min_length=1, max_length=INPUTS.most)]
+    """Features: where they are meant to be, and where they are probed."""
+    alignment: AlignmentFacts = AlignmentFacts()
+    """How coordinates of the part follow from measured points."""
+    placing: PlacingFacts = PlacingFacts()
+    """Where the part lies in the machine."""
+    probing: ProbingFacts = ProbingFacts()
+    """In which order, how fast and how often the points are probed."""
+    environment: EnvironmentFacts = EnvironmentFacts()
+    """Temperatures while the part is measured, and what is known of them."""
+    form: FormFacts = FormFacts()
+    """The part's own form and roughness, between the points that are probed."""
+    characteristic: Annotated[list[CharacteristicFacts], Field(min_length=1, max_length=INPUTS.most)]
+    """What the drawing asks for."""
+    decision: DecisionFacts = DecisionFacts()
+    """By which rule conformity with the drawing is decided."""
+    recording: MeasuredFacts | None = None
+    """The points as they were measured; without them there are uncertainties alone."""
+    by_calibrated_part: CalibratedPartFacts | None = None
+    """A calibrated part like this one, measured again and again (ISO 15530-3): its uncertainty stands beside this one's."""
+    by_orientations: OrientationsFacts | None = None
+    """The part in several orientations with standards beside it (ISO/DTS 15530-2 as described): likewise."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """The keys of a job.toml.
+
+    Parameters
+    ----------
+    path : of the file.
+    text : that it holds.
+    """
+
+    path: Path
+    text: str
+
+    def of(self, table: str, key: str = "", number: int | None = None) -> str:
+        """A key as messages name it: file, line, table and key.
+
+        Parameters
+        ----------
+        table : its name.
+        key : in it.
+        number : of the table, from 0, where there are several.
+        """
+        line = line_of([table, *([] if number is None else [str(number)]), *([key] if key else [])], self.text)
+        head = f"[{table}]" if number is None else f"[[{table}]] {number + 1}"
+        return f"{self.path}{f' line {line}' if line else ''}: {head} {key}".rstrip()

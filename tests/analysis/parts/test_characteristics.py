@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.analysis.parts.associating import ProbedFeature
-from cmm_uq.analysis.parts.evaluating import Evaluator
+from cmm_uq.analysis.parts.association import ProbedFeature
+from cmm_uq.analysis.parts.evaluation import Evaluator
 from cmm_uq.analysis.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

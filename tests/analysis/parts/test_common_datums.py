@@ -10,9 +10,9 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.analysis.parts.causes import Scatter
+from cmm_uq.analysis.parts.causes.cause import Scatter
 from cmm_uq.analysis.parts.common_datums import ProbedCommon
-from cmm_uq.analysis.parts.evaluating import Evaluator
+from cmm_uq.analysis.parts.evaluation import Evaluator
 from cmm_uq.analysis.parts.plan import Characteristic, CommonDatum, Feature, Nominal, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from cmm_uq.analysis.conformity.limits import RARE, SCARCE, LimitDecision, Limits, judge
 from cmm_uq.analysis.parts.plan import Characteristic, Plan
 from cmm_uq.analysis.parts.result import Stated, conforming, middle, stated
-from cmm_uq.app.commands.part import _together
+from cmm_uq.app.commands.parts.part import _together
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
 from tests.parts_drawn import circle

@@ -10,12 +10,12 @@ import pytest
 
 from cmm_uq.analysis.parts import in_words, plan
 from cmm_uq.analysis.parts.budget import PLACE, budget
-from cmm_uq.analysis.parts.machine import StatedNoise
-from cmm_uq.analysis.parts.of_fixture import moving_part
+from cmm_uq.analysis.parts.causes.surroundings import moving_part
+from cmm_uq.analysis.parts.machine.state import StatedNoise
+from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
-from cmm_uq.app.commands.part_plan import circumstances_of, plan_of
 from cmm_uq.base.messages import Message, Verbatim, say
-from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.job import TABLES
 from cmm_uq.maths.geometry.association import ASSOCIATIONS
 from tests.certificate.parts_found import machine
 from tests.jobs.part.parts import plate

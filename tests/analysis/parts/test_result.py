@@ -1,6 +1,11 @@
-"""What is stated of a zone is what a width can be: not below zero, in value, interval and probability."""
+"""What is stated of a zone is what a width can be: not below zero, in value, interval and probability.
+
+Distances of measured points from their features where they are known; positive is out of the material.
+"""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +13,10 @@ from scipy import stats
 
 from cmm_uq.analysis.conformity.limits import Limits
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
-from cmm_uq.analysis.parts.result import Stated, conforming, stated
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.result import Stated, conforming, deviations_of, stated
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
-from tests.parts_drawn import block, circle, spot
+from tests.parts_drawn import UP, block, circle, plane, spot
 
 PLAN = Plan(
     (circle("hole", [0, 0, 0], 20.0, 8), spot("o", [0, 0, 0])),
@@ -105,3 +110,42 @@ def test_a_zone_of_which_hardly_a_draw_is_possible_is_as_large_as_its_error() ->
     each, _ = conforming(PLAN, ERRORS, np.full(2, -3.0 + 0.25))
     assert each[0] == pytest.approx(stats.norm.cdf(1.5, 3.0) - stats.norm.cdf(-1.5, 3.0), abs=0.004)
     assert each[0] == pytest.approx(Limits(None, 1.5, DRAWS[:, 0] - DRAWS.mean(), zone=True).within(-3.0), abs=0.004)
+
+
+X = np.array([1.0, 0, 0])
+
+
+@pytest.mark.parametrize("hole", [True, False])
+def test_lobes_of_a_circle(hole: bool) -> None:
+    """Three lobes of 5 µm out of the material of a shaft, or of a hole, where that is towards the axis."""
+    feature = circle("c", [10.0, 20.0, 0.0], 15.0, 24, hole=hole)
+    lobes = 5e-3 * np.cos(3 * 2 * np.pi * np.arange(24) / 24)
+    found = deviations_of(Plan((feature,), ()), feature.points + lobes[:, None] * feature.normals)
+    np.testing.assert_allclose(found, lobes, atol=1e-8)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_plane_in_either_sense(sense: float) -> None:
+    """A saddle, to which a plane through its middle is the least-squares one, on a plane that leans and is shifted."""
+    feature = plane("A", sense * UP, [-30.0, -30.0, 0.0], [[60.0, 0, 0], [0, 60.0, 0]])
+    x, y = feature.points[:, 0], feature.points[:, 1]
+    saddle = 4e-3 * x * y / 900
+    moved = feature.points + np.outer(saddle * sense + 1e-5 * x + 0.01, UP)
+    np.testing.assert_allclose(deviations_of(Plan((feature,), ()), moved), saddle, atol=1e-9)
+
+
+def test_a_line_on_a_surface() -> None:
+    at = np.linspace(-40, 40, 9)
+    points, normals = np.outer(at, X), np.tile([0.0, 1.0, 0.0], (9, 1))
+    feature = Feature("l", "line", points, normals, "stylus", Nominal(np.zeros(3), X))
+    bow = 3e-3 * ((at / 40) ** 2 - np.mean((at / 40) ** 2))
+    moved = points + (bow + 2e-5 * at + 0.2)[:, None] * normals + np.outer(at, [0, 0, 1e-4])
+    np.testing.assert_allclose(deviations_of(Plan((feature,), ()), moved), bow, atol=1e-8)
+
+
+def test_features_that_their_points_just_determine_have_none() -> None:
+    three = circle("c", [0.0, 0.0, 0.0], 10.0, 3)
+    plan = Plan((spot("p", [1.0, 2.0, 3.0]), three, replace(circle("d", [0.0, 50.0, 0.0], 10.0, 8))), ())
+    found = deviations_of(plan, plan.points)
+    assert np.isnan(found[:4]).all()
+    np.testing.assert_allclose(found[4:], 0, atol=1e-9)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import ncx2
 
-from cmm_uq.analysis.parts.causes import Rows, Scatter
-from cmm_uq.analysis.parts.evaluating import Evaluator, characteristics_of
-from cmm_uq.analysis.parts.of_temperature import Expansion, Surroundings
+from cmm_uq.analysis.parts.causes.cause import Rows, Scatter
+from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
+from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
 from cmm_uq.analysis.parts.placing import Pose, placed
 from cmm_uq.analysis.parts.plan import Alignment, Characteristic, Nominal, Plan, Stylus
 from cmm_uq.analysis.parts.result import conforming, evaluated, stated

@@ -10,7 +10,7 @@ import pytest
 
 import cmm_uq
 from cmm_uq.app.api.outcomes import Part
-from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.job import TABLES
 from tests.part_machines import THERE, by_results, plate_of
 
 

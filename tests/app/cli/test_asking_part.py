@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
 from cmm_uq.app.cli import asking_part
 from cmm_uq.app.commands.jobs.new import write_new
-from cmm_uq.app.commands.new_part import PART
-from cmm_uq.app.commands.part_plan import plan_of, refuse_unfit
+from cmm_uq.app.commands.parts.new import PART
 from cmm_uq.jobs.part.job import PartJob, read_part
 from tests.conftest import ROOT
 

@@ -10,7 +10,7 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 
-from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.job import TABLES
 from tests.app.cli.process import run
 from tests.part_machines import THERE, by_results, plate_files
 

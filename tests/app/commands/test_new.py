@@ -18,7 +18,7 @@ from cmm_uq.app.commands.budget import write_budget
 from cmm_uq.app.commands.jobs.check import check_job, check_read
 from cmm_uq.app.commands.jobs.folder import BUDGET, PLAN, README, RECORDING, SCHEMA
 from cmm_uq.app.commands.jobs.new import job_of_export, known, new_job, titles, write_new
-from cmm_uq.app.commands.new_part import PART
+from cmm_uq.app.commands.parts.new import PART
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.app.commands.report import diagnosis_outcome, report_outcome

@@ -16,13 +16,13 @@ import pytest
 from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.commands.part import part_found
-from cmm_uq.app.commands.part_machine import machine_found
-from cmm_uq.app.commands.part_written import Asked, contents_of, write_part, written
+from cmm_uq.app.commands.parts.documents import Asked, contents_of, write_part, written
+from cmm_uq.app.commands.parts.machine import machine_found
+from cmm_uq.app.commands.parts.part import part_found
 from cmm_uq.app.commands.verify import Verification, verify
 from cmm_uq.app.commands.verify_part import _asked_again
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.part.measurement import PartFound
 from cmm_uq.certificate.part.results import standing_data
 from cmm_uq.certificate.verify.pdf_file import PdfFile
 from tests.conftest import ROOT
@@ -50,7 +50,7 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests whose report was made by :func:`plate_found`, that computing again has no part in."""
-    monkeypatch.setattr("cmm_uq.app.commands.part_written.found_of", found_again_once)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.documents.found_of", found_again_once)
 
 
 def found_in(folder: Path, files: Mapping[str, bytes], *names: str, rerun: bool = False) -> Verification:
@@ -173,7 +173,7 @@ def test_the_certificate_inside_is_verified_as_by_itself(tmp_path: Path) -> None
 
 def test_the_machines_own_job_goes_with_the_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where no certificate states the machine, its job is inside, and all is computed again from the file."""
-    monkeypatch.setattr("cmm_uq.app.commands.part.ways", unchanged)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
     (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
     files = plate_files({}, np.zeros((60, 3)), machine_state={"job": "../machine"})
     put(tmp_path / "plate", files)

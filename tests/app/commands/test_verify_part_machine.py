@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.part import part_found
-from cmm_uq.app.commands.part_history import FILE
-from cmm_uq.app.commands.part_written import contents_of
+from cmm_uq.app.commands.parts.documents import contents_of
+from cmm_uq.app.commands.parts.drift import FILE
+from cmm_uq.app.commands.parts.part import part_found
 from cmm_uq.app.commands.verify import verify
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.part.found import PartFound
+from cmm_uq.certificate.part.measurement import PartFound
 from tests.app.cli.test_due import recorded
 from tests.app.cli.test_history import scale
 from tests.part_machines import PDF as MACHINE_PDF
@@ -31,8 +31,8 @@ BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", 
 
 @pytest.fixture(autouse=True)
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cmm_uq.analysis.parts.conditional.sample_with_noise", sampled_once)
-    monkeypatch.setattr("cmm_uq.app.commands.part.ways", unchanged)
+    monkeypatch.setattr("cmm_uq.analysis.parts.machine.conditional.sample_with_noise", sampled_once)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", unchanged)
 
 
 def records(folder: Path) -> Path:

@@ -1,4 +1,7 @@
-"""A part's page says what was found of it, and nothing else: figures, verdicts, causes, and what is missing."""
+"""A part's page says what was found of it, and nothing else: figures, verdicts, causes, and what is missing.
+
+A part in a few lines: what to measure on the machine is named with its file, set-ups are left to the page.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from dataclasses import replace
 from decimal import Decimal
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,22 +20,21 @@ import pytest
 
 from cmm_uq.analysis.conformity.decision import Outcome
 from cmm_uq.analysis.conformity.limits import LimitDecision
+from cmm_uq.analysis.parts.budget import Displaced
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.displaced import Displaced
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Document, Overview, Section, Table
 from cmm_uq.certificate.effect_words import title_of
 from cmm_uq.certificate.part.budget_section import by_family, unseen_section, ways_section
-from cmm_uq.certificate.part.found import Further, PartFound, Unseen
-from cmm_uq.certificate.part.machine_section import machine_section
+from cmm_uq.certificate.part.figures import _remarks
+from cmm_uq.certificate.part.measurement import Further, PartFound, Unseen
 from cmm_uq.certificate.part.method import method_section
-from cmm_uq.certificate.part.overview import overview_of
-from cmm_uq.certificate.part.page import lacking_of, part_document
-from cmm_uq.certificate.part.pictured import errors_section
+from cmm_uq.certificate.part.page import lacking_of, machine_section, overview_of, part_document
+from cmm_uq.certificate.part.part_section import errors_section
 from cmm_uq.certificate.part.results_section import results_section
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf
-from cmm_uq.jobs.part.beginning import TABLES
+from cmm_uq.jobs.part.job import TABLES
 from tests.certificate.parts_found import ERRORS, found_of, measured_points
 from tests.certificate.parts_found import STANDING as CERTIFICATE
 from tests.certificate.saying import leaves, strangers
@@ -462,3 +465,20 @@ def test_no_key_of_a_job_file_stands_on_the_report_of_a_part(
     assert "serial number of the part (7.8.2.1 g)" in page(bare).warnings[-1]
     assert [mentioned(page(one)) for one in (planned, measured, every_kind, bare)] == [[], [], [], []]
     assert all("[part]" not in text for text in leaves(page(bare)))
+
+
+def remark(further: Further) -> str:
+    found: Any = SimpleNamespace(standing=SimpleNamespace(path=say("drawn")), unseen=(), further=further)
+    return str(_remarks(found)[-1])
+
+
+def test_what_further_set_ups_show_is_named_and_what_they_do_not_is_left_out() -> None:
+    further = Further(
+        ("scale_x", "rotation_x_x"), 2, say("all"), "cmm-uq plan further", "further/job.toml", ("rotation_x_x",)
+    )
+    assert remark(further) == "2 further set-ups of the artefact show Scale error of X: further/job.toml."
+
+
+def test_where_none_shows_anything_that_is_said() -> None:
+    said = remark(Further(("rotation_x_x",), 0, say("all"), missed=("rotation_x_x",)))
+    assert said == "No further set-up of the artefact as it was recorded shows what the calibration did not see."

@@ -7,17 +7,14 @@ import re
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.displaced import Displaced
+from cmm_uq.analysis.parts.budget import Displaced
 from cmm_uq.analysis.parts.placing import Pose
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.part import views
-from cmm_uq.certificate.part.budget_plot import shares_plots
-from cmm_uq.certificate.part.correlation_plot import correlation_plot
-from cmm_uq.certificate.part.errors_picture import MOST, errors_picture, form_picture
-from cmm_uq.certificate.part.margin_plot import A_PAGE, Margin, margin_plot, margin_plots
-from cmm_uq.certificate.part.picture import part_picture
+from cmm_uq.certificate.part.pictures import MOST, errors_picture, form_picture, part_picture
+from cmm_uq.certificate.part.plots import A_PAGE, Margin, correlation_plot, margin_plot, margin_plots, shares_plots
 from cmm_uq.certificate.part.views import ABOVE, FRONT, OBLIQUE, SIDE, VIEWS, panels
 from cmm_uq.certificate.plots.plans import _seen
 from cmm_uq.certificate.plots.style import WIDTH_MM, house_style

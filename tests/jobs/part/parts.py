@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from cmm_uq.base.files.toml_file import as_toml
-from cmm_uq.jobs.part.beginning import TABLES
 from cmm_uq.jobs.part.feature import FeatureFacts
-from cmm_uq.jobs.part.job import PartJob, part_of
+from cmm_uq.jobs.part.job import TABLES, PartJob, part_of
 from cmm_uq.jobs.part.probed import Probed, probed
 
 

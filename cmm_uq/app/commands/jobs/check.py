@@ -158,12 +158,9 @@ def _of_a_part(path: Path) -> bool:
 
 def _check_part(folder: Path, path: Path) -> JobCheck:
     """The job of a part: what its readers refuse, and that its figures are an example's."""
-    from cmm_uq.app.commands.part_machine import refuse_machine
-    from cmm_uq.app.commands.part_methods import lacking
-    from cmm_uq.app.commands.part_plan import (  # the virtual measurement, which no other job needs
-        refuse_out_of_reach,
-        refuse_unfit,
-    )
+    from cmm_uq.analysis.parts.methods.of_job import lacking
+    from cmm_uq.analysis.parts.setup import refuse_out_of_reach, refuse_unfit
+    from cmm_uq.app.commands.parts.machine import refuse_machine
 
     wrong, warnings, job = Gathered(), list[Problem](), None
     with wrong.going_on():

@@ -30,8 +30,7 @@ from cmm_uq.app.commands.jobs.folder import (
     kind_or_refused,
     read_new,
 )
-from cmm_uq.app.commands.new_part import PART, part_files, part_of_answers, part_of_drawing
-from cmm_uq.app.commands.new_part_answers import Answers
+from cmm_uq.app.commands.parts.new import PART, Answers, part_files, part_of_answers, part_of_drawing
 from cmm_uq.artefacts import kind_named, names
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.output import Owner, staged

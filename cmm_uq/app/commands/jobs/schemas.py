@@ -56,7 +56,7 @@ def budget() -> Schema:
 
 def part() -> Schema:
     """Of the job of a part."""
-    from cmm_uq.jobs.part.file import PartFile
+    from cmm_uq.jobs.part.tables import PartFile
 
     return schema_of(PartFile, "job.toml of a part, for cmm-uq")
 

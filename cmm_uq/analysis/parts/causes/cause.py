@@ -1,0 +1,236 @@
+"""What moves the points of a measured part: each cause with its draws, linear in them, and its name in the budget.
+
+What moves the points of a measured part: each cause with its draws, linear in them, and its name in the budget.
+
+A cause is displacements of all points for one unit of each of its coefficients, and draws of these together. What points have
+in common (a tip, a temperature, the machine) is one coefficient, so that it is as common in every characteristic. A
+coefficient may be any function of what is not known, such as the product of an expansion coefficient and a temperature.
+
+Displacements are of measured points in the frame of the part, about their mean: *indicated = true − e*.
+
+Components of random fields on many points, without the covariance of each with each.
+
+A pivoted Cholesky decomposition (Harbrecht, Peters, Schneider 2012, Appl. Numer. Math. 62, 428) asks for one column of the
+covariance after the other, always that of the point of which most is left, and ends when nothing is. A smooth field has
+far fewer components than points.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
+
+from cmm_uq.base.messages import Text
+from cmm_uq.base.points import Floats, Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Coefficients (N, K) that are rows of a table: what follows from them linearly needs following once a row of it.
+
+    Parameters
+    ----------
+    table : (M, K).
+    rows : (N,) of it.
+    """
+
+    table: Floats
+    rows: Ints
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> Floats:
+        return np.asarray(self.table[self.rows], dtype=dtype)
+
+
+Drawn = Floats | Rows
+"""Coefficients (N, K)."""
+
+Draw = Callable[[np.random.Generator, int], Drawn]
+"""Coefficients of so many draws."""
+
+_NOTHING = 1e-12
+"""Part of the largest variance below which a component of a random field is rounding."""
+
+
+_UNSEEN_MM = 1e-11
+"""Root mean square displacement for one unit of a coefficient below which a component is left out."""
+
+_FACTORED = 64
+"""Coefficients up to which no components are looked for."""
+
+_ROUNDING = 1e-15
+"""Of the largest, a square of components that is rounding."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Cause(ABC):
+    """What moves points in proportion to coefficients.
+
+    Parameters
+    ----------
+    name : of the cause: ``machine``, ``stylus``, ….
+    factors : K names in the budget, one a coefficient; those that share a name are one line of it.
+    draw : of the coefficients, together.
+    named : by factor, why it should be told beside the result.
+    """
+
+    name: str
+    factors: tuple[str, ...]
+    draw: Draw
+    named: Mapping[str, Text] = field(default_factory=dict)
+
+    @abstractmethod
+    def through(self, derivative: Floats) -> Floats:
+        """(K, p) change of p values for one unit of each coefficient, of their derivative (p, n, 3) by the points."""
+
+    @abstractmethod
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """(N, m, 3) displacements of m points for coefficients (N, K), mm."""
+
+    def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
+        """(N, m) of these along normals (m, 3); (N, 1) of zero where it moves none."""
+        return np.asarray(np.einsum("nmi,mi->nm", self.moved(coefficients, rows), normals))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Common(Cause):
+    """What points have in common.
+
+    Parameters
+    ----------
+    basis : (K, n, 3) displacements of the points for one unit of each coefficient, mm.
+    """
+
+    basis: Floats
+    _raising: dict[tuple[int, int], tuple[Floats, Floats]] = field(default_factory=dict, init=False)
+
+    def through(self, derivative: Floats) -> Floats:
+        """See :meth:`Cause.through`."""
+        K, n, _ = self.basis.shape
+        return np.asarray(self.basis.reshape(K, 3 * n) @ derivative.reshape(len(derivative), 3 * n).T)
+
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """See :meth:`Cause.moved`."""
+        part = self.basis[:, rows]
+        K, m, _ = part.shape
+        return np.asarray((coefficients @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
+
+    def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
+        """See :meth:`Cause.raised`."""
+        key = rows.start, rows.stop
+        if key not in self._raising:
+            self._raising[key] = _few(np.einsum("kmi,mi->km", self.basis[:, rows], normals))
+        left, right = self._raising[key]
+        if not len(right):
+            return np.zeros((len(coefficients), 1))
+        return np.asarray((coefficients @ left) @ right)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Scatter(Cause):
+    """What moves each coordinate of each point on its own: a coefficient a coordinate, in standard deviations.
+
+    Parameters
+    ----------
+    size : (n, 3) standard deviations along three axes, mm.
+    turn : (3, 3) unit vectors of these axes in the frame of the part, a row each.
+    scale : draws (N, 3) of a factor on the size along each axis, common to all points; none where it is one.
+    """
+
+    size: Floats
+    turn: Floats = field(default_factory=lambda: np.eye(3))
+    scale: Draw | None = None
+
+    @classmethod
+    def of(cls, name: str, factor: str, size: Floats, turn: Floats | None = None, scale: Draw | None = None) -> Scatter:
+        """A normal one; with draws (N, 3) of a factor on the size along each axis, common to all points, a mixture."""
+
+        def draw(random: np.random.Generator, n: int) -> Floats:
+            drawn = random.standard_normal((n, *size.shape))
+            if scale is not None:
+                drawn *= np.asarray(scale(random, n))[:, None, :]
+            return drawn.reshape(n, -1)
+
+        axes = np.eye(3) if turn is None else turn
+        return cls(name=name, factors=(factor,) * size.size, draw=draw, size=size, turn=axes, scale=scale)
+
+    def through(self, derivative: Floats) -> Floats:
+        """See :meth:`Cause.through`."""
+        return np.asarray(((derivative @ self.turn.T) * self.size).reshape(len(derivative), self.size.size).T)
+
+    def moved(self, coefficients: Floats, rows: slice) -> Floats:
+        """See :meth:`Cause.moved`."""
+        along = coefficients.reshape(len(coefficients), -1, 3)[:, rows] * self.size[rows]
+        return np.asarray(along @ self.turn)
+
+
+def _few(heights: Floats) -> tuple[Floats, Floats]:
+    """Factors (K, r) and (r, m) of heights (K, m), of as few components as these have where they are many."""
+    heights = np.asarray(heights)
+    if len(heights) <= _FACTORED:
+        acting = np.flatnonzero(np.abs(heights).max(axis=1, initial=0.0) > 0)
+        return np.eye(len(heights))[:, acting], heights[acting]
+    values, vectors = np.linalg.eigh(heights @ heights.T)
+    left = vectors[:, values > heights.shape[1] * _UNSEEN_MM**2 + _ROUNDING * values[-1]]
+    return left, np.asarray(left.T @ heights)
+
+
+def normal(sd: ArrayLike) -> Draw:
+    """Independent normal coefficients about zero of standard deviations (K,)."""
+    each = np.asarray(sd, dtype=np.float64)
+    return lambda random, n: random.standard_normal((n, len(each))) * each
+
+
+def components(kernel: Floats) -> Floats:
+    """(K, n) of a random field of covariance (n, n): times independent standard normal numbers they add up to it."""
+    values, vectors = np.linalg.eigh(kernel)
+    kept = values > _NOTHING * max(float(values[-1]), np.finfo(np.float64).tiny)
+    return np.asarray((vectors[:, kept] * np.sqrt(values[kept])).T)
+
+
+def field_along(name: str, factor: str, kernel: Floats, along: Floats) -> Common:
+    """A random field on the points along one direction (n, 3) of each, of covariance (n, n), mm²."""
+    shapes = components(kernel)
+    draw = normal(np.ones(len(shapes)))
+    return Common(name=name, factors=(factor,) * len(shapes), draw=draw, basis=shapes[:, :, None] * along)
+
+
+MANY = 1000
+"""Points up to which the eigenvectors of the whole covariance are quickly found."""
+
+_LEFT = 1e-8
+"""Of the largest variance that may be left of a point's: a ten-thousandth of a standard deviation."""
+
+Covariance = Callable[[slice], Floats]
+"""Covariance (m, n) of some points with all n."""
+
+
+def field_components(covariance: Covariance, variances: Floats) -> Floats:
+    """(K, n) of a random field on n points: times independent standard normal numbers they add up to it.
+
+    Parameters
+    ----------
+    covariance : of some points with all.
+    variances : (n,) of each point.
+    """
+    n = len(variances)
+    if n <= MANY:
+        return components(covariance(slice(None)))
+    left, least = variances.copy(), _LEFT * float(variances.max())
+    found, count = np.empty((64, n)), 0
+    while count < n and left.max() > least:
+        if count == len(found):
+            found = np.concatenate([found, np.empty_like(found)])
+        pivot = int(np.argmax(left))
+        column = covariance(slice(pivot, pivot + 1))[0] - found[:count, pivot] @ found[:count]
+        found[count] = column / np.sqrt(left[pivot])
+        left -= found[count] ** 2
+        left[pivot] = 0.0
+        count += 1
+    return found[:count].copy()

@@ -1,0 +1,354 @@
+"""The machine as its certificate states it, on the day of a part's measurement.
+
+The machine as its certificate states it: its errors with all that is known of them together, and what nobody knows of it.
+
+*Modelled* errors are drawn from the joint posterior of the calibration, whole rows of it, so that what the calibration could
+not tell apart stays tied together; what it left to the prior alone is drawn with that prior and named by its share of it. An
+error that the calibration did not model is drawn with the smaller of what physics allows and of what the calibration's
+recording would have shown. Those are drawn on their own: what is stated together in no certificate cannot be drawn together.
+
+The state of a machine from what its certificate carries: the data of ``results.json`` and the draws beside it.
+
+Takes plain data that somebody else has read and verified; nothing here opens a file.
+
+A machine's errors on the day of a part's measurement: what they may have changed by since the calibration.
+
+Where records of the machine say how its errors drift, that is drawn with them; where nothing is known of it, the errors are
+named and taken as they were, with the age of the certificate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.machine.physics.catalogue import effects, every
+from cmm_uq.machine.physics.effect import CONTRACT, Effect
+
+POWER_QUANTILE = 1.6449
+"""Of a normal error one in ten, in size, is larger than so many standard deviations."""
+
+OTHERWISE = ("artefact", "probe")
+"""Mechanisms that are no error of the machine on its own; those of the stylus are drawn from its qualification."""
+
+_SURROUNDINGS = "temp_"
+"""What begins the columns of effects that the temperatures of the part's measurement drive."""
+
+_TIMES = 200
+"""Draws of a slow wander of which its covariance is the mean."""
+
+FREE = 0.5
+"""Share of the prior in a posterior standard deviation from which on the calibration left an error free."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unmodelled:
+    """An error that the calibration did not model.
+
+    Parameters
+    ----------
+    effect : that it is.
+    sd : (k,) standard deviations of its coefficients, in their units.
+    detected : size of its (first) reported parameter that the calibration would have found; ``None`` where it would not have,
+        or does not say.
+    """
+
+    effect: Effect
+    sd: Floats
+    detected: float | None = None
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the calibration bounds it more tightly than physics does."""
+        return bool(self.sd[0] < self.effect.coefficients[0].prior_sd)
+
+
+@dataclass(frozen=True, eq=False)
+class StatedNoise:
+    """Noise of one coordinate of one point, as the calibration found it: each size a number, or one for each of M draws.
+
+    Parameters
+    ----------
+    coordinate_mm : (3,) standard deviation of each reading along x, y, z, or (M, 3).
+    placing_mm : of what a set-up adds to each of its points, and its repeats share.
+    slow_mm, slow_time_s : of a slow wander of each coordinate, and the time over which it forgets: infinite of a random walk.
+    growth_mm : of what grows with the distance from the first point that is probed, at the distance ``longest_mm``; where that
+        is zero it is not known, and all of it acts everywhere.
+    walked_s : time after which a random walk has the mean square ``slow_mm²`` from its beginning until then.
+    """
+
+    coordinate_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    placing_mm: Floats | float = 0.0
+    slow_mm: Floats | float = 0.0
+    slow_time_s: Floats | float = 600.0
+    growth_mm: Floats | float = 0.0
+    longest_mm: float = 0.0
+    walked_s: float = 600.0
+
+    @property
+    def usual_mm(self) -> Floats:
+        """(3,) root mean square of the standard deviation of a reading."""
+        return np.asarray(np.sqrt(np.mean(np.atleast_2d(self.coordinate_mm) ** 2, axis=0)))
+
+    def slow_kernel(self, seconds: Floats) -> Floats:
+        """(n, n) covariance, mm², of the slow wander at times (n,), the mean over its draws.
+
+        Of a walk only what it has moved since the first of the times matters; its variance grows by 2·slow²/walked.
+        """
+        sd, time = np.broadcast_arrays(np.atleast_1d(self.slow_mm), np.atleast_1d(self.slow_time_s))
+        apart = np.abs(np.subtract.outer(seconds, seconds))
+        walks, count = np.isinf(time), len(sd)
+        since = seconds - seconds.min(initial=np.inf)
+        kernel = 2 * np.sum(sd[walks] ** 2) / self.walked_s * np.minimum.outer(since, since)
+        returning = np.flatnonzero(~walks & (sd > 0))
+        few = returning[np.linspace(0, len(returning) - 1, min(len(returning), _TIMES)).astype(np.int64)]
+        scale = np.sum(sd[returning] ** 2) / max(float(np.sum(sd[few] ** 2)), np.finfo(np.float64).tiny)
+        for i in few:
+            kernel += scale * sd[i] ** 2 * np.exp(-apart / time[i])
+        return np.asarray(kernel / count)
+
+
+@dataclass(frozen=True, eq=False)
+class MachineState:
+    """What is known of a machine on the day that a part is measured.
+
+    Parameters
+    ----------
+    machine : its chain, travel and origin.
+    effects : that the calibration modelled, in the order of their coefficients.
+    draws : (M, k) of the coefficients together, in their units.
+    noise : of its readings.
+    shapes : nonlinear parameters of effects that have some, by name.
+    prior_share : by effect, part of its posterior standard deviation that is the prior's own: near 1 where the calibration
+        said nothing.
+    unmodelled : errors that it may have besides.
+    drift : (k,) root mean square of each coefficient's change since the calibration.
+    corrected : whether the machine corrects errors that were found, so that what remains is about zero.
+    corrections : (k,) coefficients that it then corrects; their means by default.
+    calibrated, valid_until : days of its certificate.
+    temperature_c : at its calibration: the errors of its scales are those of that temperature. ``None`` where they are those
+        of 20 °C, or nobody knows.
+    measured : day of the part's measurement.
+    drift_unknown : effects of which nobody knows how they have changed since the calibration.
+
+    Raises
+    ------
+    CmmUqError : draws that do not fit the effects.
+    """
+
+    machine: Machine
+    effects: tuple[Effect, ...]
+    draws: Floats
+    noise: StatedNoise = field(default_factory=StatedNoise)
+    shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    prior_share: Mapping[str, float] = field(default_factory=dict)
+    unmodelled: tuple[Unmodelled, ...] = ()
+    drift: Floats = field(default_factory=lambda: np.zeros(0))
+    corrected: bool = True
+    corrections: Floats = field(default_factory=lambda: np.zeros(0))
+    calibrated: date | None = None
+    valid_until: date | None = None
+    temperature_c: float | None = None
+    measured: date | None = None
+    drift_unknown: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        k = sum(len(effect.coefficients) for effect in self.effects)
+        if self.draws.ndim != 2 or self.draws.shape[1] != k or not len(self.draws):
+            raise CmmUqError(f"draws {self.draws.shape} do not fit {k} coefficients of the machine's errors",
+                             where="the posterior", fix="Give a row a draw, a column a coefficient")  # fmt: skip
+        if not np.isfinite(self.draws).all():
+            raise CmmUqError("a draw is no finite number", where="the posterior")
+        coordinate = self.noise.coordinate_mm
+        if coordinate.shape not in ((3,), (len(self.draws), 3)):
+            raise CmmUqError(f"noise {coordinate.shape} does not fit {len(self.draws)} draws", where="the posterior")
+        if not len(self.drift):
+            object.__setattr__(self, "drift", np.zeros(k))
+
+    @cached_property
+    def mean(self) -> Floats:
+        """(k,) mean of the modelled coefficients."""
+        return np.asarray(self.draws.mean(axis=0))
+
+    @property
+    def corrects(self) -> Floats:
+        """(k,) coefficients that it corrects."""
+        if not self.corrected:
+            return np.zeros(self.draws.shape[1])
+        return self.corrections if len(self.corrections) else self.mean
+
+    @property
+    def age_days(self) -> int | None:
+        """Days from its calibration to the part's measurement; ``None`` where one of them is not known."""
+        if self.measured is None or self.calibrated is None:
+            return None
+        return (self.measured - self.calibrated).days
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Effects that the calibration left to their priors."""
+        return tuple(effect.name for effect in self.effects if self.prior_share.get(effect.name, 0.0) > FREE)
+
+
+def of_machine(effect: Effect) -> bool:
+    """Whether an effect is an error of the machine, and not of an artefact or of a probe."""
+    return effect.mechanism not in OTHERWISE and not effect.of_artefact
+
+
+def coefficients_of(effects: Iterable[Effect], reported: Mapping[str, Floats]) -> Floats:
+    """Coefficients (M, k) of effects from draws (M,) of their reported parameters by ``effect.parameter``.
+
+    Raises
+    ------
+    CmmUqError : a parameter is missing, or an effect has a nonlinear one.
+    """
+    columns: list[Floats] = []
+    for effect in effects:
+        if effect.shape:
+            raise CmmUqError(f"{effect.name} has the nonlinear parameter {effect.shape[0].name}, which no certificate draws",
+                             where="the posterior", fix="Leave the effect out")  # fmt: skip
+        names = [parameter.name for parameter in effect.reported]
+        for name in names:
+            if f"{effect.name}.{name}" not in reported:
+                raise CmmUqError(f"has no draws of {effect.name}.{name}", where="the posterior",
+                                 fix=suggestion(f"{effect.name}.{name}", reported))  # fmt: skip
+        rows = np.column_stack([reported[f"{effect.name}.{name}"] for name in names]).tolist()
+        own = [effect.from_reported(dict(zip(names, row, strict=True)))[0] for row in rows]
+        columns.append(np.array(own, dtype=np.float64))
+    return np.concatenate(columns, axis=1) if columns else np.zeros((1, 0))
+
+
+def unmodelled_errors(modelled: Iterable[str], detected: Mapping[str, float | None]) -> tuple[Unmodelled, ...]:
+    """Common errors of a machine that its calibration did not model.
+
+    Parameters
+    ----------
+    modelled : names of the effects that it did.
+    detected : by effect, the smallest size of its (first) parameter that its recording would have shown; ``None`` for none.
+        An effect that is not there needs what was not recorded, so that nothing was seen of it.
+    """
+    known, found = set(modelled), []
+    for effect in every().values():
+        if effect.name in known or effect.tier != CONTRACT or not of_machine(effect):
+            continue
+        if any(column.startswith(_SURROUNDINGS) for column in effect.columns):
+            continue
+        allowed = np.array([coefficient.prior_sd for coefficient in effect.coefficients])
+        size = detected.get(effect.name)
+        seen = np.inf if size is None else size / POWER_QUANTILE
+        found.append(Unmodelled(effect, np.asarray(allowed * min(1.0, seen / allowed[0])), size))
+    return tuple(found)
+
+
+def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:
+    """The noise in draws (M,) of a posterior by ``noise.…_um``; along each axis where these were told apart."""
+    one = reported.get("noise.coordinate_um")
+    if one is None:
+        return StatedNoise()
+    axes = [np.asarray(reported.get(f"noise.{axis}_um", one)) for axis in "xyz"]
+    placing, slow, growth = (
+        MICROMETRE * np.asarray(reported.get(f"noise.{name}_um", np.zeros(1))) for name in ("placing", "slow", "growth")
+    )
+    return StatedNoise(MICROMETRE * np.column_stack(axes), placing, slow, growth_mm=growth)
+
+
+_WHERE = "the machine's results.json"
+
+
+def flat_draws(names: Any, centre: Floats, draws: Floats) -> dict[str, Floats]:
+    """Draws (M,) of each quantity by name, from the arrays of ``posterior.npz``: deviations (…, q) from their mean."""
+    values = np.asarray(centre) + np.asarray(draws, dtype=np.float64).reshape(-1, len(centre))
+    return {str(name): values[:, i] for i, name in enumerate(names)}
+
+
+def machine_stated(
+    results: Mapping[str, Any],
+    draws: Mapping[str, Floats],
+    machine: Machine,
+    *,
+    corrected: bool,
+    unmodelled: bool = True,
+) -> MachineState:
+    """The machine as a certificate states it.
+
+    Parameters
+    ----------
+    results : the data of ``results.json``.
+    draws : (M,) of its posterior, by name.
+    machine : its chain, travel and origin.
+    corrected : whether it corrects what was found.
+    unmodelled : whether errors that the calibration did not model are drawn too.
+
+    Raises
+    ------
+    CmmUqError : results of another kind, or draws that do not belong to them.
+    """
+    if "estimates" not in results or "identifiability" not in results:
+        raise CmmUqError(
+            "states no errors of a machine",
+            where=_WHERE,
+            fix="Give a certificate whose analysis names errors: of a ballbar, step gauge, plate, sphere, …",
+        )
+    modelled = list(results["estimates"])
+    # faults of the artefact, and of the probe that calibrated, are not those of this measurement
+    found = tuple(effect for effect in effects(modelled, where=_WHERE) if of_machine(effect))
+    shares: dict[str, float] = {}
+    for name, share in results["identifiability"].get("prior_share", {}).items():
+        effect = name.partition(".")[0]
+        if effect in modelled and share is not None:
+            shares[effect] = max(shares.get(effect, 0.0), float(share))
+    unseen = results.get("diagnosis", {}).get("unseen", [])
+    detected = {row["effect"]: row["detected"] for row in unseen}
+    day = results.get("job", {}).get("date")
+    return MachineState(
+        machine,
+        found,
+        coefficients_of(found, draws),
+        noise_of_draws(draws),
+        prior_share=shares,
+        unmodelled=unmodelled_errors(modelled, detected) if unmodelled else (),
+        corrected=corrected,
+        calibrated=date.fromisoformat(day) if day else None,
+    )
+
+
+Change = Callable[[str, float], float | None]
+"""Root mean square change of a reported parameter (``scale_x.ppm``), in its unit, by so many days after the calibration;
+``None`` where nothing is known of it."""
+
+
+def aged(state: MachineState, on: date, change: Change | None = None) -> MachineState:
+    """The state of a machine on a day.
+
+    Parameters
+    ----------
+    state : as its certificate states it. Errors that it did not model are drawn as large as they may be on any day.
+    on : day of the part's measurement.
+    change : by the records; ``None`` where there are none.
+    """
+    days = 0 if state.calibrated is None else abs((on - state.calibrated).days)
+    sizes, unknown = list[Floats](), list[str]()
+    for effect in state.effects:
+        found = _changes(effect, days, change)
+        sizes.append(np.array([0.0 if one is None else one for one in found]))
+        if None in found and (days or state.calibrated is None):
+            unknown.append(effect.name)
+    drift = np.concatenate([np.zeros(0), *sizes])
+    return replace(state, drift=drift, drift_unknown=tuple(unknown), measured=on)
+
+
+def _changes(effect: Effect, days: float, change: Change | None) -> list[float | None]:
+    """Of each coefficient; of an amplitude and a phase, that of the amplitude for both."""
+    if change is None:
+        return [None] * len(effect.coefficients)
+    reported = [one.name for one in effect.reported]
+    own = [one.name if one.name in reported else reported[0] for one in effect.coefficients]
+    return [change(f"{effect.name}.{name}", float(days)) for name in own]

@@ -1,0 +1,401 @@
+"""Other methods for the uncertainty of a part beside the virtual measurement.
+
+The uncertainty of a part by a calibrated one like it, measured again and again: the method of ISO 15530-3:2011.
+
+Its text was not at hand; followed is how it is described in public. The repeats show what varies between them; the machine's
+errors, which they keep, show as a systematic error b at the place where the calibrated part lay:
+
+    U = k √(u_cal² + u_p² + u_b² + u_w²), k = 2, for results that are corrected by b; else |b| is added (ISO/TS 15530-3:2004).
+
+The budget itself is that of :func:`cmm_uq.maths.uncertainty.budgets.machine.use_by_calibrated_workpiece`.
+
+The uncertainty of a part by measuring it in several orientations, with a length standard and standards of the tips.
+
+The method of ISO/DTS 15530-2, "Use of multiple workpiece orientations and calibrated simple standards", of which only the
+public summary was at hand: several orientations and repetitions, evaluated by analysis of variance; standards of length;
+standards for the error of the probe's qualification. How these go together here follows from the model
+
+    y_ij = y + a E + Σ b δ + g_i + e_ij
+
+with the machine's errors in orientation i as one random g_i, the scale E common to all orientations, taken from the length
+standard, and the error δ of a tip's effective diameter, taken from a ring or sphere; a and b are derivatives of the
+characteristic. Errors that no orientation changes (the part's form at its points, a temperature common to all) are not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
+from cmm_uq.maths.uncertainty.analysis_of_variance import OneWay, one_way
+from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
+from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS, use_by_calibrated_workpiece
+
+Method = Literal["virtual", "calibrated_part", "orientations"]
+"""Virtual measurements; a calibrated part measured again and again; the part itself in several orientations."""
+
+Seen = Literal["drawn", "varied", "systematic", "corrected", "stated", "unseen"]
+"""How a method takes hold of a cause: *drawn* from what is known of it; as scatter, because it *varied* between repeats; in
+the *systematic* error that was found; *corrected* by a standard, with the standard's uncertainty; *stated* from descriptions;
+or *unseen*."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a method asks of its test.
+
+    Parameters
+    ----------
+    text : of what is asked, in words.
+    met : whether it is met; ``None`` where the job does not say.
+    """
+
+    text: Text
+    met: bool | None
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """One characteristic by one method, mm or rad.
+
+    Parameters
+    ----------
+    name : of the characteristic.
+    budget : of the method, with its k.
+    value : of the part; ``None`` where the part was not measured.
+    systematic : error that the method found and takes off; ``None`` where it looks for none.
+    corrected : whether it is taken off; where not, its size is added to U.
+    single : standard uncertainty of one measurement in one orientation, where ``budget`` is of the mean of all.
+    zone : whether it is the width of a zone, which errors make larger on average where it is small.
+    scatter, scatter_dof : standard deviation of one measurement among the repeats, and its degrees of freedom.
+    """
+
+    name: str
+    budget: Budget
+    value: float | None
+    systematic: float | None = None
+    corrected: bool = True
+    single: float | None = None
+    zone: bool = False
+    scatter: float = 0.0
+    scatter_dof: float = 1.0
+
+    @property
+    def angle(self) -> bool:
+        """Whether it is one, in rad."""
+        return self.budget.unit == "rad"
+
+    @property
+    def u(self) -> float:
+        """Standard uncertainty, without a systematic error that is not corrected."""
+        return self.budget.u
+
+    @property
+    def U(self) -> float:  # noqa: N802
+        """Expanded uncertainty; a systematic error that is not corrected is added with its size."""
+        return self.budget.expanded + (0.0 if self.corrected else abs(self.systematic or 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ByMethod:
+    """All that a method says of a part.
+
+    Parameters
+    ----------
+    method : which.
+    figures : one a characteristic; those that were not tested are missing.
+    conditions : of the test.
+    seen : by family of causes (:data:`cmm_uq.analysis.parts.in_words.FAMILIES`), how the method takes hold of it.
+    """
+
+    method: Method
+    figures: tuple[Figure, ...]
+    conditions: tuple[Condition, ...]
+    seen: Mapping[str, Seen]
+
+    def of(self, name: str) -> Figure | None:
+        """The figure of a characteristic; ``None`` where it was not tested."""
+        return next((one for one in self.figures if one.name == name), None)
+
+
+@dataclass(frozen=True)
+class Stating:
+    """What one method states of a characteristic, mm or rad.
+
+    Parameters
+    ----------
+    method : which.
+    value : where there is one.
+    u, U : its uncertainty.
+    error : mean error that is taken off, of virtual measurements.
+    """
+
+    method: Method
+    value: float | None
+    u: float
+    U: float
+    error: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two methods on one characteristic: Eₙ = (x₁ − x₂)/√(U₁² + U₂²) (ISO/IEC 17043:2023)."""
+
+    one: Method
+    other: Method
+    normalised: float
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One characteristic by all methods.
+
+    Parameters
+    ----------
+    name : of the characteristic.
+    stated : by each method that says something of it, the virtual measurement first.
+    pairs : Eₙ of each two that have a value.
+    why : they differ, in sentences that follow from the figures.
+    """
+
+    name: str
+    stated: tuple[Stating, ...]
+    pairs: tuple[Pair, ...]
+    why: tuple[Text, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The methods beside each other; what a part's page and its ``results.json`` say of them.
+
+    Parameters
+    ----------
+    methods : the others, not the virtual measurement.
+    characteristics : those that another method tested, in the order of the plan.
+    """
+
+    methods: tuple[ByMethod, ...]
+    characteristics: tuple[Compared, ...]
+
+
+FEWEST_CYCLES = 10
+"""Set-ups of the calibrated part that descriptions of the method ask for."""
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """A characteristic of the calibrated part, mm or rad.
+
+    Parameters
+    ----------
+    value, u : by its certificate.
+    u_part : of what differs between parts: form, roughness, elasticity.
+    expanding_mm : length whose expansion counts; 0 of a form or an angle.
+    angle : whether it is one.
+    """
+
+    value: float
+    u: float
+    u_part: float = 0.0
+    expanding_mm: float = 0.0
+    angle: bool = False
+
+
+@dataclass(frozen=True)
+class Warmth:
+    """Mean temperature of the repeats, and standard uncertainties of coefficients of expansion, 1/K."""
+
+    temperature_c: float = REFERENCE_TEMPERATURE
+    u_cte_calibrated_per_k: float = 0.0
+    u_cte_part_per_k: float = 0.0
+
+
+def by_calibrated_part(
+    name: str, readings: Floats, cycle: Ints, calibrated: Calibrated, warmth: Warmth | None = None,
+    *, measured: float | None = None, corrected: bool = True,
+) -> Figure:  # fmt: skip
+    """One characteristic by the repeats of a calibrated part.
+
+    Parameters
+    ----------
+    name : of the characteristic.
+    readings : (n,) of the calibrated part, mm or rad.
+    cycle : (n,) number of the set-up of each.
+    measured : value of the part itself; ``None`` where it was not measured.
+    corrected : whether that is corrected by the systematic error.
+
+    Raises
+    ------
+    CmmUqError : too few readings or set-ups, or no uncertainty of the calibration.
+    """
+    cycles = len(np.unique(cycle))
+    if cycles < FEWEST_CYCLES or len(readings) < FEWEST_READINGS:
+        raise CmmUqError(
+            f"{name!r} has {len(readings)} measurements in {cycles} set-ups of the calibrated part, which are too few",
+            fix=f"Measure {FEWEST_READINGS} times at least, in {FEWEST_CYCLES} set-ups at least",
+        )
+    if not calibrated.u > 0:
+        raise CmmUqError(f"{name!r} of the calibrated part has no uncertainty", fix="Give that of its certificate")
+    warm = warmth or Warmth()
+    budget = use_by_calibrated_workpiece(
+        readings, calibrated.value, calibrated.u, temperature_c=warm.temperature_c,
+        u_cte_calibrated_per_k=warm.u_cte_calibrated_per_k, u_cte_workpieces_per_k=warm.u_cte_part_per_k,
+        u_form_mm=calibrated.u_part, expanding_mm=calibrated.expanding_mm, angle=calibrated.angle,
+    )  # fmt: skip
+    bias = float(np.mean(readings)) - calibrated.value
+    value = None if measured is None else measured - (bias if corrected else 0.0)
+    scatter = float(np.std(readings, ddof=1))
+    return Figure(name, budget, value, bias, corrected, scatter=scatter, scatter_dof=len(readings) - 1.0)
+
+
+STATEMENT = say(
+    "Uncertainty of the mean over all orientations, by a description of the method of ISO/DTS 15530-2; the text of the "
+    "standard was not at hand."
+)
+
+_ORIENTATIONS, _REPEATS = say("between orientations"), say("between repeats in one orientation")
+
+
+@dataclass(frozen=True, eq=False)
+class Standard:
+    """A standard as it was measured beside the part.
+
+    Parameters
+    ----------
+    calibrated, u : length or diameter by its certificate, mm.
+    readings : (n,) of it, mm.
+    orientation : (n,) number of the orientation of each.
+    inner : of a ring, whose diameter a large tip makes small.
+    temperature_c, u_cte_per_k : while it was measured; uncertainty of its coefficient of expansion.
+    """
+
+    calibrated: float
+    u: float
+    readings: Floats
+    orientation: Ints
+    inner: bool = False
+    temperature_c: float = REFERENCE_TEMPERATURE
+    u_cte_per_k: float = 0.0
+
+    @property
+    def u_expansion(self) -> float:
+        """Standard uncertainty of its length by its expansion, mm."""
+        return self.calibrated * abs(self.temperature_c - REFERENCE_TEMPERATURE) * self.u_cte_per_k
+
+    @property
+    def variances(self) -> OneWay:
+        """Of its errors, mm."""
+        return one_way(np.asarray(self.readings) - self.calibrated, self.orientation)
+
+
+@dataclass(frozen=True, eq=False)
+class Standards:
+    """What was measured beside the part.
+
+    Parameters
+    ----------
+    length : standard of length; ``None`` where there was none, and the common scale is then not known.
+    tips : standard of each tip, by stylus.
+    """
+
+    length: Standard | None = None
+    tips: Mapping[str, Standard] = field(default_factory=dict)
+
+    @property
+    def scale(self) -> float:
+        """Error of the common scale, 1."""
+        return 0.0 if self.length is None else self.length.variances.mean / self.length.calibrated
+
+    def tip(self, stylus: str) -> float:
+        """By how much a tip is effectively larger than thought, mm."""
+        one = self.tips[stylus]
+        return _sign(one) * (one.variances.mean - self.scale * one.calibrated)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of a characteristic: by the scale, mm or rad; by the diameter of each tip, by stylus."""
+
+    scale: float
+    tips: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class PartWarmth:
+    """Mean temperature of the part, its coefficient of expansion, and standard uncertainties of both."""
+
+    temperature_c: float = REFERENCE_TEMPERATURE
+    u_temperature_k: float = 0.0
+    cte_per_k: float = 0.0
+    u_cte_per_k: float = 0.0
+
+
+def by_orientations(
+    name: str, readings: Floats, orientation: Ints, slopes: Slopes, standards: Standards, warmth: PartWarmth | None = None,
+    *, angle: bool = False,
+) -> Figure:  # fmt: skip
+    """One characteristic by measurements of the part in several orientations.
+
+    Parameters
+    ----------
+    name : of the characteristic.
+    readings : (n,) of it, mm or rad; as many in each orientation.
+    orientation : (n,) number of the orientation of each.
+    angle : whether it is one.
+
+    Raises
+    ------
+    CmmUqError : fewer than two orientations, or two measurements in each, or not as many in each.
+    """
+    own, found = unit("rad" if angle else "mm"), one_way(readings, orientation)
+    used = [stylus for stylus in standards.tips if slopes.tips.get(stylus, 0.0)]
+    error = slopes.scale * standards.scale + sum(slopes.tips[stylus] * standards.tip(stylus) for stylus in used)
+    lines = [found.line(say("measurements of the part"), _ORIENTATIONS, _REPEATS, own)]
+    if standards.length is not None:
+        # a tip is compared with its standard by the same scale, which so far takes itself out of what the tip finds
+        by_scale = slopes.scale - sum(
+            slopes.tips[stylus] * _sign(standards.tips[stylus]) * standards.tips[stylus].calibrated for stylus in used
+        )
+        lines += _of_standard(standards.length, say("length standard"), by_scale / standards.length.calibrated)
+    for stylus in used:
+        which = say("standard of the tip of {stylus}", stylus=Verbatim(stylus))
+        lines += _of_standard(standards.tips[stylus], which, slopes.tips[stylus])
+    lines += _of_warmth(slopes.scale, warmth or PartWarmth())
+    budget = Budget(say("mean over all orientations"), lines, found.mean - error, own, statement=STATEMENT)
+    return Figure(name, budget, found.mean - error, error, single=_single(budget, found), scatter=found.u_single,
+                  scatter_dof=found.dof_single)  # fmt: skip
+
+
+def _single(budget: Budget, found: OneWay) -> float:
+    """Standard uncertainty of one measurement in one orientation, corrected as the mean is."""
+    return float(np.sqrt(budget.variance - found.u_mean**2 + found.u_single**2))
+
+
+def _sign(tip: Standard) -> float:
+    return -1.0 if tip.inner else 1.0
+
+
+def _of_standard(one: Standard, name: Text, slope: float) -> list[Line]:
+    mm = unit("mm")
+    return [
+        Line(say("{standard}: calibration", standard=name), one.u, CERTIFICATE, unit=mm, sensitivity=slope),
+        one.variances.line(say("{standard}: measurements", standard=name), _ORIENTATIONS, _REPEATS, mm, slope),
+        Line(say("{standard}: expansion", standard=name), one.u_expansion, JUDGEMENT, unit=mm, sensitivity=slope),
+    ]
+
+
+def _of_warmth(scale: float, warm: PartWarmth) -> list[Line]:
+    away = abs(warm.temperature_c - REFERENCE_TEMPERATURE)
+    return [
+        Line(say("expansion coefficient of the part"), warm.u_cte_per_k, JUDGEMENT, unit=unit("1/K"),
+             sensitivity=abs(scale) * away),
+        Line(say("temperature of the part"), warm.u_temperature_k, JUDGEMENT, unit=unit("K"),
+             sensitivity=abs(scale * warm.cte_per_k)),
+    ]  # fmt: skip

@@ -1,0 +1,249 @@
+"""The measurement plan of a part's job and its circumstances, as the virtual measurement takes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.analysis.parts.causes.cause import Cause, Scatter
+from cmm_uq.analysis.parts.causes.condensing import LARGE
+from cmm_uq.analysis.parts.causes.form import Form
+from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
+from cmm_uq.analysis.parts.evaluation import characteristics_of
+from cmm_uq.analysis.parts.machine.state import MachineState
+from cmm_uq.analysis.parts.placing import Pose, around, placed
+from cmm_uq.analysis.parts.plan import Alignment, Characteristic, CommonDatum, Feature, Nominal, Plan, Stylus
+from cmm_uq.analysis.parts.virtual import Circumstances
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats, Machine
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.checks import readings, rotation
+from cmm_uq.jobs.part.datums import as_one, members
+from cmm_uq.jobs.part.feature import FormFacts
+from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
+from cmm_uq.jobs.part.tables import StylusFacts
+
+PLACES = 16
+"""Places of the part that are drawn where it does not lie in the same one each time."""
+
+
+def plan_of(job: PartJob) -> Plan:
+    """The plan of a job that was read: geometry alone, in mm and rad, in the frame of the part."""
+    facts, styli = job.facts, [one.name for one in job.facts.stylus]
+    features = tuple(_feature(one, one.facts.stylus or styli[0], one.facts.form or facts.form) for one in job.features)
+    names = [one.name for one in features]
+    ends = np.cumsum([0, *(len(one.points) for one in features)])
+    order = [names.index(name) for name in facts.probing.order] or list(range(len(names)))
+    rows = np.concatenate([np.arange(ends[i], ends[i + 1]) for i in order])
+    times = np.zeros(0)
+    if facts.probing.seconds_per_point:
+        times = np.empty(len(rows))
+        times[rows] = facts.probing.seconds_per_point * np.arange(len(rows))
+    return Plan(
+        features,
+        tuple(_characteristic(one) for one in facts.characteristic),
+        tuple(
+            _stylus(one)
+            for one in facts.stylus
+        ),
+        Alignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
+        rows.astype(np.int64),
+        times,
+        _common(job),
+    )  # fmt: skip
+
+
+def _common(job: PartJob) -> tuple[CommonDatum, ...]:
+    """Datums on several features, which alignment and characteristics name."""
+    features = {one.facts.name: one for one in job.features}
+    named = [*job.facts.alignment.datums, *(name for one in job.facts.characteristic for name in one.datums)]
+    found = []
+    for name in dict.fromkeys(named):
+        own = members(name, features)
+        if len(own) > 1:
+            kind, point, direction = as_one([features[each] for each in own])
+            found.append(CommonDatum(name, own, kind, Nominal(point, direction)))
+    return tuple(found)
+
+
+def refuse_unfit(job: PartJob) -> None:
+    """Refuse what a virtual measurement of the job would refuse of its plan.
+
+    Raises
+    ------
+    CmmUqError : points that do not determine a feature, datums that do not fix a frame.
+    """
+    plan, path = plan_of(job), job.folder / "job.toml"
+    try:
+        nominal = characteristics_of(plan, plan.points)
+    except CmmUqError as error:
+        raise CmmUqError(error.problem, where=f"{path}: {error.where or ''}", fix=error.fix) from error
+    for one, value in zip(plan.characteristics, nominal.tolist(), strict=True):
+        limits = [limit for limit in (one.lower, one.upper) if limit is not None]
+        if one.what == "distance" and limits and max(map(abs, limits)) < value - max(map(abs, limits)):
+            said = " to ".join(f"{limit:g}" for limit in limits)
+            raise CmmUqError(f"limits of {said} mm, where the distance is {value:.6g} mm by the nominals",
+                             where=f"{path}: [[characteristic]] {one.name}",
+                             fix="Give limits of the distance itself, not deviations from it")  # fmt: skip
+
+
+def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
+    """Refuse a part that the axes do not reach everywhere, in any of the places where it may lie.
+
+    Raises
+    ------
+    CmmUqError : a point of it is beyond the travel.
+    """
+    plan = plan_of(job)
+    for pose in poses_of(job, PLACES, machine):
+        try:
+            placed(plan, pose, machine)
+        except CmmUqError as error:
+            raise CmmUqError(error.problem, where=f"{job.folder / 'job.toml'}: [placing]", fix=error.fix) from error
+
+
+def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> Circumstances:
+    """How and where the part is measured.
+
+    Parameters
+    ----------
+    machine : as its certificate states it.
+    plan : of the job.
+    places : where the part may lie, if it does not lie in the same place each time.
+    """
+    return Circumstances(
+        machine, poses_of(job, places, machine.machine), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
+        (*clamping_of(job, plan), *operators_of(job, plan)),
+    )  # fmt: skip
+
+
+def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[Pose, ...]:
+    """Where the part lies: the one place that is stated, or so many where it may lie.
+
+    Parameters
+    ----------
+    count : of places, where they are not the same each time.
+    machine : in the middle of whose travel it lies where the job does not say where.
+
+    """
+    given = job.facts.placing
+    pose = Pose(rotation(given), origin_of(job, machine))
+    if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
+        return (pose,)
+    return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
+
+
+def origin_of(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies in coordinates of the machine, as the job says; else in the middle of the travel."""
+    if job.facts.placing.origin_mm is not None:
+        return np.array(job.facts.placing.origin_mm, dtype=np.float64)
+    return _in_the_middle(job, machine)
+
+
+def _in_the_middle(job: PartJob, machine: Machine) -> Floats:
+    """(3,) where the part's origin lies so that its points are in the middle of the travel, to the mm."""
+    styli = {one.name: one for one in job.facts.stylus}
+    first = job.facts.stylus[0].name
+    read = np.concatenate([readings(one, styli[one.facts.stylus or first], job.facts) for one in job.features])
+    read = read - job.facts.machine_state.origin_mm + machine.origin_mm
+    return np.asarray(np.round(machine.travel_mm.mean(axis=1) - 0.5 * (read.min(axis=0) + read.max(axis=0))))
+
+
+def surroundings_of(job: PartJob) -> Surroundings:
+    """Temperatures of part and scales, and what is known of them."""
+    facts, given = job.facts.part, job.facts.environment
+    part = Expansion(facts.cte_per_k, facts.u_cte_per_k, given.part_c, given.u_part_k, given.compensated)
+    x, y, z = (
+        Expansion(given.scales_cte_per_k, given.u_scales_cte_per_k, celsius, given.u_scales_k, given.compensated)
+        for celsius in given.scales_c
+    )
+    return Surroundings(part, (x, y, z), np.array(given.u_gradient_k_per_m), given.u_drift_k)
+
+
+def forms_of(job: PartJob) -> tuple[Form, ...]:
+    """Form of each feature: its own, else that of all."""
+    found = []
+    for one in job.features:
+        given = one.facts.form or job.facts.form
+        lobed = one.facts.kind in _LOBED
+        harmonics = tuple((int(count), size) for count, size in given.harmonics_um.items()) if lobed else ()
+        form = Form(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
+        if form.field_um or form.harmonics_um or form.roughness_um:
+            found.append(form)
+    return tuple(found)
+
+
+def clamping_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+    """What clamping does to each point on its own; none where nothing is stated."""
+    size = MICROMETRE * job.facts.placing.u_fixture_um
+    return (Scatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
+
+
+def operators_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+    """What who measures does to each point, and to characteristics; none where nothing is stated."""
+    found: list[Cause] = []
+    if job.facts.probing.u_operator_um:
+        found.append(of_points(plan, job.facts.probing.u_operator_um))
+    stated = {
+        one.name: MICROMETRE * one.u_operator_um + float(np.radians(one.u_operator_deg))
+        for one in job.facts.characteristic
+        if one.u_operator_um or one.u_operator_deg
+    }
+    return (*found, reproducibility(plan, stated)) if stated else tuple(found)
+
+
+def doubled(job: PartJob) -> PartJob:
+    """The job with twice the points in every feature that is probed by a pattern, and nothing measured.
+
+    Raises
+    ------
+    CmmUqError : no feature is, or one has so many points that twice as many change nothing.
+    """
+    if any(len(one.points) >= LARGE for one in job.features):
+        raise CmmUqError("has a feature of thousands of points", where=str(job.folder / "job.toml"),
+                         fix="More of them change nothing")  # fmt: skip
+    features = tuple(_doubled(one) for one in job.features)
+    if all(one is other for one, other in zip(features, job.features, strict=True)):
+        raise CmmUqError("has no feature that is probed by a pattern", where=str(job.folder / "job.toml"),
+                         fix="Give strategy in place of points_mm")  # fmt: skip
+    return replace(job, features=features, measured=None)
+
+
+def _doubled(one: Probed) -> Probed:
+    pattern = one.facts.strategy
+    if pattern is None:
+        return one
+    key = "columns" if pattern.pattern == "grid" else "points"
+    more = pattern.model_copy(update={key: 2 * (getattr(pattern, key) or 1)})
+    return probed(one.facts.model_copy(update={"strategy": more}), one.facts.name)
+
+
+_LOBED = ("circle", "cylinder", "cone")
+
+
+def _stylus(one: StylusFacts) -> Stylus:
+    at = None if one.qualified_at_mm is None else np.array(one.qualified_at_mm)
+    return Stylus(one.name, np.array(one.offset_mm), one.diameter_mm, one.u_diameter_um, np.array(one.u_offset_um),
+                  one.lobing_um, at)  # fmt: skip
+
+
+def _feature(one: Probed, stylus: str, form: FormFacts) -> Feature:
+    facts = one.facts
+    half = None if facts.angle_deg is None else float(np.radians(facts.angle_deg / 2))
+    sized = facts.diameter_mm if facts.kind != "plane" else None
+    nominal = Nominal(np.array(facts.point_mm), one.direction, sized, half)
+    given = Feature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
+    whole = whole_surface(facts, form.surface_points)
+    return given if whole is None else replace(given, surface=whole.points, surface_normals=whole.normals)
+
+
+def _characteristic(one: CharacteristicFacts) -> Characteristic:
+    lower, upper = one.lower_mm, one.upper_mm
+    if one.asks.limits == "angles":
+        lower, upper = (None if limit is None else float(np.radians(limit)) for limit in (one.lower_deg, one.upper_deg))
+    elif one.asks.limits == "zone":
+        upper = one.tolerance_mm
+    return Characteristic(one.name, one.what, tuple(one.features), tuple(one.datums), lower, upper, one.association)

@@ -1,0 +1,224 @@
+"""From a part's job to its page and ``results.json``, written as one set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, silent, unchanged
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.language import Code
+from cmm_uq.base.messages import Text, say
+from cmm_uq.base.output import Owner, staged
+from cmm_uq.base.plugins import naming_package
+from cmm_uq.certificate.origin import file_name
+from cmm_uq.certificate.plots.style import fonts_of
+from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
+from cmm_uq.certificate.results.provenance import Behind, provenance_of
+from cmm_uq.jobs.origin import SIMULATED
+from cmm_uq.jobs.part.job import PartJob, read_part
+
+if TYPE_CHECKING:
+    from cmm_uq.certificate.document import Document
+    from cmm_uq.certificate.part.measurement import PartFound
+    from cmm_uq.certificate.wording import Summary
+
+DOCUMENTS = ("part.html", "part.pdf")
+COMMAND = "part"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """How a part is evaluated.
+
+    Parameters
+    ----------
+    seed : of everything random.
+    trials : number of virtual measurements; ``None`` for as many as is usual.
+    digits : of u that are to be known: then so many are made as that needs, ``trials`` at least; ``None`` for ``trials``.
+    rerun : whether the machine's certificate is computed again from its inputs.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    records : of the machine's history, that its drift is read from; ``None`` for none.
+    history : of the machine, that a report has inside; then no records are asked.
+    """
+
+    seed: int = 0
+    trials: int | None = None
+    digits: int | None = None
+    rerun: bool = False
+    trust: tuple[Path, ...] | None = None
+    records: str | Path | None = None
+    history: bytes | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenPart:
+    """What was found of a part, contents of results.json, and what was written, by name."""
+
+    found: PartFound
+    results: bytes
+    files: Mapping[str, Path] = field(default_factory=dict)
+    recorded: str = ""
+
+    @property
+    def summary(self) -> Summary:
+        """For the end of the command."""
+        from cmm_uq.certificate.part.figures import part_summary
+
+        return part_summary(self.found)
+
+    @property
+    def conforming(self) -> bool:
+        """See :class:`~cmm_uq.certificate.part.measurement.PartFound`."""
+        return self.found.conforming
+
+    @property
+    def name(self) -> str:
+        """Id of the job."""
+        return self.found.job.facts.job.id
+
+    @property
+    def origin(self) -> str:
+        """Of the recording."""
+        return self.found.job.facts.job.origin
+
+
+@naming_package()
+def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
+    """What a part's job gives; nothing is written.
+
+    Raises
+    ------
+    CmmUqError : see :func:`cmm_uq.app.commands.parts.part.part_found`.
+    """
+    from cmm_uq.app.commands.parts.part import part_found
+
+    return part_found(
+        job, seed=asked.seed, trials=asked.trials, digits=asked.digits, rerun=asked.rerun,
+        trust=asked.trust, records=asked.records, history=asked.history, stage=stage,
+    )  # fmt: skip
+
+
+def in_language(job: PartJob, language: Code | None) -> PartJob:
+    """A job whose page is to be said in a language; without one as job.toml has it."""
+    if language is None:
+        return job
+    told = job.facts.job.model_copy(update={"language": language})
+    return replace(job, facts=job.facts.model_copy(update={"job": told}))
+
+
+def write_part(
+    folder: Path, out: Path | None = None, *, asked: Asked | None = None, force: bool = False, stage: Stage = silent,
+    language: Code | None = None,
+) -> WrittenPart:  # fmt: skip
+    """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
+
+    Parameters
+    ----------
+    folder : the job folder.
+    out : where to write; ``reports/<job id>`` by default.
+    asked : how it is evaluated.
+    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+    stage : told of progress.
+    language : of the page, instead of the job's.
+
+    Raises
+    ------
+    CmmUqError : the job cannot be evaluated, or something in the folder that this command did not write for this job.
+    OutputError : the folder cannot be written to.
+    """
+    stage("Reading the job", 0.0)
+    job = in_language(read_part(folder), language)
+    return written(job, lambda: found_of(job, asked or Asked(), stage), out, force=force, stage=stage)
+
+
+def written(
+    job: PartJob, found: Any, out: Path | None = None, *, force: bool = False, stage: Stage = silent
+) -> WrittenPart:  # fmt: skip
+    """Make sure of the folder, then evaluate, render and write, all or none.
+
+    Parameters
+    ----------
+    found : evaluates it.
+
+    Raises
+    ------
+    CmmUqError, OutputError : see :func:`write_part`.
+    """
+    facts = job.facts.job
+    fonts_of(facts.language)  # refused before anything is computed
+    folder = REPORTS / facts.id if out is None else out
+    names = [file_name(name, facts.origin) for name in DOCUMENTS]
+    owner, inputs = Owner(COMMAND, facts.id, facts.origin), tuple(job.folder / name for name in job.inputs)
+    with staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS, PROVENANCE)) as place:
+        one: PartFound = found()
+        contents = contents_of(one, stage)
+        stage(f"Writing: {len(contents)} files to {folder}", 0.95)
+        files = place.write(contents)
+    stage("Done", 1.0)
+    return WrittenPart(one, contents[RESULTS], files)
+
+
+def contents_of(
+    found: PartFound, stage: Stage = silent, *, finished: Finished = unchanged
+) -> dict[str, bytes]:  # fmt: skip
+    """Bytes of every file, by name.
+
+    Parameters
+    ----------
+    finished : what becomes of a document before the next is made of it.
+
+    Raises
+    ------
+    CmmUqError : an input has the name of a file that is written.
+    """
+    from cmm_uq.certificate.part.results import part_results
+    from cmm_uq.certificate.render.html import render_html
+    from cmm_uq.certificate.render.pdf import render_pdf
+    from cmm_uq.certificate.results.plain import as_json
+
+    job = found.job
+    if RESULTS in job.inputs:
+        raise CmmUqError("has the name of a file that this command writes", where=str(job.folder / RESULTS),
+                         fix="Put the machine's results into a folder of their own")  # fmt: skip
+    html, pdf = (file_name(name, job.facts.job.origin) for name in DOCUMENTS)
+    results = part_results(found)
+    data = as_json(results)
+    stage("Composing the page", 0.88)
+    document = document_of(found)
+    stage("Rendering", 0.92)
+    page = render_html(document).encode()
+    behind = provenance_of(_behind(found), results, {html: page, RESULTS: data})
+    further = {RESULTS: data, PROVENANCE: finished(PROVENANCE, behind)}
+    return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
+
+
+def _behind(found: PartFound) -> Behind:
+    facts, standing = found.job.facts, found.standing
+    recording = "" if facts.recording is None else facts.recording.file
+    return Behind(COMMAND, facts.job, facts.laboratory, facts.job.origin, found.job.inputs, recording,
+                  (standing.number, standing.laboratory))  # fmt: skip
+
+
+def document_of(found: PartFound) -> Document:
+    """The page, in the job's language, marked where nobody measured."""
+    from cmm_uq.certificate.document import translated as said
+    from cmm_uq.certificate.origin import marked_as
+    from cmm_uq.certificate.part.page import part_document
+    from cmm_uq.certificate.plots.style import lettered_in
+
+    facts = found.job.facts.job
+    with lettered_in(facts.language):
+        document = part_document(found)
+    return said(marked_as(document, facts.origin, facts.id, origin_told(found.job)), facts.language)
+
+
+def origin_told(job: PartJob) -> list[Text]:
+    """What must be known of a job whose figures nobody measured."""
+    if job.facts.job.origin != SIMULATED:
+        return []
+    return [
+        say("Figures of this job are simulated or an example's: no part was measured, and nothing here certifies one.")
+    ]

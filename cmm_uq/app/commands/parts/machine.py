@@ -1,0 +1,485 @@
+"""What the reader of a part's page must know of its machine: drafts, dates, temperatures, probes.
+
+The machine that a part was measured on: its certificate verified, refused where it does not hold, then its state.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cmm_uq import __version__
+from cmm_uq.analysis.diagnosis.observations import thin_out
+from cmm_uq.analysis.parts.machine.conditional import given_recording
+from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
+from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.estimation import with_noise
+from cmm_uq.app.commands.files import Stage, silent
+from cmm_uq.app.commands.parts.drift import FILE as HISTORY
+from cmm_uq.app.commands.parts.drift import with_drift
+from cmm_uq.app.commands.reading import job_of, read_job
+from cmm_uq.artefacts import kind_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say
+from cmm_uq.base.points import AXES, Floats, Machine
+from cmm_uq.certificate.clauses import draft
+from cmm_uq.certificate.part.measurement import Checked, Source, Standing
+from cmm_uq.certificate.verify.given import Given, given_of
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED
+from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.jobs.reading import sha256 as hashes
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.maths.inference.draws import Draws
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.verify import Verification
+
+_ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
+
+NORMAL_C = 20.0
+"""°C to which lengths are referred (ISO 1)."""
+
+
+def temperatures(job: Job | None) -> Floats | None:
+    """What the calibration recorded of the temperatures of the scales, °C."""
+    if job is None:
+        return None
+    columns = [f"temp_{axis}_c" for axis in AXES if f"temp_{axis}_c" in job.points.columns]
+    return np.concatenate([job.points.columns[name] for name in columns]) if columns else None
+
+
+def machine_warnings(job: PartJob, standing: Standing, calibrated: Job | None) -> Iterable[Text]:
+    """What the reader must know of the machine.
+
+    Parameters
+    ----------
+    job : of the part.
+    standing : of the machine's certificate.
+    calibrated : job of the calibration, where it is at hand.
+    """
+    if standing.origin != MEASURED:
+        origin = _ORIGINS.get(standing.origin, Verbatim(standing.origin))
+        yield say("The machine's calibration is {origin}: nobody measured this machine.", origin=origin)
+    if standing.draft:
+        yield say("The machine's certificate is a draft: it does not state all that ISO/IEC 17025:2017 asks for.")
+    if standing.source == "results":
+        yield say(
+            "The machine is taken from its figures and draws alone: its recording is not at hand and was not verified."
+        )
+    if standing.valid_until is None:
+        yield say("The machine's certificate of {date} does not say until when it holds.", date=day(standing.date))
+    yield from _thermal(job, calibrated)
+    if calibrated is not None and calibrated.facts.circumstances.probe.sensing == "optical" and _touches(job):
+        yield say(
+            "The machine was calibrated with a probe that does not touch; the noise of one that does may be another."
+        )
+
+
+def _touches(job: PartJob) -> bool:
+    return any(stylus.diameter_mm > 0 for stylus in job.facts.stylus)
+
+
+def _thermal(job: PartJob, calibrated: Job | None) -> Iterable[Text]:
+    """Temperatures of the scales beside those of the calibration, and those for which the machine is rated."""
+    given, known = job.facts.environment.scales_c, temperatures(calibrated)
+    low, high = min(given), max(given)
+    if known is not None and (low < known.min() or high > known.max()):
+        yield say(
+            "The scales were at {low:.4g} to {high:.4g} °C, and at {coldest:.4g} to {warmest:.4g} °C when the machine was "
+            "calibrated: how its errors change between is not known.",
+            low=low, high=high, coldest=float(known.min()), warmest=float(known.max()),
+        )  # fmt: skip
+    elif known is None and (low, high) != (NORMAL_C, NORMAL_C):
+        yield say(
+            "The scales were at {low:.4g} to {high:.4g} °C; the temperature of the calibration is not known.",
+            low=low, high=high,
+        )  # fmt: skip
+    rated = None if calibrated is None else calibrated.circumstances.rated.temperature_c
+    if rated is not None and (low < rated[0] or high > rated[1]):
+        yield say(
+            "The scales were at {low:.4g} to {high:.4g} °C, outside of the {coldest:.4g} to {warmest:.4g} °C for which the "
+            "machine is rated.", low=low, high=high, coldest=rated[0], warmest=rated[1],
+        )  # fmt: skip
+
+
+WHERE = "job.toml [machine_state]"
+
+CALIBRATION = "machine-job/"
+"""Before the names of inputs of the machine's own job, where they are attached to a part's report."""
+
+_MOST = 200
+"""Quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
+show of errors left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class MachineFound:
+    """A machine, and how it is known.
+
+    Parameters
+    ----------
+    state : its errors and noise on the day of the part's measurement.
+    standing : of its certificate.
+    job : of its calibration, where the inputs are at hand.
+    warnings : what the reader must know of it.
+    history : that its changes since follow from; ``None`` where no records were asked.
+    """
+
+    state: MachineState
+    standing: Standing
+    job: Job | None
+    warnings: tuple[Text, ...]
+    history: bytes | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _Stated:
+    """What states the machine, once it is known to hold."""
+
+    source: Source
+    files: tuple[str, ...]
+    results: Mapping[str, Any]
+    draws: Mapping[str, Floats]
+    job: Job | None
+    verdict: str
+    checked: tuple[Checked, ...]
+    again: bool = False
+    not_again: Text = NOTHING
+
+
+def machine_found(
+    job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
+    history: bytes | None = None, seed: int = 0, stage: Stage = silent,
+    fits: Callable[[Machine], None] = lambda machine: None,
+) -> MachineFound:  # fmt: skip
+    """The machine of a part's job.
+
+    Parameters
+    ----------
+    job : that was read.
+    rerun : whether the certificate's figures are computed again from its inputs.
+    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
+    records : of the machine's history, for its drift; ``None`` for none.
+    history : of the machine, that a report has inside; then no records are asked.
+    seed : of the draws.
+    stage : told of progress.
+    fits : refuses a machine on which the part cannot be measured, before anything is computed.
+
+    Raises
+    ------
+    CmmUqError : the certificate does not verify, does not hold on the day, states too little, or is of another machine; or the
+        job that is to be analysed in its place cannot be.
+    """
+    if job.facts.machine_state.job is not None:
+        stated = _analysed(job, seed, stage)
+    else:
+        stage("Verifying the machine's certificate", 0.02)
+        stated = _certified(job, verified(job, rerun=rerun, trust=trust), rerun=rerun)
+    standing = _standing(job, stated, trusted=trust is not None)
+    machine = _machine(job, stated.job)
+    fits(machine)
+    state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
+    state = replace(
+        state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)
+    )
+    since = with_drift(
+        state, standing.serial or standing.machine, job.facts.job.date, records, _where(job), kept=history
+    )
+    state = since.state
+    stage("The machine's errors, given the recording of its calibration", 0.15)
+    state, path, given = _given(state, stated.job, seed)
+    standing = replace(standing, path=path, drift=since.told, given_recording=given, changes=since.changes)
+    told = machine_warnings(job, standing, stated.job)
+    if rerun and stated.not_again:
+        told = [stated.not_again, *told]
+    return MachineFound(state, standing, stated.job, tuple(told), since.history)
+
+
+def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
+    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is read alone.
+
+    Parameters
+    ----------
+    fits : refuses a machine on which the part cannot be measured.
+
+    Raises
+    ------
+    CmmUqError : see :func:`machine_found`.
+    """
+    if job.facts.machine_state.job is not None:
+        fits(_machine(job, read_job(_machines_folder(job))))
+        return
+    stated = _certified(job, verified(job), rerun=False)
+    _standing(job, stated, trusted=False)
+    fits(_machine(job, stated.job))
+
+
+def standing_of(job: PartJob, found: Verification) -> Standing:
+    """The machine's certificate on the day of the part's measurement, without what its errors then are.
+
+    Parameters
+    ----------
+    job : of the part.
+    found : the certificate, verified.
+
+    Raises
+    ------
+    CmmUqError : see :func:`machine_found`.
+    """
+    stated = _certified(job, found, rerun=False)
+    _machine(job, stated.job)
+    return _standing(job, stated, trusted=False)
+
+
+def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None) -> Verification:
+    """The verification of the certificate that states the machine of a part's job.
+
+    Raises
+    ------
+    CmmUqError : it states too little, or a file of it is hostile.
+    """
+    from cmm_uq.app.commands.verify import verify_given
+
+    where = _where(job)
+    given = given_of(job.machine_files)
+    if given.results is None:
+        raise CmmUqError("states too little: neither draws of the machine's errors nor its recording are inside", where=where,
+                         fix="Give certificate.pdf, or the folder that cmm-uq report wrote")  # fmt: skip
+    if given.of_part:
+        raise CmmUqError("is of a part, and states no machine", where=where,
+                         fix="Give the certificate of the machine that measured the part")  # fmt: skip
+    return verify_given(given, rerun=rerun, trust=trust)
+
+
+def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
+    """What a certificate states that verifies.
+
+    Raises
+    ------
+    CmmUqError : it does not, or has no draws of the posterior.
+    """
+    given, where = found.given, _where(job)
+    if wrong := found.inquiry.findings:
+        more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+        first = ": ".join(filter(None, (wrong[0].file, wrong[0].place, wrong[0].problem)))
+        raise CmmUqError(f"the machine's certificate does not verify: {first}{more}", where=where,
+                         fix="cmm-uq verify says all that is wrong; ask for the certificate as it was issued")  # fmt: skip
+    results = {} if given.results is None else given.results[1]
+    read = found.job
+    source: Source = "results" if read is None else "certificate"
+    again = rerun and "again" in found.inquiry.done
+    return _Stated(source, job.stated_by, results, _drawn(job, given, results, where), read, found.inquiry.word,
+                   _checks(found), again, NOTHING if again else _not_again(str(results["software"]["version"])))  # fmt: skip
+
+
+def _not_again(made: str) -> Text:
+    """Why a certificate was not computed again where that was asked for."""
+    if made != __version__:
+        return say(
+            "The machine's certificate was to be computed again and was not: version {made} made it, and this is {here}. "
+            "Verify it with the version that made it, or issue it anew.", made=Verbatim(made), here=Verbatim(__version__),
+        )  # fmt: skip
+    return say("The machine's certificate was to be computed again and was not: cmm-uq verify says why.")
+
+
+def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -> dict[str, Floats]:
+    """Draws of the posterior, of the file whose hash results.json has."""
+    entry = results.get("posterior")
+    if not isinstance(entry, dict):
+        raise CmmUqError("states too little: it has no draws of the machine's errors", where=where,
+                         fix="Give the certificate of a report whose errors are a list of effects")  # fmt: skip
+    named = str(entry["file"])
+    content = given.files.get(named) or job.inputs.get(job.facts.machine_state.posterior)
+    if content is None:
+        raise CmmUqError(f"states too little: {named} is not there", where=where,
+                         fix="Put it beside results.json, or give the certificate as PDF")  # fmt: skip
+    if sha256(content).hexdigest() != entry["sha256"]:
+        raise CmmUqError(f"{named} is not the file whose hash results.json has", where=where,
+                         fix="Give both as the same report wrote them")  # fmt: skip
+    return Draws.of_npz(content, named).flat()
+
+
+def _checks(found: Verification) -> tuple[Checked, ...]:
+    from cmm_uq.certificate.verify.found import CHECKS
+
+    inquiry = found.inquiry
+    done = [Checked(what, inquiry.done[name]) for name, what in CHECKS.items() if inquiry.done.get(name)]
+    return (*done, *(Checked(left.what, 0, left.why) for left in inquiry.unchecked))
+
+
+def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
+    """What the machine's job gives when it is analysed here."""
+    from cmm_uq.app.commands import analysis
+    from cmm_uq.certificate.results.plain import as_json
+
+    named = str(job.facts.machine_state.job)
+    attached = attached_calibration(job)
+    if job.folder == Path() and not attached:
+        raise CmmUqError("a part's job in memory has no other job beside it", where=f"{WHERE} job",
+                         fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
+    stage("Analysing the machine's job", 0.02)
+    read = job_of(attached) if attached else read_job(_machines_folder(job))
+    found = analysis.analyse_job(read, seed=seed)
+    outcome = analysis.outcome_of(found, seed)
+    if outcome.draws is None:
+        raise CmmUqError("states too little: its analysis draws no errors of the machine", where=f"{WHERE} job = {named!r}",
+                         fix="Name a job whose errors are a list of effects")  # fmt: skip
+    results = json.loads(as_json(outcome.results))
+    return _Stated("job", (named,), results, outcome.draws.flat(), read, "ANALYSED", ())
+
+
+def _machines_folder(job: PartJob) -> Path:
+    """Folder of the machine's job.
+
+    Raises
+    ------
+    CmmUqError : it is that of the part's own job.
+    """
+    folder = job.folder / str(job.facts.machine_state.job)
+    if folder.resolve() == job.folder.resolve():
+        raise CmmUqError("is the part's own job", where=f"{WHERE} job = {job.facts.machine_state.job!r}",
+                         fix="Name the folder of the machine's job, or its certificate")  # fmt: skip
+    return folder
+
+
+def attached_calibration(job: PartJob) -> dict[str, bytes]:
+    """Inputs of the machine's own job, of a part's report that has them inside; by their names in that job."""
+    if job.facts.machine_state.job is None:
+        return {}
+    return {
+        name.removeprefix(CALIBRATION): content for name, content in job.inputs.items() if name.startswith(CALIBRATION)
+    }
+
+
+def with_calibration(job: PartJob, calibration: Job | None) -> PartJob:
+    """A part's job with the inputs of its machine's job among its own, where that was analysed in place of a certificate."""
+    if job.facts.machine_state.job is None or calibration is None:
+        return job
+    named = {f"{CALIBRATION}{name}": content for name, content in calibration.inputs.items()}
+    return replace(job, inputs={**job.inputs, **named})
+
+
+def with_history(job: PartJob, kept: bytes | None) -> PartJob:
+    """A part's job with the machine's history among its inputs, where its changes were read from records."""
+    return job if kept is None else replace(job, inputs={**job.inputs, HISTORY: kept})
+
+
+def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
+    """The certificate on the day of the measurement.
+
+    Raises
+    ------
+    CmmUqError : it is later than the measurement, or no longer holds.
+    """
+    said, facts, on = stated.results["job"], job.facts.machine_state, job.facts.job.date
+    date = dt.date.fromisoformat(said["date"])
+    where = _where(job)
+    if date > on:
+        raise CmmUqError(f"the machine was calibrated on {date}, after the part was measured on {on}", where=where,
+                         fix="Give the certificate that held on that day, or mend [job] date")  # fmt: skip
+    own = None if stated.job is None else stated.job.facts
+    until = facts.valid_until or (None if own is None else own.job.recalibration_agreed)
+    if until is not None and on > until:
+        raise CmmUqError(f"the machine's certificate has expired: it held until {until}, and the part was measured on {on}",
+                         where=where, fix="Calibrate the machine, or give the certificate that held on that day")  # fmt: skip
+    recorded = temperatures(stated.job)
+    return Standing(
+        stated.source, stated.files, number=str(said.get("number") or (own and own.job.number) or said["id"]),
+        laboratory="" if own is None else own.laboratory.name, machine=str(said["machine"]),
+        serial=str(said.get("serial") or ""), origin=str(said["origin"]), date=date, age=on - date, valid_until=until,
+        verdict=stated.verdict, checked=stated.checked, again=stated.again, trusted=trusted,
+        draft=stated.job is not None and draft(stated.job),
+        given_recording=False,
+        path=NOTHING, drift=NOTHING,
+        temperature_c=None if recorded is None else float(np.mean(recorded)),
+        inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
+    )  # fmt: skip
+
+
+def _known_at(state: MachineState, standing: Standing) -> float | None:
+    """Temperature at which the errors of the scales are known: of 20 °C where the calibration modelled their expansion."""
+    modelled = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
+    return None if modelled else standing.temperature_c
+
+
+def _where(job: PartJob) -> str:
+    """What states the machine, for messages."""
+    facts = job.facts.machine_state
+    key, named = ("certificate", facts.certificate) if facts.job is None else ("job", facts.job)
+    return f"{WHERE} {key} = {named!r}"
+
+
+def _machine(job: PartJob, calibrated: Job | None) -> Machine:
+    """Chain, travel and origin: as the job says, else as the calibration has them.
+
+    Raises
+    ------
+    CmmUqError : both say a chain or a travel, and not the same; or neither a travel.
+    """
+    facts, own = job.facts.machine_state, None if calibrated is None else calibrated.facts.machine
+    chain, origin = facts.chain, facts.origin_mm
+    if own is not None and "chain" not in facts.model_fields_set:
+        chain = own.chain
+    if own is not None and "origin_mm" not in facts.model_fields_set:
+        origin = own.origin_mm
+    if own is not None and chain != own.chain:
+        raise CmmUqError(f"the machine's certificate is of chain {own.chain}, and the job says {chain}",
+                         where=f"{WHERE} chain", fix="Leave it out, or give the certificate of this machine")  # fmt: skip
+    travel = np.full((3, 2), np.nan)
+    for i, axis in enumerate(AXES):
+        here, there = getattr(facts.travel_mm, axis), None if own is None else getattr(own.travel_mm, axis)
+        if here is not None and there is not None and list(here) != list(there):
+            raise CmmUqError(
+                f"the machine's certificate has a travel of {axis} of {there[0]:g} to {there[1]:g} mm, and the job says "
+                f"{here[0]:g} to {here[1]:g} mm", where=f"{WHERE} travel_mm",
+                fix="Leave it out, or give the certificate of this machine",
+            )  # fmt: skip
+        given = here or there
+        if given is None:
+            raise CmmUqError(f"nothing says how far axis {axis} goes, by which errors of guideways are told", where=WHERE,
+                             fix=f"Give travel_mm = {{ {axis} = [lowest, highest] }}, or the certificate as PDF")  # fmt: skip
+        travel[i] = given
+    name = "" if own is None else own.name
+    return Machine(name, chain, travel, np.array(origin, dtype=np.float64))
+
+
+def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineState, Text, bool]:
+    """The state given the recording, where that is at hand; and how its errors are drawn, in a sentence."""
+    apart = say("errors that it did not model are each drawn on its own, which makes most uncertainties too large")
+    if job is None:
+        return state, say("The recording of the calibration is not at hand: {apart}.", apart=apart), False
+    if kind_of(job).observe is None:
+        return state, say("The calibration is of another sort than one by named errors: {apart}.", apart=apart), False
+    try:
+        model, _ = screened_model(job)
+        model, _, _ = with_noise(model)
+        count, observe = int(model.used.sum()), kind_of(job).observing("the machine of a part")
+        most = _MOST * count // max(_quantities(model), 1)
+        model = thin_out(model, partial(observe, job.facts.artefact, where=job.recording_path), seed, most)
+        together = given_recording(state, model, seed=seed)
+    except CmmUqError as error:
+        why = Verbatim(error.problem)
+        told = say("The errors could not be drawn given the recording ({why}): {apart}.", why=why, apart=apart)
+        return state, told, False
+    text: Text = say(
+        "All errors are drawn together, given the recording of the calibration, those included that it did not model."
+    )
+    if (some := int(model.used.sum())) < count:
+        text = after(text, say("{some} of its {count} observations are reckoned with.", some=some, count=count))
+    return together, text, True
+
+
+def _quantities(model: MeasurementModel) -> int:
+    """How many of the used observations are no repeats of others."""
+    artefact = model.artefact
+    first = artefact.points.point[artefact.rows[model.used, 0]]
+    return len(np.unique(np.column_stack([artefact.measurement[model.used], first]), axis=0))

@@ -1,0 +1,261 @@
+"""From a part's job to what is found of it: its machine verified, virtual measurements, budget, decisions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
+from cmm_uq.analysis.conformity.limits import LimitDecision as Judged
+from cmm_uq.analysis.conformity.limits import Limits, judge
+from cmm_uq.analysis.parts.budget import DRAWS as SHARED
+from cmm_uq.analysis.parts.budget import Budget, budget, displaced
+from cmm_uq.analysis.parts.machine.state import MachineState
+from cmm_uq.analysis.parts.methods.comparison import compared
+from cmm_uq.analysis.parts.methods.of_job import methods_of
+from cmm_uq.analysis.parts.plan import Plan
+from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
+from cmm_uq.analysis.parts.setup import (
+    PLACES,
+    circumstances_of,
+    doubled,
+    origin_of,
+    plan_of,
+    refuse_out_of_reach,
+    refuse_unfit,
+)
+from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.ways import ways
+from cmm_uq.app.commands.files import Stage, silent
+from cmm_uq.app.commands.parts.further import further_of
+from cmm_uq.app.commands.parts.machine import machine_found, with_calibration, with_history
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.certificate.effect_words import title_of
+from cmm_uq.certificate.part.measurement import MATTERS, PartFound, Unseen
+from cmm_uq.jobs.part.characteristic import CharacteristicFacts
+from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
+
+TRIALS = 200_000
+"""Virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2)."""
+
+KEPT = 100_000
+"""Virtual measurements that are kept, for probabilities: one of 5 % is then known to 0.07 %."""
+
+COMPARED = 6000
+"""Virtual measurements of each way that is compared: its u is then known to 0.9 %, and its part of the planned one better."""
+
+MANY = 1000
+"""Points of a plan from which on fewer virtual measurements are made, as many points in all; a tenth of them at least."""
+
+COVERAGE = 0.95
+
+
+ITERATED = 50
+"""Points that one of a feature counts for that is found anew each time, not by a derivative: a zone, an inscribed element."""
+
+
+def affordable(draws: int, plan: Plan) -> int:
+    """So many virtual measurements, or fewer of a plan of many points, or of features that are found anew in each."""
+    own = {one.name: one.association for one in plan.features}
+    found_anew = {
+        (name, how) for one in plan.characteristics for name in (*one.features, *one.datums)
+        if (how := (name in one.features and one.association) or own.get(name, "least_squares")) != "least_squares"
+    }  # fmt: skip
+    points = len(plan.points) + ITERATED * sum(len(plan.feature(name).points) for name, _ in found_anew if name in own)
+    return max(draws // 10, min(draws, draws * MANY // points))
+
+
+def part_found(
+    job: PartJob,
+    *,
+    seed: int = 0,
+    trials: int | None = None,
+    digits: int | None = None,
+    rerun: bool = False,
+    trust: Iterable[Path] | None = None,
+    records: str | Path | None = None,
+    history: bytes | None = None,
+    stage: Stage = silent,
+) -> PartFound:
+    """What a part's job gives.
+
+    Parameters
+    ----------
+    job : that was read.
+    seed : of everything random; the same seed gives the same result.
+    trials : number of virtual measurements; by default :data:`TRIALS`, fewer of a plan of many points.
+    digits : of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least.
+    rerun : whether the machine's certificate is computed again from its inputs.
+    trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
+    records : of the machine's history, for its drift; ``None`` for none.
+    history : of the machine, that a report has inside; then no records are asked.
+    stage : told of progress.
+
+    Raises
+    ------
+    CmmUqError : the machine's certificate does not hold, or the measurement is impossible.
+    """
+    refuse_unfit(job)
+    plan = plan_of(job)
+    trials = affordable(TRIALS, plan) if trials is None else trials
+    measured = None if job.measured is None else evaluated(plan, job.measured)
+    others = methods_of(job, plan, measured)
+
+    machine = machine_found(
+        job, rerun=rerun, trust=trust, records=records, history=history, seed=seed, stage=stage,
+        fits=partial(refuse_out_of_reach, job),
+    )  # fmt: skip
+    job = with_history(with_calibration(job, machine.job), machine.history)
+    given = circumstances_of(job, machine.state, plan, PLACES)
+    if job.measured is not None:
+        given = replace(given, measured=job.measured)
+    stage("Preparing the virtual measurements", 0.25)
+    virtual = Virtual(plan, given)
+    simulated, errors = _simulated(virtual, trials, digits, seed, stage)
+    stage("Shares of each cause", 0.6)
+    shares = budget(virtual, min(affordable(SHARED, plan), trials), seed)
+    stage("What would change the uncertainty", 0.7)
+    compared_by = min(affordable(COMPARED, plan), trials)
+    found_ways = ways(
+        plan, given, compared_by, seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
+    )
+    stage("What to measure on the machine", 0.8)
+    unseen = _unseen(virtual, shares)
+    further = further_of(machine.job, unseen)
+    stage("Decisions", 0.85)
+    known = stated(simulated, measured, plan, errors)
+    decided = judged(job, plan, errors, measured)
+    together = None if measured is None else _together(conforming(plan, errors, measured)[1], decided)
+    return PartFound(
+        job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,
+        decided, together, tuple(found_ways),
+        displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
+        machine.standing, compared(known, shares, others), digits=digits, seed=seed, asked=trials, warnings=machine.warnings,
+        files={} if further is None else further.files,
+    )  # fmt: skip
+
+
+def _together(together: float, decided: Iterable[Judged | None]) -> float | None:
+    """The probability that all limits are kept, beside those of each as they are told: with a prior, and rare tails."""
+    each = [one.probability for one in decided if one is not None and one.probability is not None]
+    return within_bounds(together, np.array(each)) if each else None
+
+
+def _with_twice_the_points(job: PartJob, machine: MachineState) -> Callable[[], tuple[Plan, Circumstances]]:
+    def more() -> tuple[Plan, Circumstances]:
+        other = doubled(job)
+        plan = plan_of(other)
+        return plan, circumstances_of(other, machine, plan, PLACES)
+
+    return more
+
+
+def _three(values: Floats) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+@dataclass(eq=False)
+class _Keeping:
+    """Errors of virtual measurements, the first of them kept."""
+
+    virtual: Virtual
+    stage: Stage
+    blocks: list[Floats] = field(default_factory=list)
+    made: int = 0
+
+    def draw(self, random: np.random.Generator, n: int) -> Floats:
+        """(c, n) errors."""
+        errors = self.virtual.errors(random, n)
+        if self.made < KEPT:
+            self.blocks.append(errors[: KEPT - self.made].copy())
+        self.made += n
+        self.stage(f"Virtual measurements: {self.made}", 0.3 + 0.3 * min(1.0, self.made / TRIALS))
+        return np.ascontiguousarray(errors.T)
+
+
+def _simulated(
+    virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage
+) -> tuple[Simulated, Floats]:  # fmt: skip
+    """Figures of the errors, and (N, c) errors of some of the virtual measurements that they come from."""
+    keeping = _Keeping(virtual, stage)
+    source = Source(virtual.names, keeping.draw)
+    if digits is None:
+        found = from_source(source, trials, COVERAGE, seed)
+    else:
+        found = settled_source(source, COVERAGE, digits, seed, fewest_trials=trials)
+    return found, np.concatenate(keeping.blocks)
+
+
+def _unseen(virtual: Virtual, shares: Budget) -> tuple[Unseen, ...]:
+    """What the calibration left free or did not see, by characteristic, the largest share first."""
+    found = []
+    for name in shares.characteristics:
+        for line, share, why in shares.told(name, virtual.named, MATTERS):
+            effect = line.partition(": ")[2]
+            found.append(Unseen(name, line, effect, title_of(effect), share, why))
+    return tuple(found)
+
+
+def judged(
+    job: PartJob, plan: Plan, errors: Floats, measured: Floats | None
+) -> tuple[Judged | None, ...]:  # fmt: skip
+    """What follows from each characteristic's limits, by the job's rule.
+
+    Where nothing was measured, what would be accepted is told of a value that is not corrected for its mean error. A zone is
+    then decided on by the root mean square of all errors as that of a normal distribution: errors about a perfect part are to
+    one side and narrower than those about a part near its limit.
+
+    Parameters
+    ----------
+    errors : (N, c) of virtual measurements.
+    measured : (c,) values; ``None`` where nothing was measured.
+
+    Raises
+    ------
+    CmmUqError : the rule needs a prior that these limits cannot have.
+    """
+    found: list[Judged | None] = []
+    for i, (facts, one) in enumerate(zip(job.facts.characteristic, plan.characteristics, strict=True)):
+        if one.lower is None and one.upper is None:
+            found.append(None)
+            continue
+        zone = facts.asks.limits == "zone"
+        mean = middle(errors[:, i]) if zone and measured is not None else float(errors[:, i].mean())
+        about = errors[:, i] - mean
+        if measured is None and zone:
+            size = float(np.sqrt(np.mean(errors[:, i] ** 2)))
+            about = size * np.random.default_rng(0).standard_normal(len(errors))
+        limits = Limits(one.lower, one.upper, about, zone, _prior(job, facts, one.lower, one.upper, zone=zone))
+        value = None if measured is None else float(measured[i]) - mean
+        found.append(judge(limits, job.facts.decision.rule, value))
+    return tuple(found)
+
+
+def _prior(
+    job: PartJob, facts: CharacteristicFacts, lower: float | None, upper: float | None, *, zone: bool
+) -> Known | None:  # fmt: skip
+    """What is known of the value beforehand: about the middle of its limits, of a zone about zero."""
+    given = job.facts.decision.prior
+    if given is None:
+        return None
+    where = f"job.toml [decision] prior: characteristic {facts.name!r}"
+    if zone:
+        middle, limit = 0.0, upper or 0.0
+    elif lower is None or upper is None:
+        raise CmmUqError("a prior is about the middle of two limits, and there is one", where=where,
+                         fix="Give both limits, or a rule without a prior")  # fmt: skip
+    else:
+        middle, limit = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    if given.share_of_limit is not None:
+        return Known(middle, given.share_of_limit * limit)
+    if facts.asks.limits == "angles":
+        raise CmmUqError("a prior in µm is none of an angle", where=where, fix="Give share_of_limit")
+    return Known(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))

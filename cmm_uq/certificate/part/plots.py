@@ -1,0 +1,313 @@
+"""Every characteristic against its limits, a row each: where its value lies between them, and its 95 % interval.
+
+What the uncertainty of every characteristic is made of: a bar each, parted by cause.
+
+Correlations between many characteristics, as a picture: a dot for each two, larger where they hang together more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cmm_uq.base.messages import Text, commas, number, say, semicolons, signed
+from cmm_uq.base.points import Floats
+from cmm_uq.certificate.document import Outcome, Plot
+from cmm_uq.certificate.plots.labels import NAMES_MM, told_apart, width_mm
+from cmm_uq.certificate.plots.style import (
+    ACCENT,
+    BAD,
+    BAND,
+    DIVERGING,
+    INK,
+    MUTED,
+    OPEN,
+    RULE,
+    TINY,
+    WIDTH_MM,
+    dots,
+    drawn,
+    finite,
+    house_style,
+    lettered,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_FARTHEST = 0.45
+"""Of the distance of the limits, how far the picture goes beyond either."""
+
+_TIMES = 2.0
+"""A single limit stands so many intervals from where its picture ends, or as far as the value needs."""
+
+A_PAGE = 40
+"""Rows of one picture."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """One characteristic.
+
+    Parameters
+    ----------
+    name : of it.
+    value : measured, in any unit; the middle of what is allowed where nothing was measured.
+    interval : of the value, same unit.
+    lower, upper : limits, same unit; ``None`` where there is none. At least one is there.
+    outcome : of the decision; ``None`` where nothing was measured.
+    accepted : least and largest value that the rule accepts; ``None`` where it accepts none or is not known.
+    """
+
+    name: Text
+    value: float
+    interval: tuple[float, float]
+    lower: float | None
+    upper: float | None
+    outcome: Outcome | None
+    accepted: tuple[float | None, float | None] | None = None
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Where the row has 0, and how much is 1 of it."""
+        if self.lower is not None and self.upper is not None:
+            return self.lower, self.upper - self.lower
+        spread = _TIMES * (self.interval[1] - self.interval[0])
+        if self.upper is not None:
+            width = max(spread, 1.3 * (self.upper - self.interval[0])) or 1.0
+            return self.upper - width, width
+        lower = self.lower or 0.0
+        return lower, max(spread, 1.3 * (self.interval[1] - lower)) or 1.0
+
+    def of(self, value: float) -> float:
+        """A value between the limits, 0 … 1."""
+        zero, one = self.scale
+        return (value - zero) / one
+
+
+_COLOURS = {"pass": ACCENT, "conditional pass": ACCENT, "fail": BAD, "conditional fail": BAD}
+_RULED = (0.0, 1.0)
+
+
+def margin_plots(rows: Sequence[Margin]) -> list[Plot]:
+    """The rows in order, forty a picture; none without rows."""
+    parts = [rows[i : i + A_PAGE] for i in range(0, len(rows), A_PAGE)]
+    return [margin_plot(part, _number(i, len(parts))) for i, part in enumerate(parts)]
+
+
+def _number(place: int, count: int) -> tuple[int, int] | None:
+    return (place + 1, count) if count > 1 else None
+
+
+def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> Plot:
+    """One picture.
+
+    Parameters
+    ----------
+    part : which of how many, where there are several.
+    """
+    height = 17.0 + 5.2 * len(rows)
+    measured = any(row.outcome is not None for row in rows)
+    with house_style():
+        figure = new_figure(height)
+        ax = figure.subplots()
+        figure.subplots_adjust(left=0.34, right=0.985, bottom=12 / height, top=1 - 1.5 / height)
+        for place, row in enumerate(rows):
+            _band(ax, place, row)
+            _interval(ax, place, row)
+        ax.set_yticks(np.arange(len(rows)), told_apart([row.name for row in rows], NAMES_MM))
+        ax.set_xticks([0.0, 0.5, 1.0], [say("lower limit"), say("middle"), say("upper limit")])
+        ax.set(xlim=(-_FARTHEST, 1 + _FARTHEST), ylim=(len(rows) - 0.4, -0.6))
+        ax.tick_params(left=False)
+        ax.spines["left"].set_visible(False)
+        ax.set_xlabel(
+            say("full dot: conforms, cross: does not, hollow dot: undecided; dark: what is accepted")
+            if measured
+            else say("bar: 95 % interval about the middle, since nothing was measured; dark: what is accepted"),
+            loc="right",  # towards the names: in some languages it is longer than the axis
+        )
+        caption = (
+            say("The characteristics between their limits, with their 95 % intervals.")
+            if measured
+            else say("How much of the tolerance the uncertainty takes.")
+        )
+        if part:
+            caption = say("{caption} Part {number} of {count}.", caption=caption, number=part[0], count=part[1])
+        return drawn(figure, caption, _told(rows, measured=measured))
+
+
+def _told(rows: Sequence[Margin], *, measured: bool) -> Text:
+    if not measured:
+        share = max((row.interval[1] - row.interval[0]) / row.scale[1] for row in rows)
+        return say("{count} characteristics; the 95 % interval takes up to {share} % of what is allowed.",
+                   count=len(rows), share=number(100 * share, ".0f"))  # fmt: skip
+    inside = sum(row.outcome in ("pass", "conditional pass") for row in rows)
+    out = sum(row.outcome in ("fail", "conditional fail") for row in rows)
+    return say("{count} characteristics against their limits: {inside} conform, {out} do not, {rest} are undecided.",
+               count=len(rows), inside=inside, out=out, rest=len(rows) - inside - out)  # fmt: skip
+
+
+def _band(ax: Axes, place: int, row: Margin) -> None:
+    """What is allowed, what the rule accepts, and the limits that there are."""
+    ends = (0.0 if row.lower is not None else -_FARTHEST, 1.0 if row.upper is not None else 1 + _FARTHEST)
+    ax.barh(place, ends[1] - ends[0], 0.72, left=ends[0], color=BAND, lw=0, alpha=0.55, zorder=0)
+    if row.accepted is not None:
+        low, high = (end if given is None else row.of(given) for given, end in zip(row.accepted, ends, strict=True))
+        ax.barh(place, max(high - low, 0.0), 0.72, left=low, color=BAND, lw=0, zorder=1)
+    for limit, at in zip((row.lower, row.upper), _RULED, strict=True):
+        if limit is not None:
+            ax.plot([at, at], [place - 0.36, place + 0.36], color=MUTED, lw=1.0, zorder=2)
+    ax.axhline(place + 0.5, color=RULE, lw=0.3, zorder=0)
+
+
+def _interval(ax: Axes, place: int, row: Margin) -> None:
+    reach = -_FARTHEST, 1 + _FARTHEST
+    low, high, at = (float(np.clip(row.of(value), *reach)) for value in (*row.interval, row.value))
+    colour = MUTED if row.outcome is None else _COLOURS.get(row.outcome, OPEN)
+    ax.plot([low, high], [place, place], color=colour, lw=1.8, solid_capstyle="butt", zorder=3)
+    if row.outcome is not None and _COLOURS.get(row.outcome) == BAD:
+        ax.plot([at], [place], ls="", marker="x", ms=5.5, mec=colour, mew=1.6, zorder=5)
+    elif row.outcome is not None:
+        dots(ax, np.array([at]), np.array([float(place)]), 4.6, colour, hollow=colour == OPEN, zorder=5)
+    if not reach[0] <= row.of(row.value) <= reach[1]:
+        side = 1 if at > 0.5 else -1
+        text = say("{times} times the tolerance", times=number(row.of(row.value), ".1f"))
+        ax.annotate(text, (at, place), (-7 * side, 0), textcoords="offset points", ha="right" if side > 0 else "left",
+                    va="center", color=INK, fontsize=6.5, zorder=6,
+                    bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.5})  # fmt: skip
+
+
+_SHADES = ("#0b5c7a", "#86b1c2", "#a84e08", "#e0b48a", "#5a666e", "#c3ccd0", "#3f86a0", "#cc7f3c")
+"""Neighbours differ in lightness, so that they can be told apart without colour."""
+
+_DARK = ("#0b5c7a", "#a84e08", "#5a666e")
+_LEAST = 0.07
+"""Share from which on a figure has room in its part."""
+
+_LEFT_MM, _RIGHT_MM, _ROW_MM = 58.0, 2.5, 5.2
+
+
+def shares_plots(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> list[Plot]:
+    """The bars in order, forty a picture.
+
+    Parameters
+    ----------
+    names : (c,) of the characteristics.
+    causes : (g,) in words.
+    shares : (g, c) of each, which add up to 1, or to 0 of one that has no uncertainty.
+    """
+    starts = range(0, len(names), A_PAGE)
+    return [_bars(names[i : i + A_PAGE], causes, shares[:, i : i + A_PAGE]) for i in starts]
+
+
+def _bars(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> Plot:
+    rows = np.arange(len(names))
+    with house_style():
+        lines = _legend_lines(causes)
+        top = 4.6 * len(lines) + 2.0
+        height = top + _ROW_MM * len(names) + 3.0
+        figure = new_figure(height)
+        ax = figure.add_axes((_LEFT_MM / WIDTH_MM, 1.5 / height, 1 - (_LEFT_MM + _RIGHT_MM) / WIDTH_MM,
+                              _ROW_MM * len(names) / height))  # fmt: skip
+        before = np.zeros(len(names))
+        for g in range(len(causes)):
+            shade = _SHADES[g % len(_SHADES)]
+            ax.barh(rows, shares[g], 0.7, left=before, color=shade, edgecolor="white", lw=0.6)
+            for row in np.flatnonzero(shares[g] >= _LEAST).tolist():
+                ax.text(before[row] + 0.5 * shares[g, row], row, number(100 * shares[g, row], ".0f"), fontsize=TINY,
+                        color="white" if shade in _DARK else INK, ha="center", va="center_baseline")  # fmt: skip
+            before = before + shares[g]
+        ax.set_yticks(rows, told_apart(names, NAMES_MM))
+        ax.set(xlim=(0, 1), ylim=(len(names) - 0.4, -0.6), xticks=[])
+        ax.tick_params(left=False)
+        for side in ("bottom", "left"):
+            ax.spines[side].set_visible(False)
+        for line, members in enumerate(lines):
+            y = 1 - (2.6 + 4.6 * line) / height
+            for g, left in members:
+                figure.text(left / WIDTH_MM, y, "■", fontsize=8, color=_SHADES[g % len(_SHADES)], va="center")
+                figure.text((left + 3.6) / WIDTH_MM, y, causes[g], fontsize=TINY, color=INK, va="center")
+        return drawn(
+            figure,
+            say("What the variance of each characteristic is made of, %, by cause: total shares over their sum."),
+            semicolons(_told_of_budget_plot(name, causes, shares[:, i]) for i, name in enumerate(names)),
+        )
+
+
+def _told_of_budget_plot(name: Text, causes: Sequence[Text], shares: Floats) -> Text:
+    order = [int(g) for g in np.argsort(-shares, kind="stable")[:3] if shares[g] > 0]
+    said = commas(say("{what:small} {share} %", what=causes[g], share=number(100 * shares[g], ".0f")) for g in order)
+    return say("{name}: {shares}", name=name, shares=said)
+
+
+def _legend_lines(causes: Sequence[Text]) -> list[list[tuple[int, float]]]:
+    """Causes in lines, with where each begins, mm."""
+    lines, left = [list[tuple[int, float]]()], 1.0
+    for g, cause in enumerate(causes):
+        width = 9.0 + width_mm(lettered(cause), TINY)
+        if lines[-1] and left + width > WIDTH_MM:
+            lines.append([])
+            left = 1.0
+        lines[-1].append((g, left))
+        left += width
+    return lines
+
+
+_SIDE_MM, _LEAST_MM = 5.0, 2.2
+LEAST = 0.1
+"""Correlation from which on there is a dot."""
+
+_CLASSES = 5
+
+
+def correlation_plot(numbers: Sequence[Text], correlation: Floats) -> Plot:
+    """The lower half of the matrix.
+
+    Parameters
+    ----------
+    numbers : (c,) short names of the characteristics, two at least.
+    correlation : (c, c).
+    """
+    count = len(numbers)
+    values = finite("correlation", correlation, (count, count))
+    side = max(min(_SIDE_MM, (WIDTH_MM - 24.0) / count), _LEAST_MM)
+    below, left = np.tril_indices(count, -1)
+    sizes = values[below, left]
+    with house_style():
+        height = 11.0 + side * count
+        figure = new_figure(height)
+        edge = 0.5 * (WIDTH_MM - side * count)
+        ax = figure.add_axes((edge / WIDTH_MM, 9.0 / height, side * count / WIDTH_MM, side * count / height))
+        steps = np.ceil(np.abs(sizes) * _CLASSES)
+        for step in range(1, _CLASSES + 1):
+            for positive, colour in ((True, DIVERGING[-1]), (False, DIVERGING[0])):
+                some = (steps == step) & (np.abs(sizes) >= LEAST) & ((sizes > 0) == positive)
+                if some.any():
+                    diameter = 0.92 * side * np.sqrt(step / _CLASSES) * 72 / 25.4
+                    dots(ax, left[some], below[some], float(diameter), colour, hollow=not positive)
+        ax.set(xlim=(-0.5, count - 0.5), ylim=(count - 0.5, -0.5))
+        turned = 90 if side < 6.0 and any(len(name) > 2 for name in numbers) else 0
+        ax.set_xticks(range(count), numbers, fontsize=TINY, rotation=turned)
+        ax.set_yticks(range(count), numbers, fontsize=TINY)
+        ax.tick_params(length=0, labelcolor=INK)
+        for name in ("left", "bottom"):
+            ax.spines[name].set_color(RULE)
+        return drawn(
+            figure,
+            say("Correlations between the characteristics, by their numbers: full dots positive, hollow dots negative, the "
+                "larger the stronger; those below {least:g} in size are left out.", least=LEAST),
+            _told_of_correlation_plot(numbers, sizes, below, left),
+        )  # fmt: skip
+
+
+def _told_of_correlation_plot(numbers: Sequence[Text], sizes: Floats, below: np.ndarray, left: np.ndarray) -> Text:
+    most = int(np.abs(sizes).argmax())
+    return say(
+        "{count} of {all} correlations are {least:g} or larger in size; the largest, {r}, is between {one} and {other}.",
+        count=int((np.abs(sizes) >= LEAST).sum()), all=len(sizes), least=LEAST, r=signed(float(sizes[most]), ".2f"),
+        one=numbers[int(left[most])], other=numbers[int(below[most])],
+    )  # fmt: skip

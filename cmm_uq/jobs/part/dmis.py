@@ -1,0 +1,419 @@
+"""Statements of DMIS by their first words: what is read of features, and what says nothing of a plan.
+
+Tolerances of DMIS programs, ``T(…)=TOL/…``, as keys of a characteristic.
+
+DMIS part programs (ISO 22093): nominal features with the points at which they are measured, tolerances, datums, styli.
+
+Read are ``F(…)=FEAT/…`` in Cartesian coordinates, measured by ``MEAS`` with ``PTMEAS``; ``T(…)=TOL/…`` that ``OUTPUT`` or
+``EVAL`` gives to a feature; ``DATDEF``; styli by ``SNSDEF/PROBE``; and the frames of the program (``DATSET``, ``TRANS``,
+``ROTATE``), which are followed by their nominals, so that all stands in the frame of the first feature. Motion and machine
+settings say nothing of a plan and are passed over.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.jobs.importing.dmis import statements
+from cmm_uq.jobs.importing.encodings import decoded, report_lines
+from cmm_uq.jobs.part.characteristic import ASKS, What
+from cmm_uq.jobs.part.datums import BETWEEN
+from cmm_uq.jobs.part.dmis_frames import Frame, numbers_of, reference, words_of
+from cmm_uq.jobs.part.drawing import (
+    Drawing,
+    Facts,
+    NotUnderstoodError,
+    Unknown,
+    all_there,
+    limits,
+    refuse_other_kind,
+    usual_strategy,
+)
+from cmm_uq.jobs.part.feature import (
+    FREE_STATE,
+    LEAST_MATERIAL,
+    LINE_PROFILE,
+    MAXIMUM_MATERIAL,
+    POINT_PROFILE,
+    PROJECTED,
+    SCANNED,
+    SURFACE_PROFILE,
+    TWO_POINT,
+)
+
+MILLIMETRES = {"MM": 1.0, "CM": 10.0, "M": 1000.0, "INCH": 25.4, "FEET": 304.8}
+DEGREES = {"ANGDEC": 1.0, "ANGRAD": math.degrees(1.0)}
+KINDS = {
+    "POINT": "point",
+    "LINE": "line",
+    "PLANE": "plane",
+    "CIRCLE": "circle",
+    "SPHERE": "sphere",
+    "CYLNDR": "cylinder",
+}
+NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
+"""That a feature has at least: its place, its direction, its diameter."""
+
+PASSED = (
+    "DMISMN", "DMISMD", "DISPLY", "FILNAM", "PRCOMP", "SNSET", "SNSMNT", "OPEN", "CLOSE", "GOTO", "MODE", "TEXT", "SAVE",
+    "ENDFIL", "FEDRAT", "ACLRAT", "DECPL", "FINPOS", "RAPID", "FROM", "GOHOME", "CRSLCT", "TECOMP", "WKPLAN", "DEVICE",
+    "DID", "VFORM", "REPORT", "FLY", "BADTST", "CALIB", "UNITS", "ENDMES", "PTMEAS", "SCNSET", "SCNMOD", "PATH", "PAMEAS",
+    "GOTARG", "ENDGO", "CLMPID", "CLMPSN", "FIXTID", "FIXTSN", "OPERID", "PARTID", "PARTRV", "PARTSN", "PLANID", "PREVOP",
+    "PROCID", "LOTID", "DMEID", "DMESWI", "DMESWV", "MFGDEV",
+)  # fmt: skip
+"""First words of statements that say nothing of what is measured, or that are read elsewhere."""
+
+
+_TOLERANCES: Mapping[str, What] = {
+    "FLAT": "flatness", "STRGHT": "straightness", "CIRLTY": "roundness", "CYLCTY": "cylindricity", "DIAM": "size",
+    "POS": "position", "PARLEL": "parallelism", "PERP": "perpendicularity", "CONCEN": "coaxiality",
+    "CRNOUT": "circular_runout", "TRNOUT": "total_runout",
+}  # fmt: skip
+
+_REFUSED: Mapping[str, str] = {
+    "PROFL": LINE_PROFILE, "PROFS": SURFACE_PROFILE, "PROFP": POINT_PROFILE, "MMC": MAXIMUM_MATERIAL, "LMC": LEAST_MATERIAL,
+    "LP": TWO_POINT, "FREE": FREE_STATE, "PROJ": PROJECTED,
+}  # fmt: skip
+"""Words that change what a tolerance means, refused in words of their own."""
+
+_PLAIN = ("RFS", "2D", "3D")
+"""Words that leave a tolerance as it is, or say what its feature says already."""
+
+
+def toleranced(words: list[str], feature: Facts, millimetres: float, datums: Mapping[str, str]) -> Facts:
+    """Keys of the characteristic that a tolerance is of a feature, but its name.
+
+    Parameters
+    ----------
+    words : of the tolerance.
+    feature : that it was given to, as its table.
+    millimetres : in the program's unit of length.
+    datums : names of features that are read, by the labels of datums.
+
+    Raises
+    ------
+    NotUnderstoodError : it is none that is read.
+    """
+    sort = words[0].upper() if words else ""
+    if sort not in _TOLERANCES:
+        raise NotUnderstoodError(_REFUSED.get(sort) or f"is a tolerance {sort or 'of no kind'}, which is not read")
+    what, kind = _TOLERANCES[sort], feature["kind"]
+    refuse_other_kind(what, kind)
+    plain = [word.upper() for word in words[1:] if not reference(word)[0]]
+    refused = next((_REFUSED[word] for word in plain if word in _REFUSED), None)
+    if refused:
+        raise NotUnderstoodError(refused)
+    number = numbers_of([word for word in plain if word not in _PLAIN])
+    if what == "size":
+        if len(number) < 2:
+            raise NotUnderstoodError("has a diameter without two limits, which is not read")
+        low, high = (feature["diameter_mm"] + millimetres * limit for limit in number[:2])
+        return {"what": what, "features": [feature["name"]], **limits(what, low, high)}
+    if what == "position" and ("3D" in plain) != (kind in ("point", "sphere")):
+        said = "3D" if "3D" in plain else "2D"
+        raise NotUnderstoodError(f"is a position in {said} of a {kind}, which is not read")
+    if not number or number[0] <= 0:
+        raise NotUnderstoodError("is a tolerance of 0, which nothing conforms with")
+    about = [_datum(name, datums) for of, name in map(reference, words[1:]) if of in ("DAT", "FA")]
+    if len(about) < ASKS[what].datums:
+        raise NotUnderstoodError("names no datum")
+    if about and not ASKS[what].datum_kinds:
+        raise NotUnderstoodError(f"is a {what} with a datum, which has none")
+    named = {"datums": about} if about else {}
+    return {"what": what, "features": [feature["name"]], **named, "tolerance_mm": millimetres * number[0]}
+
+
+def _datum(label: str, datums: Mapping[str, str]) -> str:
+    if label in datums:
+        return datums[label]
+    if label in datums.values():
+        return label
+    parts = label.split(BETWEEN)
+    if len(parts) > 1:
+        return BETWEEN.join(_datum(each.strip(), datums) for each in parts)
+    raise NotUnderstoodError(f"is about the datum {label}, which is no feature that is read")
+
+
+PROGRAM = "DMIS program"
+
+_LABELLED = re.compile(r"^(?P<of>\w+)\s*\((?P<name>[^)]*)\)\s*=\s*(?P<major>\w+)\s*/\s*(?P<rest>.*)$")
+_PLAIN_of_drawing_dmis = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
+
+
+def drawing_of_dmis(content: bytes, where: str) -> Drawing:
+    """A DMIS program.
+
+    Parameters
+    ----------
+    content : of the file.
+    where : its path, for messages.
+
+    Raises
+    ------
+    CmmUqError : it is damaged, in units or frames that are not understood, or branches.
+    """
+    text, _ = decoded(content, where, None)
+    return _Program(where).read([
+        (line, statement.partition("$$")[0].strip()) for line, statement in statements(report_lines(text, where), where)
+    ])  # fmt: skip
+
+
+class _Program:
+    """What was said so far."""
+
+    def __init__(self, where: str) -> None:
+        self.where, self.drawing = where, Drawing(PROGRAM)
+        self.frame = Frame()
+        self.nominal: dict[str, Facts] = {}
+        self.tolerances: dict[str, tuple[int, list[str]]] = {}
+        self.datums: dict[str, str] = {}
+        self.styli: dict[str, Facts] = {}
+        self.mount = np.zeros(3)
+        self.stylus = ""
+        self.measuring: tuple[str, int, list[list[float]]] | None = None
+        self.given: list[tuple[int, str, str]] = []
+        self.scanning = False
+        self.scanned: set[str] = set()
+
+    def read(self, said: list[tuple[int, str]]) -> Drawing:
+        """See :func:`drawing_of_dmis`."""
+        for line, statement in said:
+            if statement:
+                self._one(line, statement)
+        for line, feature, tolerance in self.given:
+            self._characteristic(line, feature, tolerance)
+        self._left_over()
+        self.drawing.styli = [self.styli[name] for name in dict.fromkeys(one["stylus"] for one in self.drawing.features)
+                              if name in self.styli]  # fmt: skip
+        self.drawing.datums = list(dict.fromkeys(self.datums.values()))
+        return self.drawing
+
+    def _one(self, line: int, statement: str) -> None:
+        labelled, plain = _LABELLED.match(statement), _PLAIN_of_drawing_dmis.match(statement)
+        place = f"{self.where} line {line}"
+        try:
+            if labelled:
+                self._labelled(labelled, line, place)
+            elif plain:
+                self._plain(plain["major"].upper(), words_of(plain["rest"] or ""), line, place)
+            else:
+                raise NotUnderstoodError("is no statement of DMIS that is read")
+        except NotUnderstoodError as error:
+            name = labelled["name"].strip() if labelled else statement[:60]
+            self.drawing.unknown.append(Unknown(name, str(error), place))
+
+    def _labelled(self, found: re.Match[str], line: int, place: str) -> None:
+        of, name, major = found["of"].upper(), found["name"].strip(), found["major"].upper()
+        words = words_of(found["rest"])
+        if of == "F" and major == "FEAT":
+            self.nominal[name] = self._feature(name, words)
+        elif of == "T" and major == "TOL":
+            self.tolerances[name] = (line, words)
+        elif of == "S" and major == "SNSDEF":
+            self.styli[name] = self._stylus(name, words)
+        elif of == "D":
+            self._frame(major, words, place)
+        elif of not in PASSED and major not in PASSED:
+            raise NotUnderstoodError(f"is a statement {of}(…)={major}/, which is not read")
+
+    def _plain(self, major: str, words: list[str], line: int, place: str) -> None:
+        read: Mapping[str, Callable[[list[str], int, str], None]] = {
+            "SCNMOD": self._scanning, "PAMEAS": self._scanned, "UNITS": self._units, "SNSMNT": self._mounted,
+            "SNSLCT": self._selected, "MEAS": self._begun, "PTMEAS": self._point, "ENDMES": self._ended,
+            "DATDEF": self._datum, "OUTPUT": self._output, "EVAL": self._output, "CONST": self._constructed,
+        }  # fmt: skip
+        if major in read:
+            read[major](words, line, place)
+        elif major not in PASSED:
+            raise NotUnderstoodError(f"is a statement {major}, which is not read")
+
+    def _units(self, words: list[str], line: int, place: str) -> None:
+        length, angle = (*words, "ANGDEC")[:2]
+        if length.upper() not in MILLIMETRES or angle.upper() not in DEGREES:
+            raise CmmUqError(f"UNITS/{','.join(words)} is not read", where=place,
+                             fix=f"Write it in {', '.join(MILLIMETRES)} and {' or '.join(DEGREES)}")  # fmt: skip
+        if self.nominal:
+            raise CmmUqError(
+                "the unit changes after features were defined", where=place, fix="Say UNITS once, at first"
+            )
+        self.frame = replace(self.frame, millimetres=MILLIMETRES[length.upper()], degrees=DEGREES[angle.upper()])
+
+    def _feature(self, name: str, words: list[str]) -> Facts:
+        sort = words[0].upper() if words else ""
+        if sort not in KINDS:
+            raise NotUnderstoodError(f"is a feature {sort or 'of no kind'}, which is not read")
+        kind, rest = KINDS[sort], words[1:]
+        found: Facts = {"name": name, "kind": kind}
+        sides = [word.upper() for word in rest if word.upper() in ("INNER", "OUTER", "BND", "UNBND")]
+        if "CART" not in (word.upper() for word in rest):
+            raise NotUnderstoodError("is not given in Cartesian coordinates, which alone are read")
+        number = numbers_of([word for word in rest if word.upper() not in (*sides, "CART")])
+        if "BND" in sides:
+            raise NotUnderstoodError("is a line with ends (BND), which is not read")
+        if len(number) < NUMBERS[kind]:
+            raise NotUnderstoodError(f"has {len(number)} of the {NUMBERS[kind]} numbers that a {kind} has")
+        return found | self._nominal(kind, number) | _side(kind, sides)
+
+    def _nominal(self, kind: str, number: list[float]) -> Facts:
+        found: Facts = {"point_mm": self.frame.place(number[:3])}
+        if kind != "sphere":
+            found["direction"] = self.frame.vector(number[3:6])
+        if kind == "line":
+            found["normal"] = self.frame.vector(number[6:9])
+        if kind in ("circle", "cylinder"):
+            found["diameter_mm"] = self.frame.millimetres * number[6]
+        if kind == "sphere":
+            found["diameter_mm"] = self.frame.millimetres * number[3]
+        return found
+
+    def _stylus(self, name: str, words: list[str]) -> Facts:
+        """``SNSDEF/PROBE, …, i, j, k, length, diameter``: the tip stands along i, j, k from where the probe is mounted."""
+        if not words or words[0].upper() != "PROBE":
+            raise NotUnderstoodError(f"is a sensor {words[0] if words else ''}, which is not read")
+        number = numbers_of([word for word in words if not word[:1].isalpha()])
+        if len(number) < 5:
+            raise NotUnderstoodError("does not give direction, length and diameter of its tip")
+        if any(number[:-5]):
+            raise NotUnderstoodError("is turned by the angles of a wrist, which is not read")
+        along, length, diameter = np.array(number[-5:-2]), number[-2], number[-1]
+        offset = self.mount + self.frame.millimetres * length * along
+        return {"name": name, "diameter_mm": self.frame.millimetres * diameter, "offset_mm": offset.tolist()}
+
+    def _mounted(self, words: list[str], line: int, place: str) -> None:
+        upper = [word.upper() for word in words]
+        if "MNTLEN" in upper:
+            number = numbers_of(words[upper.index("MNTLEN") + 1 :][:3])
+            self.mount = self.frame.millimetres * np.array((*number, 0.0, 0.0, 0.0)[:3])
+
+    def _selected(self, words: list[str], line: int, place: str) -> None:
+        _, name = reference(words[0] if words else "")
+        if name not in self.styli:
+            self.styli[name] = {"name": name, "diameter_mm": 0.0}
+            self.stylus = name
+            raise NotUnderstoodError(
+                f"selects {name!r}, which this program does not define: its tip is taken as a point"
+            )
+        self.stylus = name
+
+    def _scanning(self, words: list[str], line: int, place: str) -> None:
+        self.scanning = bool(words) and words[0].upper() == "ON"
+
+    def _scanned(self, words: list[str], line: int, place: str) -> None:
+        if self.measuring is not None:
+            self.scanned.add(self.measuring[0])
+
+    def _begun(self, words: list[str], line: int, place: str) -> None:
+        _, name = reference(words[1] if len(words) > 1 else "")
+        if name not in self.nominal:
+            raise NotUnderstoodError(f"measures {name!r}, which is not read")
+        if not self.stylus:
+            self.stylus = "stylus"
+            self.styli[self.stylus] = {"name": self.stylus, "diameter_mm": 0.0}
+            self.drawing.unknown.append(Unknown("stylus", "is not said: its tip is taken as a point", place))
+        self.measuring = (name, line, [])
+
+    def _point(self, words: list[str], line: int, place: str) -> None:
+        if self.measuring is None:
+            return
+        if not words or words[0].upper() != "CART":
+            raise NotUnderstoodError("is a point that is not given in Cartesian coordinates")
+        self.measuring[2].append(self.frame.place(numbers_of(words[1:4])))
+
+    def _ended(self, words: list[str], line: int, place: str) -> None:
+        if self.measuring is None:
+            return
+        name, _, points = self.measuring
+        self.measuring = None
+        if name in self.scanned or self.scanning:
+            self.drawing.unknown.append(Unknown(name, SCANNED, place))
+            return
+        found: Facts = {**self.nominal[name], "stylus": self.stylus}
+        if found["kind"] == "point":
+            found["point_mm"] = points[0] if points else found["point_mm"]
+        elif points:
+            found["points_mm"] = points
+        else:
+            found["strategy"] = usual_strategy(found["kind"])
+            if found["kind"] == "plane":
+                found |= {"length_mm": 20.0, "width_mm": 20.0}
+            elif found["kind"] in ("line", "cylinder"):
+                found["length_mm"] = found.get("diameter_mm", 20.0) / 2
+            self.drawing.open_keys[name] = ["strategy", "length_mm", "width_mm"]
+        if any(one["name"] == name for one in self.drawing.features):
+            raise NotUnderstoodError(f"measures {name!r} a second time, which is not read")
+        self.drawing.features.append(found)
+
+    def _datum(self, words: list[str], line: int, place: str) -> None:
+        features = [name for of, name in map(reference, words) if of in ("FA", "F")]
+        labels = [name for of, name in map(reference, words) if of == "DAT"]
+        if len(labels) == 1 and len(features) > 1:
+            self.datums[labels[0]] = BETWEEN.join(features)
+            return
+        for feature, label in zip(features, labels, strict=False):
+            self.datums[label] = feature
+
+    def _constructed(self, words: list[str], line: int, place: str) -> None:
+        _, name = reference(words[1] if len(words) > 1 else "")
+        self.drawing.unknown.append(Unknown(name, "is constructed of other features, which is not read", place))
+
+    def _output(self, words: list[str], line: int, place: str) -> None:
+        references = [reference(word) for word in words]
+        features = [name for of, name in references if of in ("FA", "F")]
+        tolerances = [name for of, name in references if of in ("TA", "T")]
+        for tolerance in tolerances:
+            self.given += [(line, feature, tolerance) for feature in features[:1]]
+
+    def _characteristic(self, line: int, feature: str, tolerance: str) -> None:
+        place = f"{self.where} line {line}"
+        try:
+            if tolerance not in self.tolerances:
+                raise NotUnderstoodError("is a tolerance that is not defined")
+            features = {one["name"]: one for one in self.drawing.features}
+            if feature not in features:
+                raise NotUnderstoodError(f"is a tolerance of {feature!r}, which is not read")
+            place = f"{self.where} line {self.tolerances[tolerance][0]}"
+            datums = {label: name for label, name in self.datums.items() if all_there([name], features)}
+            found = toleranced(self.tolerances[tolerance][1], features[feature], self.frame.millimetres, datums)
+            same = [one["name"] for one in self.drawing.characteristics]
+            name = tolerance if tolerance not in same else f"{tolerance} {feature}"
+            self.drawing.characteristics.append({"name": name, **found})
+        except NotUnderstoodError as error:
+            self.drawing.unknown.append(Unknown(tolerance, str(error), place))
+
+    def _left_over(self) -> None:
+        """Features that are never measured, and tolerances that are never given to a feature."""
+        told = {one.name for one in self.drawing.unknown} | {one["name"] for one in self.drawing.features}
+        for name in self.nominal:
+            if name not in told:
+                self.drawing.unknown.append(Unknown(name, "is a feature that is not measured", self.where))
+        given = {tolerance for _, _, tolerance in self.given}
+        for name, (line, _) in self.tolerances.items():
+            if name not in given:
+                self.drawing.unknown.append(
+                    Unknown(name, "is a tolerance without a feature", f"{self.where} line {line}")
+                )
+
+    def _frame(self, major: str, words: list[str], place: str) -> None:
+        """Follow a change of frame; before the first feature it is the machine's, and places the part."""
+        label = reference(words[0])[1] if words else ""
+        try:
+            self.frame = self.frame.changed(major, words, self.nominal, self.datums.get(label, label))
+        except NotUnderstoodError as error:
+            raise CmmUqError(f"a frame {error}, which is not read: what follows would stand in no frame", where=place,
+                             fix="Write the program with all its features in one frame") from None  # fmt: skip
+        if not self.nominal:
+            self.frame = replace(self.frame, axes=np.eye(3), origin=np.zeros(3))
+
+
+def _side(kind: str, sides: list[str]) -> Facts:
+    if kind not in ("circle", "sphere", "cylinder"):
+        return {}
+    if not {"INNER", "OUTER"} & set(sides):
+        raise NotUnderstoodError("does not say INNER or OUTER")
+    return {"inner": "INNER" in sides}

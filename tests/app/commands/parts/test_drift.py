@@ -1,0 +1,99 @@
+"""How far a machine has moved since its calibration, by its records: drawn where they say so, said where they do not."""
+
+from __future__ import annotations
+
+import datetime as dt
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cmm_uq.analysis.parts.machine.state import MachineState
+from cmm_uq.app.commands.parts.drift import known_of, with_drift
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.points import Machine
+from cmm_uq.machine.physics.catalogue import effects
+from tests.app.cli.test_due import recorded
+from tests.app.cli.test_history import scale
+from tests.laboratory.records.histories import certificate
+
+CALIBRATED, ON = dt.date(2026, 3, 2), dt.date(2027, 3, 2)
+STATE = MachineState(Machine("1102"), effects(["scale_x", "scale_y"]), np.zeros((1, 2)), calibrated=CALIBRATED)
+
+
+@pytest.fixture
+def records(tmp_path: Path) -> Path:
+    """One ppm a year, each known to 0.5 ppm."""
+    return recorded(
+        tmp_path, *(certificate("1102", dt.date(2021 + i, 3, 2), scale(float(i))) for i in range(6))
+    )  # fmt: skip
+
+
+def test_without_records_the_age_is_told_and_nothing_is_drawn() -> None:
+    found = with_drift(STATE, "1102", ON, None, "job.toml")
+    assert "365 days since the calibration is not known" in found.told
+    assert not found.state.drift.any()
+    assert found.state.drift_unknown == ("scale_x", "scale_y")
+
+
+def test_the_word_none_is_no_records_as_in_the_other_commands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert (
+        with_drift(STATE, "1102", ON, "none", "job.toml").told == with_drift(STATE, "1102", ON, None, "job.toml").told
+    )
+
+
+def test_on_the_day_of_the_calibration_nothing_has_changed() -> None:
+    assert "on the day of the measurement" in with_drift(STATE, "1102", CALIBRATED, None, "job.toml").told
+
+
+def test_a_steady_drift_goes_on_by_its_rate_and_more(records: Path) -> None:
+    """A year at 1 ppm a year: the rate, its uncertainty and some wandering; of scale_y there is nothing."""
+    found = with_drift(STATE, "1102", ON, records, "job.toml")
+    assert 1.0 < found.state.drift[0] < 3.0
+    assert found.state.drift[1] == 0
+    assert "They say nothing of Scale error of Y" in found.told
+    sooner = with_drift(STATE, "1102", CALIBRATED + dt.timedelta(days=90), records, "job.toml")
+    assert sooner.state.drift[0] < 0.6 * found.state.drift[0]
+
+
+def test_a_history_that_was_kept_gives_the_same_drift_once_more(records: Path) -> None:
+    """To the bit, without the records: of the drift model's changes as :func:`change_since` has them."""
+    found = with_drift(STATE, "1102", ON, records, "job.toml")
+    assert found.changes is not None
+    assert found.changes["scale_y.ppm"] is None
+    again = with_drift(STATE, "1102", ON, None, "job.toml", kept=found.history)
+    np.testing.assert_array_equal(again.state.drift, found.state.drift)
+    assert (again.told, again.state.drift_unknown) == (found.told, found.state.drift_unknown)
+    assert (again.changes, again.history) == (found.changes, found.history)
+
+
+def test_a_history_inside_says_nothing_of_what_came_after_the_calibration(records: Path) -> None:
+    sooner = replace(STATE, calibrated=dt.date(2024, 3, 2))
+    kept = with_drift(sooner, "1102", ON, records, "job.toml").history
+    assert kept is not None
+    ((series, _),) = known_of(kept).values.values()
+    assert series.value.tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{}", b"[" * 100_000, b'{"schema": "cmm-uq/machine-history/1", "adjusted": [1]}']
+)
+def test_what_is_no_history_is_refused(content: bytes) -> None:
+    with pytest.raises(CmmUqError, match="is no history of a machine"):
+        with_drift(STATE, "1102", ON, None, "job.toml", kept=content)
+
+
+def test_a_machine_that_was_adjusted_since_is_refused(tmp_path: Path) -> None:
+    since = certificate("1102", dt.date(2026, 9, 1), scale(0.0), adjusted_since="2026-06-01")
+    kept = recorded(tmp_path, certificate("1102", CALIBRATED, scale(5.0)), since)
+    with pytest.raises(CmmUqError, match="adjusted on 2026-06-01, after its calibration of 2026-03-02"):
+        with_drift(STATE, "1102", ON, kept, "job.toml")
+    later = replace(STATE, calibrated=dt.date(2026, 9, 1))
+    assert with_drift(later, "1102", ON, kept, "job.toml").state.calibrated == dt.date(2026, 9, 1)
+
+
+def test_a_machine_that_is_not_in_the_records_is_refused(records: Path) -> None:
+    with pytest.raises(CmmUqError, match="1103"):
+        with_drift(STATE, "1103", ON, records, "job.toml")

@@ -1,0 +1,335 @@
+"""A part from its job to what is found: the machine verified and refused, values, decisions, and what nobody saw."""
+
+from __future__ import annotations
+
+import datetime as dt
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cmm_uq import __version__
+from cmm_uq.analysis.parts.characteristics import never_negative
+from cmm_uq.analysis.parts.result import evaluated
+from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
+from cmm_uq.app.commands.parts.machine import machine_found
+from cmm_uq.app.commands.parts.part import affordable, judged, part_found
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import say
+from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.results import PART_RESULTS, part_results
+from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.jobs.part.job import TABLES
+from tests.conftest import ROOT
+from tests.part_machines import MACHINE, THERE, by_certificate, by_results, plate_of, report, results_keys
+
+TRIALS = 4000
+
+
+def test_features_that_are_found_anew_each_time_have_fewer_virtual_measurements_by_default() -> None:
+    """The plate has 60 points, of its bore 24: one zone of it counts as 1200 more, so that 158 730 are made; two as 2400."""
+    plan = plan_of(plate_of(by_results(), **THERE))
+    assert affordable(200_000, plan) == 200_000
+    bore = next(one for one in plan.characteristics if "bore" in one.features)
+    others = tuple(one for one in plan.characteristics if one is not bore)
+    one = replace(plan, characteristics=(*others, replace(bore, association="maximum_inscribed")))
+    assert affordable(200_000, one) == 200_000 * 1000 // (60 + 50 * 24)
+    both = replace(
+        one, characteristics=(*one.characteristics, replace(bore, name="by zone", association="minimum_zone"))
+    )
+    assert affordable(200_000, both) == 200_000 * 1000 // (60 + 2 * 50 * 24)
+
+
+@cache
+def plain() -> PartFound:
+    """The plate with its nominal points, by the machine's certificate."""
+    return part_found(plate_of(by_certificate()), trials=TRIALS)
+
+
+@cache
+def shifted() -> PartFound:
+    """The plate with its bore measured 20 µm off along x, by figures and draws of the machine alone."""
+    off = np.zeros((60, 3))
+    off[36:, 0] = 0.02
+    return part_found(plate_of(by_results(), off, **THERE), trials=TRIALS)
+
+
+def test_a_certificate_is_verified_and_its_recording_conditions_the_errors() -> None:
+    standing = plain().standing
+    assert (standing.source, standing.verdict, standing.given_recording) == ("certificate", "NOT WHOLLY CHECKED", True)
+    assert [one.what for one in standing.checked if one.why] == ["computing again"]
+    assert (standing.date, standing.age) == (dt.date(2026, 1, 1), dt.timedelta(days=150))
+    assert standing.origin == "simulated"
+    assert "150 days" in standing.drift
+    assert not [one for one in plain().given.machine.unmodelled if one.effect.name == "rotation_x_x"]  # drawn together
+
+
+def test_figures_and_draws_alone_are_taken_too_and_said_to_be_less() -> None:
+    standing = shifted().standing
+    assert (standing.source, standing.given_recording) == ("results", False)
+    assert any("recording is not at hand" in text for text in shifted().warnings)
+    assert {one.effect.name for one in shifted().given.machine.unmodelled} >= {"rotation_x_x", "hysteresis_x"}
+
+
+def test_chain_travel_and_place_are_the_certificates_where_the_job_leaves_them_out() -> None:
+    machine = plain().given.machine.machine
+    np.testing.assert_array_equal(machine.travel_mm, [[0, 900], [0, 1200], [-600, 0]])
+    read = plain().origin_mm + plain().plan.points - [0, 0, -150] + machine.origin_mm + 2 * plain().plan.normals
+    np.testing.assert_allclose((read.min(axis=0) + read.max(axis=0)) / 2, [450, 600, -300], atol=0.5)
+
+
+def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draws of one posterior, of which a file has some in single precision: means and spreads agree to a few of a hundred."""
+    monkeypatch.setattr("cmm_uq.app.commands.parts.machine._given", lambda state, job, seed: (state, say(""), False))
+    from cmm_uq.jobs.part.job import read_part
+    from tests.part_machines import plate_files
+
+    (tmp_path / "plate").mkdir()
+    (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
+    files = plate_files({}, machine_state={"job": "../machine"})
+    (tmp_path / "plate" / "job.toml").write_bytes(files["job.toml"])
+    found = machine_found(read_part(tmp_path / "plate"))
+    state, stated = found.state, shifted().given.machine
+    assert (found.standing.source, found.standing.verdict) == ("job", "ANALYSED")
+    assert [one.name for one in state.effects] == [one.name for one in stated.effects]
+    spread = stated.draws.std(axis=0)
+    assert np.all(np.abs(state.mean - stated.mean) < 0.1 * spread)
+    np.testing.assert_allclose(state.draws.std(axis=0), spread, rtol=0.1)
+    np.testing.assert_allclose(state.noise.usual_mm, stated.noise.usual_mm, rtol=0.05)
+
+
+def test_a_value_is_what_was_measured_less_the_mean_error_and_of_a_zone_zero_at_least() -> None:
+    found = shifted()
+    assert found.measured is not None
+    assert found.job.measured is not None
+    np.testing.assert_allclose(found.measured, evaluated(found.plan, found.job.measured))
+    assert found.measured[0] == pytest.approx(30.0, abs=1e-6)
+    assert found.measured[1] == pytest.approx(2 * 0.02, rel=1e-3)  # a position is twice the distance
+    for stated, value, zone in zip(found.stated, found.measured, never_negative(found.plan), strict=True):
+        assert stated.value is not None
+        if zone:
+            assert 0 <= max(stated.value, stated.interval[0]) <= stated.interval[1]
+        else:
+            assert stated.value == pytest.approx(value - stated.error)
+
+
+def test_without_measured_points_nothing_is_decided_but_what_would_be_accepted_is_told() -> None:
+    found = plain()
+    assert found.outcome is None
+    assert found.together is None
+    assert all(one is not None and one.outcome is None and one.probability is None for one in found.judged)
+    squareness = found.judged[2]
+    assert squareness is not None
+    assert squareness.accepted is not None
+    assert 0 < float(squareness.accepted[1] or 0) < 0.05
+
+
+def test_of_a_perfect_zone_acceptance_goes_by_all_errors_about_zero() -> None:
+    """A position is accepted up to its tolerance less 1.645 root mean squares of what a perfect one is found as."""
+    random = np.random.default_rng(5)
+    job = plate_of(by_results(), characteristic=[TABLES["characteristic"][1]])
+    errors = 2e-3 * np.abs(random.standard_normal((20_000, 1)))
+    (found,) = judged(job, plan_of(job), errors, None)
+    assert found is not None
+    assert found.accepted == (None, pytest.approx(0.1 - 1.645 * 2e-3, abs=1e-4))
+
+
+def test_the_whole_part_conforms_no_more_probably_than_any_of_its_characteristics() -> None:
+    found = shifted()
+    chances = [one.probability for one in found.judged if one is not None and one.probability is not None]
+    assert len(chances) == 5
+    assert found.together is not None
+    assert max(0.0, sum(chances) - len(chances) + 1) - 1e-3 <= found.together <= min(chances) + 1e-3
+
+
+def test_margins_are_in_standard_uncertainties_from_the_nearest_limit() -> None:
+    found = shifted()
+    assert found.margins[0] == pytest.approx((0.05 - abs((found.stated[0].value or 0) - 30)) / found.stated[0].u)
+    assert found.nearest == int(np.argmin(found.margins))
+
+
+def test_a_correlation_is_one_with_itself_and_symmetric() -> None:
+    found = plain().correlation
+    np.testing.assert_allclose(np.diagonal(found), 1)
+    np.testing.assert_allclose(found, found.T)
+    drawn = np.corrcoef(plain().virtual.errors(np.random.default_rng(9), 20_000).T)
+    np.testing.assert_allclose(found, drawn, atol=6 / np.sqrt(TRIALS))
+
+
+def test_what_the_calibration_did_not_see_is_named_with_its_share() -> None:
+    """Play shows in no measurement of balls' centres, and is as large as physics allows."""
+    first = next(one for one in plain().unseen if one.characteristic == "1")
+    assert first.effect in ("hysteresis_x", "hysteresis_y")
+    shares = dict(zip(plain().budget.causes, plain().budget.total[:, 0].tolist(), strict=True))
+    assert first.share == pytest.approx(shares[first.line])
+    assert all(one.share >= 0.05 for one in plain().unseen)
+
+
+def test_results_say_what_was_found_with_hashes_of_all_inputs() -> None:
+    found = shifted()
+    data = json.loads(as_json(part_results(found)))
+    assert data["schema"] == "cmm-uq/part/1"
+    assert set(data["job"]["inputs_sha256"]) == {"job.toml", "points.csv", *by_results()}
+    one, stated = data["characteristics"][1], found.stated[1]
+    assert (one["unit"], one["value"], one["u"]) == ("mm", pytest.approx(stated.value), pytest.approx(stated.u))
+    size = data["characteristics"][0]
+    assert size["measured"] - size["mean_error"] == pytest.approx(size["value"])
+    low, high = found.simulated.interval[found.stated.index(stated)]
+    wide = stated.interval[1] if stated.value == 0 else 0.0  # of a zone that is stated as zero U reaches to the end
+    assert one["U"] == pytest.approx(max((high - low) / 2, wide))  # of the errors; the interval of a zone ends at zero
+    assert one["interval95"] == pytest.approx(stated.interval)
+    assert data["decision"]["outcome"] == found.outcome
+    assert data["simulation"]["virtual_measurements"] == TRIALS
+    matrix = np.array(data["covariance"]["matrix"])
+    np.testing.assert_allclose(np.sqrt(np.diagonal(matrix)), [each["u"] for each in data["characteristics"]])
+
+
+def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
+    told, there = set(PART_RESULTS), set(results_keys(json.loads(as_json(part_results(shifted())))))
+    empty = {"further", "simulation.not_drawn", "machine.changes"}  # here
+    assert there - told - empty == set()
+    sometimes = (
+        "job.number",
+        "job.language",
+        "simulation.not_drawn[]",
+        "further",
+        "machine.changes[]",
+        "other_methods.",
+    )
+    assert {key for key in told - there if not key.startswith(sometimes)} == set()
+
+
+def test_angles_are_in_degrees_in_results() -> None:
+    asked = {"name": "a", "what": "angle", "features": ["A", "B"], "lower_deg": 89.0, "upper_deg": 91.0}
+    job = plate_of(by_results(), np.zeros((60, 3)), characteristic=[asked], **THERE)
+    found = part_found(job, trials=1000)
+    data = part_results(found)["characteristics"][0]
+    assert data["unit"] == "°"
+    assert data["measured"] == pytest.approx(90.0, abs=1e-6)
+    assert data["u"] == pytest.approx(np.degrees(found.stated[0].u))
+    assert data["limits"]["upper"] == pytest.approx(91.0)
+
+
+def tampered() -> dict[str, bytes]:
+    """A figure that is another than that of the estimate's own interval, and no longer as the hash of the manifest."""
+    files = by_certificate()
+    data = json.loads(report()["results.json"])
+    data["job"]["date"] = "2026-02-01"
+    return {
+        **files,
+        "machine/results.json": as_json(data),
+        "machine/posterior-simulated.npz": report()["posterior-simulated.npz"],
+    }
+
+
+def other_draws() -> dict[str, bytes]:
+    files = by_results()
+    content = bytearray(files["machine/posterior-simulated.npz"])
+    content[2000] ^= 1
+    return {**files, "machine/posterior-simulated.npz": bytes(content)}
+
+
+def without_posterior() -> dict[str, bytes]:
+    data = json.loads(report()["results.json"])
+    data["posterior"] = None
+    return {**by_results(), "machine/posterior.npz": b"", "machine/results.json": as_json(data)}
+
+
+REFUSED: list[tuple[Any, dict[str, Any], str]] = [
+    (tampered, {}, "the machine's certificate does not verify: "),
+    (other_draws, {}, "does not verify: posterior-simulated.npz: is not the file whose hash results.json has"),
+    (without_posterior, {}, "states too little: it has no draws"),
+    (lambda: {"machine/certificate.xml": report()["certificate-simulated.xml"]},
+     {"machine_state": {"certificate": "machine/certificate.xml"}}, "states too little: neither draws"),
+    (by_results, {"machine_state": {"certificate": "machine", "valid_until": dt.date(2026, 5, 30)}},
+     "has expired: it held until 2026-05-30, and the part was measured on 2026-05-31"),
+    (by_results, {"job": {"id": "plate", "date": dt.date(2025, 12, 31), "origin": "simulated"}},
+     "was calibrated on 2026-01-01, after the part was measured on 2025-12-31"),
+    (by_certificate, {"machine_state": {"certificate": "machine", "chain": "FXYZ"}}, "is of chain XYZ, and the job says FXYZ"),
+    (by_certificate, {"machine_state": {"certificate": "machine", "travel_mm": {"x": [0.0, 500.0]}}},
+     "has a travel of x of 0 to 900 mm, and the job says 0 to 500 mm"),
+    (by_certificate, {"placing": {"origin_mm": [850.0, 300.0, -500.0]}}, "beyond its travel of 0 to 900 mm"),
+    (by_results, {}, "nothing says how far axis x goes"),
+    (by_results, {"machine_state": {"job": "../machine"}}, "a part's job in memory has no other job beside it"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("machine", "changes", "words"), REFUSED, ids=[words[:40] for _, _, words in REFUSED])
+def test_a_machine_whose_certificate_does_not_hold_is_refused(
+    machine: Any, changes: dict[str, Any], words: str
+) -> None:
+    placed = THERE if machine in (by_results, other_draws) and "nothing says" not in words else {}
+    with pytest.raises(CmmUqError, match=words.replace("(", r"\(")) as raised:
+        part_found(plate_of(machine(), **{**placed, **changes}), trials=1000)
+    assert raised.value.fix
+
+
+@pytest.mark.parametrize("last", [dt.date(2026, 5, 31), dt.date(2026, 6, 1)])
+def test_a_certificate_holds_until_its_last_day(last: dt.date) -> None:
+    state = {**THERE["machine_state"], "valid_until": last}
+    found = machine_found(plate_of(by_results(), machine_state=state))
+    assert found.standing.valid_until == last
+
+
+def test_a_certificate_of_another_version_that_was_to_be_computed_again_is_told_with_both_versions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for module in ("verify_again", "parts.machine"):
+        monkeypatch.setattr(f"cmm_uq.app.commands.{module}.__version__", "99.0.0")
+    job = plate_of(by_certificate())
+    (first, *_) = machine_found(job, rerun=True).warnings
+    assert "was to be computed again and was not: version " in first
+    assert __version__ in first
+    assert "99.0.0" in first
+    assert not any("computed again" in one for one in machine_found(job).warnings)
+
+
+def test_temperatures_outside_of_the_calibrations_are_told() -> None:
+    warm = {"scales_c": [23.0, 23.0, 23.0]}
+    told = machine_found(plate_of(by_results(), environment=warm, **THERE)).warnings
+    assert any("23 to 23 °C; the temperature of the calibration is not known" in text for text in told)
+
+
+def test_a_check_says_what_would_stop_the_command(tmp_path: Path) -> None:
+    """Of the machine's certificate too, without drawing anything."""
+    from cmm_uq.app.commands.jobs.check import check_job
+    from tests.part_machines import plate_files
+
+    for name, content in plate_files(other_draws(), **THERE).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    found = check_job(tmp_path)
+    assert ["does not verify" in one.problem for one in found.problems] == [True]
+    (tmp_path / "machine" / "posterior-simulated.npz").write_bytes(report()["posterior-simulated.npz"])
+    assert (check_job(tmp_path).sound, check_job(tmp_path).command) == (True, "part")
+
+
+def test_a_check_reaches_as_far_as_the_axes_of_the_certificate(tmp_path: Path) -> None:
+    from cmm_uq.app.commands.jobs.check import check_job
+    from tests.part_machines import plate_files
+
+    for name, content in plate_files(by_certificate(), placing={"origin_mm": [850.0, 300.0, -500.0]}).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    assert ["beyond its travel of 0 to 900 mm" in one.problem for one in check_job(tmp_path).problems] == [True]
+
+
+def test_a_machine_s_job_that_is_not_there_stops_the_check(tmp_path: Path) -> None:
+    from cmm_uq.app.commands.jobs.check import check_job
+    from tests.part_machines import plate_files
+
+    for job, words in (("../nowhere", "no such file"), (".", "is the part's own job")):
+        for name, content in plate_files({}, machine_state={"job": job}).items():
+            (tmp_path / name).write_bytes(content)
+        assert [words in one.problem for one in check_job(tmp_path).problems] == [True]
+
+
+def test_limits_of_a_distance_that_are_deviations_from_it_are_refused() -> None:
+    said = [{"name": "1", "what": "distance", "features": ["bore", "B"], "lower_mm": -0.05, "upper_mm": 0.05}]
+    with pytest.raises(CmmUqError, match=r"limits of -0\.05 to 0\.05 mm, where the distance is 40 mm") as raised:
+        refuse_unfit(plate_of(by_certificate(), characteristic=said))
+    assert raised.value.where == "job.toml: [[characteristic]] 1"
