@@ -45,12 +45,8 @@ WITHIN_NOISE = say("it explains no more of the misfit than noise alone would giv
 class WithheldEffect:
     """An effect that is probable, or one of a probable group, and yet is not asserted.
 
-    Parameters
-    ----------
-    effect, title : its name, and in words.
-    probability : as that of an effect that is asserted.
-    why : in words, to follow a colon.
-    modes : periods that fit, where it has one.
+    ``effect``, ``title`` its name, and in words; ``probability`` as that of an effect that is asserted; ``why`` in
+    words, to follow a colon; ``modes`` periods that fit, where it has one.
     """
 
     effect: str

@@ -52,17 +52,13 @@ _NOISE_KIND = 0.9
 class OmittedEffect:
     """An effect that the model left out.
 
-    Parameters
-    ----------
-    effect, title : its name, and in words.
-    probability : among all candidates that could stand in its place, nothing and nonparametric terms included.
-    parameters : reported parameters, from the joint posterior.
-    explained : part of the misfit's sum of squares that it takes away.
-    together : probability of it or one that these data cannot tell from it.
-    points_to : what a technician should look at.
-    group : what these data cannot tell from it; with a probability below one half it is asserted as one of these.
-    modes : other periods that fit, where it has one; all that fit, where none of them is settled.
-    settled : whether its period, where it has one, is among the parameters.
+    ``effect``, ``title`` its name, and in words; ``probability`` among all candidates that could stand in its place,
+    nothing and nonparametric terms included; ``parameters`` reported parameters, from the joint posterior;
+    ``explained`` part of the misfit's sum of squares that it takes away; ``together`` probability of it or one that
+    these data cannot tell from it; ``points_to`` what a technician should look at; ``group`` what these data cannot
+    tell from it; with a probability below one half it is asserted as one of these; ``modes`` other periods that fit,
+    where it has one; all that fit, where none of them is settled; ``settled`` whether its period, where it has one, is
+    among the parameters.
     """
 
     effect: str
@@ -92,23 +88,14 @@ class NoiseEstimate:
 class Diagnosis:
     """See the module's docstring.
 
-    Parameters
-    ----------
-    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
-    p_value : of "nothing is missing".
-    alpha : false-alarm rate asked for.
-    where : most significant first.
-    effects : what is asserted, most probable first.
-    indistinguishable : groups of effects that this recording cannot tell apart.
-    rivals : every candidate by itself with its probability, most probable first.
-    noise, improvement : see their classes.
-    before, after : the job's model, and with what was left out.
-    components : of the noise, for the model after.
-    posterior : joint, of the model after.
-    compared : observations that the candidates were compared on; what was found is estimated from all.
-    found : the search that it rests on.
-    withheld : effects that are probable, and yet not asserted.
-    remaining : combinations of explanations that remain, and what they make of the named effects.
+    ``verdict`` ``consistent``, ``explained``, ``partial`` or ``unexplained``; ``p_value`` of "nothing is missing";
+    ``alpha`` false-alarm rate asked for; ``where`` most significant first; ``effects`` what is asserted, most probable
+    first; ``indistinguishable`` groups of effects that this recording cannot tell apart; ``rivals`` every candidate by
+    itself with its probability, most probable first; ``noise``, ``improvement`` see their classes; ``before``,
+    ``after`` the job's model, and with what was left out; ``components`` of the noise, for the model after;
+    ``posterior`` joint, of the model after; ``compared`` observations that the candidates were compared on; what was
+    found is estimated from all; ``found`` the search that it rests on; ``withheld`` effects that are probable, and yet
+    not asserted; ``remaining`` combinations of explanations that remain, and what they make of the named effects.
     """
 
     verdict: str
@@ -140,17 +127,7 @@ def diagnose(
     known: NoisyPosterior | None = None,
     observe: Observed | None = None,
 ) -> Diagnosis:
-    """Diagnose a recording.
-
-    Parameters
-    ----------
-    model : what the job names, without gross outliers.
-    stated_um : standard uncertainty of a coordinate that the job states.
-    alpha : false-alarm rate.
-    seed : of everything random.
-    known : posterior of the model, where it was sampled already.
-    observe : makes the artefact of points; without it a large recording is searched with all its observations.
-    """
+    """Diagnose a recording."""
     stated = None if stated_um is None else stated_um * MICROMETRE
     model = _with_last_digit(model)
     some = model if observe is None else thin_out(model, observe, seed)
@@ -319,7 +296,7 @@ def _noise(found: SearchResult, joint: JointPosterior, stated: float | None) -> 
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
         probability_by_name(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
         stated is not None and _contradicts(stated, squares, found.last.degrees_of_freedom),
-    )  # fmt: skip
+    )
 
 
 def _contradicts(stated: float, squares: float, count: int) -> bool:

@@ -26,12 +26,9 @@ _SINGULAR = 1e-9
 class Improvement:
     """Before and after, on the recording itself and on held-out placings.
 
-    Parameters
-    ----------
-    rms_before_um, rms_after_um : residual rms of the observations.
-    heldout_rms_before_um, heldout_rms_after_um : of predictions of what was left out of the fit.
-    elpd_gain, elpd_gain_se : gain in expected log predictive density, and its standard error over what was held out.
-    unseen : what was held out.
+    ``rms_before_um``, ``rms_after_um`` residual rms of the observations; ``heldout_rms_before_um``,
+    ``heldout_rms_after_um`` of predictions of what was left out of the fit; ``elpd_gain``, ``elpd_gain_se`` gain in
+    expected log predictive density, and its standard error over what was held out; ``unseen`` what was held out.
     """
 
     rms_before_um: float
@@ -121,10 +118,8 @@ def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
 def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
     """What is held out of columns (m, b), less what the placings' other observations tell of it.
 
-    Returns
-    -------
-    (o, b) without what no observation tells of the placings; (o, r) whose products are the covariance of what was told, in
-    units of the noise; and how many of the o dimensions are lost with what is left open.
+    Gives (o, b) without what no observation tells of the placings; (o, r) whose products are the covariance of what was
+    told, in units of the noise; and how many of the o dimensions are lost with what is left open.
     """
     left, known, open_ = every.copy(), np.zeros((len(every), 0)), 0
     for rows in placing.rows:
@@ -145,10 +140,8 @@ def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tupl
 def _told(columns: Floats) -> tuple[Floats, Floats, Floats]:
     """What columns (m, q) tell of their coefficients.
 
-    Returns
-    -------
-    orthonormal basis (m, r) of what they reach, what (q, r) turns observations along it into coefficients, and an orthonormal
-    basis (q, q − r) of the coefficients that they leave open.
+    Gives orthonormal basis (m, r) of what they reach, what (q, r) turns observations along it into coefficients, and an
+    orthonormal basis (q, q − r) of the coefficients that they leave open.
     """
     if not columns.size:
         return np.zeros((len(columns), 0)), np.zeros((columns.shape[1], 0)), np.eye(columns.shape[1])

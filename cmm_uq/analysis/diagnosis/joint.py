@@ -55,11 +55,6 @@ def period_modes(found: SearchResult, index: int) -> tuple[Mode, ...]:
     """All modes of the period of an effect that was found, the most probable first; none of one without a period.
 
     Periods shorter than those that are searched count too: where positions repeat at equal distances, they fit as well.
-
-    Parameters
-    ----------
-    found : by the search.
-    index : of the effect, among the candidates.
     """
     explanation = found.first.explanations[index]
     effect = effect_of(explanation)
@@ -143,12 +138,7 @@ def joint_posterior(
 ) -> JointPosterior:
     """Sample everything at once.
 
-    Parameters
-    ----------
-    found : by the search.
-    seed : of the draws.
-    progress : told the part done.
-    known : posterior of the job's own model, which it stays where nothing is found.
+    ``known`` posterior of the job's own model, which it stays where nothing is found.
     """
     model = found.model
     components = replace(noise_of(model), known=model.least_noise)

@@ -45,21 +45,14 @@ _MOST = 4
 class Place:
     """Where a mismatch lives.
 
-    Parameters
-    ----------
-    covariate : column that it depends on.
-    region : of that covariate, where the function is larger than half its maximum and its band does not hold zero, or between
-        which values it jumps.
-    p_value : corrected for having looked at every covariate; of a further place, beside those before it.
-    amplitude_um : largest value of the function in the region.
-    what : the function, in words.
-    curve : covariate, function and its standard uncertainty in µm, each (p,).
-    k : coverage factor of its band for 95 %.
-    along : axis along which it displaces points; ``None`` where it is told by the observations themselves.
-    scale : whether it is a scale of that axis.
-    also : other functions that fit as well and show the same.
-    data : lowest and highest of the covariate among the points of each observation, and what the job's model leaves of it in
-        µm, each (m,).
+    ``covariate`` column that it depends on; ``region`` of that covariate, where the function is larger than half its
+    maximum and its band does not hold zero, or between which values it jumps; ``p_value`` corrected for having looked
+    at every covariate; of a further place, beside those before it; ``amplitude_um`` largest value of the function in
+    the region; ``what`` the function, in words; ``curve`` covariate, function and its standard uncertainty in µm, each
+    (p,); ``k`` coverage factor of its band for 95 %; ``along`` axis along which it displaces points; ``None`` where it
+    is told by the observations themselves; ``scale`` whether it is a scale of that axis; ``also`` other functions that
+    fit as well and show the same; ``data`` lowest and highest of the covariate among the points of each observation,
+    and what the job's model leaves of it in µm, each (m,).
     """
 
     covariate: str
@@ -76,14 +69,7 @@ class Place:
 
 
 def locate(compared: ModelComparison, alpha: float, effects: Collection[int] = ()) -> tuple[Place, ...]:
-    """Where the evidence is that something is missing, significant at ``alpha``, the place with most of it first.
-
-    Parameters
-    ----------
-    compared : the candidates.
-    alpha : false-alarm rate over all covariates.
-    effects : those that were found; of functions that fit equally well the one that has the form of one of them is named.
-    """
+    """Where the evidence is that something is missing, significant at ``alpha``, the place with most of it first."""
     if compared.p_value >= alpha:
         return ()
     functions = {
@@ -134,9 +120,7 @@ def _has_form(compared: ModelComparison, function: int, effects: Collection[int]
     return any(own.could_be(effect) for i, effect in enumerate(compared.explanations) if i in effects)
 
 
-def _places(
-    compared: ModelComparison, chosen: Sequence[tuple[Version, float, tuple[Text, ...]]]
-) -> Iterable[Place]:  # fmt: skip
+def _places(compared: ModelComparison, chosen: Sequence[tuple[Version, float, tuple[Text, ...]]]) -> Iterable[Place]:
     """Those whose band does not hold zero everywhere, their functions estimated together."""
     fit = _Fit.of(compared, [version for version, *_ in chosen])
     for number, (version, p_value, also) in enumerate(chosen):
@@ -162,12 +146,8 @@ def _places(
 class _Fit:
     """Unknown functions fitted together to what the baseline leaves.
 
-    Parameters
-    ----------
-    mean, covariance : of their coefficients, (r,) and (r, r), for functions in mm.
-    parts : coefficients of each function.
-    left : (m, r) what the baseline leaves of their columns.
-    k : coverage factor for 95 %.
+    ``mean``, ``covariance`` of their coefficients, (r,) and (r, r), for functions in mm; ``parts`` coefficients of each
+    function; ``left`` (m, r) what the baseline leaves of their columns; ``k`` coverage factor for 95 %.
     """
 
     mean: Floats
@@ -253,13 +233,10 @@ _SEEN = 1e-6
 class ResidualField:
     """Residuals where they lie.
 
-    Parameters
-    ----------
-    place : (q, 3) readings of the scales, mm.
-    before, after : (q, 3) µm, indicated minus modelled, by the job's model and by that with what was left out.
-    scale : (q,) standard uncertainty of each vector's length, per unit of that of one coordinate.
-    dimensions : (q,) in how many directions it is seen.
-    lengths : whether they are the two ends of lengths, one after the other.
+    ``place`` (q, 3) readings of the scales, mm; ``before``, ``after`` (q, 3) µm, indicated minus modelled, by the job's
+    model and by that with what was left out; ``scale`` (q,) standard uncertainty of each vector's length, per unit of
+    that of one coordinate; ``dimensions`` (q,) in how many directions it is seen; ``lengths`` whether they are the two
+    ends of lengths, one after the other.
     """
 
     place: Floats
@@ -280,9 +257,9 @@ def residual_field(before: MeasurementModel, after: MeasurementModel) -> Residua
     """The residuals of two models of one recording as vectors; ``None`` where an observation is of more than two points."""
     artefact, used = before.artefact, before.used
     rows = artefact.rows[used]
-    left = np.column_stack([
-        model.residuals(model.estimate().least_squares.value)[used] / MICROMETRE for model in (before, after)
-    ])  # fmt: skip
+    left = np.column_stack(
+        [model.residuals(model.estimate().least_squares.value)[used] / MICROMETRE for model in (before, after)]
+    )
     noise = artefact.noise_scale[used]
     readings = artefact.points.machine_xyz
     if rows.shape[1] == 1:
@@ -311,7 +288,7 @@ def _of_points(point: Ints, directions: Floats, left: Floats, noise: Floats, rea
     field = np.array(vectors)
     return ResidualField(
         readings[owners], field[:, :, 0], field[:, :, 1], np.array(scale), np.array(dimensions, dtype=np.int64), False
-    )  # fmt: skip
+    )
 
 
 def _of_lengths(rows: Ints, left: Floats, noise: Floats, readings: Floats) -> ResidualField:

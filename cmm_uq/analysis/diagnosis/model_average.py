@@ -48,15 +48,10 @@ EffectParameters = Mapping[str, Mapping[str, Quantity]]
 class Rival:
     """A combination of explanations that remains.
 
-    Parameters
-    ----------
-    probability : among all combinations, with what adds nothing to it.
-    effects : names of the effects that it adds to the model.
-    functions : what is unknown besides.
-    named : parameters of the effects that the job names, under it.
-    added : parameters of its own effects.
-    model : the job's, with its effects.
-    draws : (N, k) of that model's unknowns.
+    ``probability`` among all combinations, with what adds nothing to it; ``effects`` names of the effects that it adds
+    to the model; ``functions`` what is unknown besides; ``named`` parameters of the effects that the job names, under
+    it; ``added`` parameters of its own effects; ``model`` the job's, with its effects; ``draws`` (N, k) of that model's
+    unknowns.
     """
 
     probability: float
@@ -74,11 +69,8 @@ class ModelAverage:
 
     Empty where one is settled, or nothing is missing.
 
-    Parameters
-    ----------
-    rivals : each.
-    averaged : parameters of the effects that the job names, over all of them.
-    draws : (N, k) of the unknowns of the job's model, over all of them; ``None`` where there are none.
+    ``rivals`` each; ``averaged`` parameters of the effects that the job names, over all of them; ``draws`` (N, k) of
+    the unknowns of the job's model, over all of them; ``None`` where there are none.
     """
 
     rivals: tuple[Rival, ...] = ()
@@ -94,12 +86,7 @@ class ModelAverage:
 def average_models(found: SearchResult, joint: JointPosterior, before: MeasurementModel, seed: int) -> ModelAverage:
     """What remains of a search.
 
-    Parameters
-    ----------
-    found : by the search; of what is asserted the model is that of all observations.
-    joint : its posterior, whose noise is taken for all.
-    before : the job's model.
-    seed : of the draws.
+    ``before`` the job's model.
     """
     combinations = found.combinations
     if combinations is None:

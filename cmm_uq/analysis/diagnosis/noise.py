@@ -46,16 +46,12 @@ _POINTS = 400
 class NoiseKind:
     """One shape of the noise.
 
-    Parameters
-    ----------
-    name : ``components`` or ``tails``.
-    whitening : (m, m) sparse W; W times the part of such noise that is independent, over that of a reading, is white.
-    log_whitening : logarithm of its determinant.
-    probability : beforehand.
-    slow : (m, c) columns with standard normal coefficients that it has besides.
-    log_factor : logarithm by which its density exceeds that of a normal distribution with this covariance.
-    unrounded : the same without the display's steps, where there are any.
-    scatter : standard deviation of neighbouring readings about each other, over √2, over that of a reading alone.
+    ``name`` ``components`` or ``tails``; ``whitening`` (m, m) sparse W; W times the part of such noise that is
+    independent, over that of a reading, is white; ``log_whitening`` logarithm of its determinant; ``probability``
+    beforehand; ``slow`` (m, c) columns with standard normal coefficients that it has besides; ``log_factor`` logarithm
+    by which its density exceeds that of a normal distribution with this covariance; ``unrounded`` the same without the
+    display's steps, where there are any; ``scatter`` standard deviation of neighbouring readings about each other, over
+    √2, over that of a reading alone.
     """
 
     name: str
@@ -115,11 +111,7 @@ def heavy_tails(residual: Floats) -> NoiseKind:
 def with_tails(kind: NoiseKind, residual: Floats, probability: float) -> NoiseKind:
     """A kind of noise whose independent part is of Student's t, by its tangent at residuals; see :func:`heavy_tails`.
 
-    Parameters
-    ----------
-    kind : otherwise.
-    residual : (m,) of the whitened observations, over their standard deviation.
-    probability : beforehand.
+    ``residual`` (m,) of the whitened observations, over their standard deviation.
     """
     precision, log_factor = _tangent(residual)
     whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)) @ kind.whitening)
@@ -145,12 +137,7 @@ def tail_precision(residual: Floats) -> Floats:
 
 
 def has_heavy_tails(residuals: Floats) -> bool:
-    """Whether Student's t with four degrees of freedom describes residuals (n,) e⁴ times better than a normal distribution.
-
-    Parameters
-    ----------
-    residuals : each of the same variance, as :func:`~cmm_uq.maths.inference.studentised.studentised` gives them.
-    """
+    """Whether Student's t with four degrees of freedom describes residuals (n,) e⁴ times better than a normal distribution."""
     return len(residuals) >= _FEWEST and _tails_over_normal(residuals) > _BETTER
 
 
@@ -175,12 +162,6 @@ def sigma_grid(stated: float | None, residual: float, least: float = 0.0) -> tup
     """Values (s,) of the noise, mm, and their log probabilities beforehand.
 
     A stated value is mostly good to a fifth, and now and then simply wrong; without one, the logarithm is uniform.
-
-    Parameters
-    ----------
-    stated : as the job states it.
-    residual : standard deviation of what the baseline leaves.
-    least : of the noise, whatever the residuals say; 0 where there is none.
     """
     centre = np.log(max(residual, least))
     grid = np.linspace(centre - 4.0, centre + 1.5, _POINTS)

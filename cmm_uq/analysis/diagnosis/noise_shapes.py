@@ -64,14 +64,9 @@ def representative_kinds(
 ) -> list[NoiseKind]:
     """Shapes of the noise that a recording could show.
 
-    Parameters
-    ----------
-    linear : what is explained.
-    components : of the noise.
-    estimate : least squares of ``linear``.
-    rivals : (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one.
-    residuals : (m,) of the estimate, mm.
-    jumps : (m, j) columns, mm, of what may jump with time: slow noise looks like it, and is not needed beside it.
+    ``rivals`` (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one; ``residuals``
+    (m,) of the estimate, mm; ``jumps`` (m, j) columns, mm, of what may jump with time: slow noise looks like it, and is
+    not needed beside it.
     """
     components = _for_a_unit(Marginal(linear, components, estimate))
     either = (
@@ -137,11 +132,8 @@ def drawn_shapes(components: Components) -> Floats:
 class _Density:
     """Of shapes, the reading noise integrated out.
 
-    Parameters
-    ----------
-    marginal : with the noise in its own size, not that for a unit.
-    sigma : mm, near which the reading noise is.
-    count : observations that are left for the noise.
+    ``marginal`` with the noise in its own size, not that for a unit; ``sigma`` mm, near which the reading noise is;
+    ``count`` observations that are left for the noise.
     """
 
     marginal: Marginal
@@ -186,14 +178,7 @@ def _latent(components: Components, numbers: Floats) -> Floats:
 
 
 def _more(shapes: Shapes, few: Sequence[_Density], told: Sequence[_Density]) -> Shapes:
-    """With draws from what is proposed for the densities; all together count as drawn from the mixture of what drew them.
-
-    Parameters
-    ----------
-    shapes : drawn from the prior.
-    few : the densities with few cosines, by which to find where the others are.
-    told : those that are meant.
-    """
+    """With draws from what is proposed for the densities; all together count as drawn from the mixture of what drew them."""
     n, d = shapes.latent.shape
     components = told[0].marginal.noise
     near = present(few[0], beginning(components.names[1:]), 0, tried=_TRIED)
@@ -266,13 +251,7 @@ _FEW = 2
 
 
 def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> list[NoiseKind]:
-    """Kinds of noise of the used observations.
-
-    Parameters
-    ----------
-    model : what is explained so far.
-    candidates : what else could be; the known effects among them may act all at once.
-    """
+    """Kinds of noise of the used observations."""
     estimate = model.estimate()
     columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))

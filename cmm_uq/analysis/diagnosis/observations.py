@@ -25,10 +25,7 @@ def numbered_by_place(model: MeasurementModel, group: Ints) -> Ints:
 
     No order of rows, numbering or frame changes how far the groups are from it.
 
-    Parameters
-    ----------
-    model : with its recording.
-    group : (m,) or (m, j), equal for the observations of one group.
+    ``group`` (m,) or (m, j), equal for the observations of one group.
     """
     xyz, rows = model.artefact.points.xyz, model.artefact.rows[model.used]
     away = np.sum((xyz - xyz.mean(axis=0)) ** 2, axis=1)[rows].mean(axis=1)
@@ -51,13 +48,6 @@ def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = 
 
     Whole quantities are drawn, with their repeats, evenly from every placing, and where there are many placings, from some
     of them: at random, so that no pattern of the recording is hidden.
-
-    Parameters
-    ----------
-    model : with its recording.
-    observe : makes the artefact of points.
-    seed : of the choice.
-    most : observations to use.
     """
     artefact, used = model.artefact, np.flatnonzero(model.used)
     if len(used) <= most:
@@ -85,9 +75,7 @@ def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = 
     return replace(model, artefact=found, used=~found.unread())
 
 
-def _first_of_each(
-    owner: Ints, part: Ints, most: int, random: np.random.Generator
-) -> NDArray[np.bool_]:  # fmt: skip
+def _first_of_each(owner: Ints, part: Ints, most: int, random: np.random.Generator) -> NDArray[np.bool_]:
     """(m,) which of every owner's observations: its parts in random order, each of them whole, until ``most`` are reached."""
     _, part = np.unique(np.column_stack([owner, part]), axis=0, return_inverse=True)
     part = part.ravel()

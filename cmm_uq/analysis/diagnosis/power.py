@@ -51,13 +51,10 @@ ALLOWED = 3.0
 class Power:
     """How an effect would be found.
 
-    Parameters
-    ----------
-    effect : its name.
-    parameter, unit : its (first) parameter.
-    allowed : largest amplitude that physics allows, in its unit.
-    per_unit : size, as in :data:`SIZES`, of an effect of one unit; 0 where nothing of it shows.
-    detected_at, named_at : (d,) size from which on each drawn recording is alarmed, and named rightly; may be infinite.
+    ``effect`` its name; ``parameter``, ``unit`` its (first) parameter; ``allowed`` largest amplitude that physics
+    allows, in its unit; ``per_unit`` size, as in :data:`SIZES`, of an effect of one unit; 0 where nothing of it shows;
+    ``detected_at``, ``named_at`` (d,) size from which on each drawn recording is alarmed, and named rightly; may be
+    infinite.
     """
 
     effect: str
@@ -95,10 +92,7 @@ class Power:
 class DrawnNoise:
     """Noise of the observations of a recording, m of them, in one set of sizes.
 
-    Parameters
-    ----------
-    components, sizes : of the noise.
-    noise_scale : (m,).
+    ``components``, ``sizes`` of the noise; ``noise_scale`` (m,).
     """
 
     components: Components
@@ -119,14 +113,7 @@ class DrawnNoise:
 
 
 def without_fault(observe: Observed, model: MeasurementModel, noise: Noise, seed: int) -> MeasurementModel:
-    """The same model of a recording drawn with nothing left out, in the placings of its own.
-
-    Parameters
-    ----------
-    observe : makes the artefact of points.
-    model : gives effects and placings.
-    noise : that it has.
-    """
+    """The same model of a recording drawn with nothing left out, in the placings of its own."""
     artefact = model.artefact
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(8,)))
     sizes = np.array([size.nominal for size in artefact.sizes])
@@ -140,16 +127,7 @@ def powers(
 ) -> Iterator[Power]:  # fmt: skip
     """Power of the diagnosis of a model's recording, for effects that the model does not name.
 
-    Parameters
-    ----------
-    model : what the job names, of a recording without fault.
-    effects : linear ones.
-    stated : standard uncertainty of a coordinate that the job would state, mm.
-    sigma : that it truly has, mm.
-    alpha : false-alarm rate.
-    seed : of the draws; those of the test itself are of seed 0 (:func:`~cmm_uq.analysis.diagnosis.comparison.search.search`).
-    draws : recordings drawn of each effect and size.
-    noise : of these; white where it is left out. It has ``sigma`` as the noise of a reading.
+    ``stated`` standard uncertainty of a coordinate that the job would state, mm; ``sigma`` that it truly has, mm.
     """
     compared = model_comparison(model, stated, 0)
     rule = _Rule(compared.comparison, sigma, alpha, noise)
@@ -210,10 +188,7 @@ class Naming:
     def __call__(self, odds: Floats, true: int) -> Floats:
         """By how much (b,) the true effect passes what would let others stand beside it.
 
-        Parameters
-        ----------
-        odds : (c, b) log evidence of each explanation over nothing.
-        true : which of them acts.
+        ``odds`` (c, b) log evidence of each explanation over nothing.
         """
         weight = odds + self.priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.explanations])

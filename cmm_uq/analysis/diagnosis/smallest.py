@@ -45,12 +45,9 @@ ABSORBED = 1e-5
 class PeriodRange:
     """Of an effect with a nonlinear parameter, for which values of it the figures hold.
 
-    Parameters
-    ----------
-    parameter, unit : its name and unit.
-    low, high : range of what is tried.
-    worst : largest of the smallest amplitudes that are detected, over all resolved values and any phase.
-    unresolved : ranges of values that the positions do not resolve: nothing of them is left, or another looks the same.
+    ``parameter``, ``unit`` its name and unit; ``low``, ``high`` range of what is tried; ``worst`` largest of the
+    smallest amplitudes that are detected, over all resolved values and any phase; ``unresolved`` ranges of values that
+    the positions do not resolve: nothing of them is left, or another looks the same.
     """
 
     parameter: str
@@ -65,18 +62,14 @@ class PeriodRange:
 class SmallestEffect:
     """How large one effect must have been for the recording to show it.
 
-    Parameters
-    ----------
-    effect, title : its name, and in words.
-    parameter, unit : its (first) parameter.
-    allowed : largest amplitude that physics allows.
-    detected : amplitude detected with a probability of 90 %, though beyond what is allowed; ``None`` where hardly any is.
-    named : amplitude named rightly with this probability; ``None`` where none that is allowed is.
-    share : part of the effect's length in the observations that what is fitted leaves.
-    taken_up : names of what is fitted that takes up the rest, where that is most of it.
-    common : whether it is one of the common effects.
-    periods : where it has a nonlinear parameter, of which the figures are then the typical ones.
-    length : of what is left of it over the noise, from which on it is detected; ``None`` where it was not computed.
+    ``effect``, ``title`` its name, and in words; ``parameter``, ``unit`` its (first) parameter; ``allowed`` largest
+    amplitude that physics allows; ``detected`` amplitude detected with a probability of 90 %, though beyond what is
+    allowed; ``None`` where hardly any is; ``named`` amplitude named rightly with this probability; ``None`` where none
+    that is allowed is; ``share`` part of the effect's length in the observations that what is fitted leaves;
+    ``taken_up`` names of what is fitted that takes up the rest, where that is most of it; ``common`` whether it is one
+    of the common effects; ``periods`` where it has a nonlinear parameter, of which the figures are then the typical
+    ones; ``length`` of what is left of it over the noise, from which on it is detected; ``None`` where it was not
+    computed.
     """
 
     effect: str
@@ -108,12 +101,6 @@ def smallest_effects(found: SearchResult, alpha: float, model: MeasurementModel)
     """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
 
     Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
-
-    Parameters
-    ----------
-    found : the search of the recording.
-    alpha : false-alarm rate.
-    model : with all that was asserted.
     """
     view = Visibility.of(found)
     named = {effect.name for effect in model.effects}
@@ -178,7 +165,6 @@ class _Signal:
 
     @classmethod
     def shaped(cls, view: Visibility, index: int, explanation: Explanation, effect: Effect) -> _Signal:
-        """Of an effect with a nonlinear parameter."""
         scale = view.found.first.comparison.noise_scale[:, None]
         members = [member for member in explanation.members if member.shape and not member.rough]
         raws = np.stack([member.columns / scale for member in members])

@@ -167,13 +167,9 @@ _Z = np.linspace(-5.0, 5.0, 101)
 class Thresholds:
     """What an effect must pass, in terms of z; see the module's docstring.
 
-    Parameters
-    ----------
-    detected : z from which on the test rejects.
-    named : z (r,) from which on it exceeds each of its closest rivals, on average; infinite where never.
-    cosines : (r,) with these.
-    known : degrees of freedom of what was known of σ beforehand.
-    left : degrees of freedom of the residuals.
+    ``detected`` z from which on the test rejects; ``named`` z (r,) from which on it exceeds each of its closest rivals,
+    on average; infinite where never; ``cosines`` (r,) with these; ``known`` degrees of freedom of what was known of σ
+    beforehand; ``left`` degrees of freedom of the residuals.
     """
 
     detected: float
@@ -242,12 +238,8 @@ _RIVALS = 4
 def thresholds(view: Visibility, which: Sequence[int], columns: Floats, alpha: float) -> Iterator[Thresholds]:
     """Of each effect, from the statistic on the bare effect at :data:`SIZES`.
 
-    Parameters
-    ----------
-    view : of the search.
-    which : (n,) place of each effect among the explanations.
-    columns : (n, m) what is left of each, of visible length one.
-    alpha : rate of false alarms.
+    ``which`` (n,) place of each effect among the explanations; ``columns`` (n, m) what is left of each, of visible
+    length one.
     """
     if not which:
         return
@@ -312,9 +304,7 @@ def _rivals(naming: Naming, odds: Floats, true: int) -> tuple[Floats, Floats]:
 
     A cosine follows from how fast the two gain evidence.
 
-    Parameters
-    ----------
-    odds : (c, d) log odds of each explanation at :data:`LENGTHS`.
+    ``odds`` (c, d) log odds of each explanation at :data:`LENGTHS`.
     """
     kinds = np.array([explanation.kind for explanation in naming.explanations])
     weight = odds + naming.priors[:, None]

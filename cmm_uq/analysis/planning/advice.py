@@ -24,11 +24,8 @@ _OF_FITS = ("radius_mm", "fit_rms_um", "n_points")
 class Separation:
     """Two effects that the recording cannot tell apart.
 
-    Parameters
-    ----------
-    effects : their names.
-    before : odds of the first over the second, by the recording.
-    after : odds of the true one over the other that are to be expected, the worse of the two cases.
+    ``effects`` their names; ``before`` odds of the first over the second, by the recording; ``after`` odds of the true
+    one over the other that are to be expected, the worse of the two cases.
     """
 
     effects: tuple[str, str]
@@ -40,11 +37,8 @@ class Separation:
 class DetectionGoal:
     """An effect that is to be shown.
 
-    Parameters
-    ----------
-    effect : its name.
-    amplitude : that is to be detected, over its prior standard deviation.
-    length : visible length from which on it is detected.
+    ``effect`` its name; ``amplitude`` that is to be detected, over its prior standard deviation; ``length`` visible
+    length from which on it is detected.
     """
 
     effect: str
@@ -56,10 +50,8 @@ class DetectionGoal:
 class DetectionChange:
     """How well an effect that was not seen will show.
 
-    Parameters
-    ----------
-    effect : its name.
-    before, after : smallest amplitude that is detected, over its prior standard deviation; infinite where none is.
+    ``effect`` its name; ``before``, ``after`` smallest amplitude that is detected, over its prior standard deviation;
+    infinite where none is.
     """
 
     effect: str
@@ -71,15 +63,10 @@ class DetectionChange:
 class NextPlan:
     """What to measure next.
 
-    Parameters
-    ----------
-    placings : set-ups, in this order.
-    repeats : how often each is measured.
-    first : number of the first as a measurement.
-    partings : pairs, with the odds before and after.
-    shown : effects that were asked for.
-    reached : whether every pair reaches :data:`ODDS` and every effect shows as asked for.
-    box : (3, 2) the room for the artefact, scale readings, mm.
+    ``placings`` set-ups, in this order; ``repeats`` how often each is measured; ``first`` number of the first as a
+    measurement; ``partings`` pairs, with the odds before and after; ``shown`` effects that were asked for; ``reached``
+    whether every pair reaches :data:`ODDS` and every effect shows as asked for; ``box`` (3, 2) the room for the
+    artefact, scale readings, mm.
     """
 
     placings: tuple[SetUp, ...]
@@ -103,12 +90,8 @@ class NextPlan:
 class Suggestion:
     """What parts two effects.
 
-    Parameters
-    ----------
-    separates : names of the two effects.
-    what : in words.
-    repetitions : how often to measure each set-up.
-    odds : of the true one of the two over the other that are then to be expected.
+    ``separates`` names of the two effects; ``what`` in words; ``repetitions`` how often to measure each set-up;
+    ``odds`` of the true one of the two over the other that are then to be expected.
     """
 
     separates: tuple[str, str]
@@ -118,13 +101,7 @@ class Suggestion:
 
 
 def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
-    """A plan for each pair that it parts.
-
-    Parameters
-    ----------
-    plan : of all pairs together.
-    title : of the artefact.
-    """
+    """A plan for each pair that it parts."""
     if plan is None:
         return ()
     times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))

@@ -30,31 +30,19 @@ Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
 class RelocatedCandidates:
     """A recorded artefact, that stands by itself in each placing, set up in other places.
 
-    Parameters
-    ----------
-    attitudes : in which it is set up, beside that of the recording.
+    ``attitudes`` in which it is set up, beside that of the recording.
     """
 
     attitudes: Attitudes
 
     def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
-        """The first recorded placing, once, in many places and attitudes.
-
-        Raises
-        ------
-        CmmUqError : there is none.
-        """
+        """The first recorded placing, once, in many places and attitudes."""
         first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
         pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
         return self.like(pattern, attitude, volume, count)
 
     def like(self, pattern: Pattern, recorded: Floats, volume: Volume, count: int) -> tuple[SetUp, ...]:
-        """A pattern in other places; first of all in the recorded attitude (3, 3).
-
-        Raises
-        ------
-        CmmUqError : there is none.
-        """
+        """A pattern in other places; first of all in the recorded attitude (3, 3)."""
         ways = [(say("as recorded"), recorded), *self.attitudes(volume)]
         return thinned(everywhere(volume, ways, lambda _: pattern), count, volume)
 
@@ -63,11 +51,8 @@ class RelocatedCandidates:
 class VolumeCandidates:
     """Candidates of an artefact that stands by itself in each placing.
 
-    Parameters
-    ----------
-    attitudes : in which it is set up.
-    shape : what is measured of it in one placing.
-    elsewhere : of a recorded one.
+    ``attitudes`` in which it is set up; ``shape`` what is measured of it in one placing; ``elsewhere`` of a recorded
+    one.
     """
 
     attitudes: Attitudes
@@ -75,12 +60,7 @@ class VolumeCandidates:
     elsewhere: RelocatedCandidates
 
     def candidates(self, setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-        """In many places: as the plan says, or as it was recorded.
-
-        Raises
-        ------
-        CmmUqError : there is none.
-        """
+        """In many places: as the plan says, or as it was recorded."""
         plan, volume = setting.plan, setting.volume
         if start is not None and start.again is not None:
             pattern, attitude, _ = Pattern.of_recording(start.again.points)
@@ -89,12 +69,7 @@ class VolumeCandidates:
 
 
 def candidates(setting: Setting, start: Start | None = None) -> tuple[SetUp, ...]:
-    """Placings that the volume and the fixtures allow, at most as many as the plan says.
-
-    Raises
-    ------
-    CmmUqError : there is none.
-    """
+    """Placings that the volume and the fixtures allow, at most as many as the plan says."""
     return setting.planning.candidates(setting, start)
 
 
@@ -114,12 +89,7 @@ def upright(volume: Volume) -> list[tuple[Text, Floats]]:
 
 
 def thinned(placings: Iterator[SetUp], count: int, volume: Volume) -> tuple[SetUp, ...]:
-    """At most so many of them, spread evenly over the list.
-
-    Raises
-    ------
-    CmmUqError : there are none at all.
-    """
+    """At most so many of them, spread evenly over the list."""
     found = tuple(placings)
     if not found:
         raise CmmUqError(
@@ -159,12 +129,7 @@ ACROSS = " (across it)"
 
 
 def ready_plan(setting: Setting) -> tuple[Text, tuple[SetUp, ...]]:
-    """Name and placings of the ready plan that a job asks for, or of the usual one for its kind.
-
-    Raises
-    ------
-    CmmUqError : its kind has no such plan, it does not fit the volume, or no fixture holds it.
-    """
+    """Name and placings of the ready plan that a job asks for, or of the usual one for its kind."""
     ready, kind = setting.planning.ready, setting.artefact.kind
     usual = next(iter(ready))
     name = Verbatim(setting.plan.ready or usual)
@@ -175,19 +140,10 @@ def ready_plan(setting: Setting) -> tuple[Text, tuple[SetUp, ...]]:
 
 
 def check_allowed(setting: Setting, direction: Floats, how: str = "") -> None:
-    """Refuse a direction that no fixture holds.
-
-    Parameters
-    ----------
-    how : the artefact stands to the direction, as ``(across it)``.
-
-    Raises
-    ------
-    CmmUqError : with the direction in words.
-    """
+    """Refuse a direction that no fixture holds."""
     if not setting.volume.allows(direction):
         raise CmmUqError(
             f"no fixture holds the artefact {direction_words(direction)}{how}, which this plan wants",
             where="job.toml [plan.fixtures] directions",
             fix='Allow the direction, or leave out ready and ask for number = 20 placings by criterion = "D"',
-        )  # fmt: skip
+        )

@@ -33,10 +33,8 @@ Score = Callable[[Floats], Floats]
 class Selection:
     """What a search ends with.
 
-    Parameters
-    ----------
-    indices : of the candidates taken, in ascending order.
-    after, before : score with and without them; smaller is better.
+    ``indices`` of the candidates taken, in ascending order; ``after``, ``before`` score with and without them; smaller
+    is better.
     """
 
     indices: tuple[int, ...]
@@ -45,20 +43,7 @@ class Selection:
 
 
 def score_of(criterion: str, told: Information, targets: Sequence[int]) -> Score:
-    """A criterion as a function of information.
-
-    Parameters
-    ----------
-    criterion : ``D`` (volume of the uncertainty ellipsoid), ``A`` (mean of variances) and ``worst`` (largest variance) of the
-        targets, in units of their prior standard deviations, as logarithms of a variance; ``separation``: mean of −ln sin²
-        over pairs of targets, each pair with everything that is not a target fitted.
-    told : for what must be fitted besides.
-    targets : rows of the effects that count.
-
-    Raises
-    ------
-    CmmUqError : an unknown criterion, or fewer targets than it compares.
-    """
+    """A criterion as a function of information."""
     targets = list(targets)
     least = 2 if criterion == "separation" else 1
     if criterion not in CRITERIA:
@@ -104,12 +89,7 @@ def choose(told: Information, start: Floats, score: Score, count: int, *, again:
     Where no single candidate improves the score (nothing is told apart by one placing alone), the one is taken that shrinks
     the uncertainty ellipsoid of all effects together most.
 
-    Parameters
-    ----------
-    told : candidates.
-    start : (k, k) information of what is there already, certificates included.
-    score : see :func:`score_of`.
-    again : whether a candidate may be taken more than once; it may in any case once all are taken.
+    ``start`` (k, k) information of what is there already, certificates included.
     """
     again = again or count > len(told.each)
     everything = score_of("D", told, [i for i in range(len(told.prior)) if i not in told.nuisance])

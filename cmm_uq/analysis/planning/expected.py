@@ -36,10 +36,8 @@ _ZERO = 1e-8
 class ExpectedUncertainty:
     """Standard uncertainties (k,) of each parameter, in its unit.
 
-    Parameters
-    ----------
-    u : of the least-squares estimate, infinite where the placings leave it free; as :meth:`PlannedNoise.spread` averages.
-    with_prior : the same when what physics allows is used too.
+    ``u`` of the least-squares estimate, infinite where the placings leave it free; as :meth:`PlannedNoise.spread`
+    averages; ``with_prior`` the same when what physics allows is used too.
     """
 
     u: Floats
@@ -47,13 +45,7 @@ class ExpectedUncertainty:
 
 
 def expected_uncertainty(model: MeasurementModel, noise: PlannedNoise) -> ExpectedUncertainty:
-    """What placings will determine under a noise.
-
-    Parameters
-    ----------
-    model : of the artefact in these placings.
-    noise : known or not.
-    """
+    """What placings will determine under a noise."""
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear, components = model.linearised(values), noise.components(model, values)
     sizes, weight = noise.spread(components)
@@ -62,13 +54,7 @@ def expected_uncertainty(model: MeasurementModel, noise: PlannedNoise) -> Expect
 
 
 def uncertainties(linear: LinearModel, components: Components, sizes: Sizes) -> tuple[Floats, Floats]:
-    """Standard uncertainties (w, k) for each of w sizes of the noise: of least squares, and with the prior of the effects.
-
-    Parameters
-    ----------
-    linear : whose certified sizes are held.
-    components : of its noise; slow noise is not reckoned with.
-    """
+    """Standard uncertainties (w, k) for each of w sizes of the noise: of least squares, and with the prior of the effects."""
     unknowns, scale = linear.unknowns, scales(linear.unknowns)
     held = np.array([unknown.known for unknown in unknowns], dtype=bool)
     design = linear.design * scale * _there(linear)
@@ -123,11 +109,9 @@ COMPARED = 10
 class RepeatsRow:
     """What placings tell with a number of repeats.
 
-    Parameters
-    ----------
-    repeats, readings, minutes : of every point; of all placings together.
-    u : (p,) expected of each parameter, in its unit, infinite where it stays free.
-    readings_more, minutes_more, u_more : with one more placing, which tells as much as they do on average.
+    ``repeats``, ``readings``, ``minutes`` of every point; of all placings together; ``u`` (p,) expected of each
+    parameter, in its unit, infinite where it stays free; ``readings_more``, ``minutes_more``, ``u_more`` with one more
+    placing, which tells as much as they do on average.
     """
 
     repeats: int
@@ -143,11 +127,8 @@ class RepeatsRow:
 class RepeatsComparison:
     """Repeats against placings.
 
-    Parameters
-    ----------
-    unknowns : p parameters, those without a certificate.
-    placings : how many there are.
-    rows : for 1, 2, … repeats.
+    ``unknowns`` p parameters, those without a certificate; ``placings`` how many there are; ``rows`` for 1, 2, …
+    repeats.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -174,13 +155,7 @@ def _placing_is_better(one: RepeatsRow, following: RepeatsRow) -> bool:
 
 
 def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsComparison | None:
-    """Repeats against placings; ``None`` where no parameter is determined or the noise is taken as white.
-
-    Parameters
-    ----------
-    setting : with the noise.
-    placings : of the plan.
-    """
+    """Repeats against placings; ``None`` where no parameter is determined or the noise is taken as white."""
     noise, n = setting.noise, len(placings)
     if noise is None or not setting.named:
         return None
@@ -195,10 +170,8 @@ def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsCompa
         )
         with_one_more = len(points) * (1 + 1 / n)
         rows.append(
-            RepeatsRow(
-                repeats, len(points), minutes, now, with_one_more, _minutes(setting, n + 1, with_one_more), more,
-            )
-        )  # fmt: skip
+            RepeatsRow(repeats, len(points), minutes, now, with_one_more, _minutes(setting, n + 1, with_one_more), more)
+        )
     unknowns = tuple(unknown for unknown in model.unknowns if not unknown.known)
     return RepeatsComparison(unknowns, n, tuple(rows)) if np.any(np.isfinite(rows[0].u)) else None
 

@@ -39,13 +39,9 @@ WEAK = 0.1
 class Determination:
     """What to expect of one parameter.
 
-    Parameters
-    ----------
-    unknown : the parameter.
-    u : standard uncertainty of its least-squares estimate, in its unit; ``None`` where the placings leave it free.
-    u_with_prior : the same when what physics allows is used too.
-    u_white : like ``u``, if the noise were white.
-    status : ``determined``, ``weak`` (the prior says almost as much) or ``free``.
+    ``unknown`` the parameter; ``u`` standard uncertainty of its least-squares estimate, in its unit; ``None`` where the
+    placings leave it free; ``u_with_prior`` the same when what physics allows is used too; ``u_white`` like ``u``, if
+    the noise were white; ``status`` ``determined``, ``weak`` (the prior says almost as much) or ``free``.
     """
 
     unknown: Unknown
@@ -59,14 +55,12 @@ class Determination:
 class Identifiability:
     """What placings determine.
 
-    Parameters
-    ----------
-    parameters : of the effects named, and the sizes of the artefact that no certificate gives.
-    free : combinations, each by the keys of its parameters and their parts, that leave every observation as it is.
-    singular_values : of the design whitened by the noise and scaled by the prior standard deviations, largest first.
-    alike : pairs of effects, and their cosine, that could not be told apart.
-    absorbed : effects, not named by the job, that would be taken for some that it names; with the names of these.
-    unseen : effects, not named by the job, of which nothing would show at all.
+    ``parameters`` of the effects named, and the sizes of the artefact that no certificate gives; ``free`` combinations,
+    each by the keys of its parameters and their parts, that leave every observation as it is; ``singular_values`` of
+    the design whitened by the noise and scaled by the prior standard deviations, largest first; ``alike`` pairs of
+    effects, and their cosine, that could not be told apart; ``absorbed`` effects, not named by the job, that would be
+    taken for some that it names; with the names of these; ``unseen`` effects, not named by the job, of which nothing
+    would show at all.
     """
 
     parameters: tuple[Determination, ...]
@@ -84,14 +78,10 @@ class Identifiability:
 
 def identifiability(
     model: MeasurementModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
-) -> Identifiability:  # fmt: skip
+) -> Identifiability:
     """What the placings of a model's artefact determine of its effects, and how rivals would show besides.
 
-    Parameters
-    ----------
-    model : effects that are to be determined, with the noise.
-    rivals : effects that might act and are not named.
-    noise : of the recording to be; ``None`` for the white noise that the model states.
+    ``noise`` of the recording to be; ``None`` for the white noise that the model states.
     """
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear = model.linearised(values)
@@ -133,7 +123,7 @@ def _singular_values(linear: LinearModel, sigma: float) -> Floats:
 
 def _parameters(
     linear: LinearModel, estimate: LeastSquares, noisy: ExpectedUncertainty, white: ExpectedUncertainty
-) -> tuple[Determination, ...]:  # fmt: skip
+) -> tuple[Determination, ...]:
     scale, found = scales(linear.unknowns), []
     for i, unknown in enumerate(linear.unknowns):
         if unknown.known:

@@ -38,11 +38,8 @@ _HELD = 1e12
 class Information:
     """Information of placings, one matrix each.
 
-    Parameters
-    ----------
-    unknowns : k of them, effects first.
-    each : (c, k, k) of every placing; there may be more rows than unknowns, of freedoms that all placings share.
-    prior : (k, k) of the certificates, without that of the effects.
+    ``unknowns`` k of them, effects first; ``each`` (c, k, k) of every placing; there may be more rows than unknowns, of
+    freedoms that all placings share; ``prior`` (k, k) of the certificates, without that of the effects.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -62,12 +59,7 @@ class Information:
 
 
 def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[Effect, ...] = ()) -> Information:
-    """What each placing tells of the effects that the job names, and of some others.
-
-    Raises
-    ------
-    CmmUqError : an effect needs what these placings do not give.
-    """
+    """What each placing tells of the effects that the job names, and of some others."""
     plan = setting.plan
     points = join(
         placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
@@ -92,9 +84,7 @@ def recording_information(setting: Setting, points: Points, also: tuple[Effect, 
 def gram(model: MeasurementModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
     """Information (k, k) of all that a model's recording says about the parameters (k,), without any prior.
 
-    Parameters
-    ----------
-    noise : in its typical sizes; ``None`` for the white noise that the model states.
+    ``noise`` in its typical sizes; ``None`` for the white noise that the model states.
     """
     white = _white(model, values, noise)
     return np.asarray(white.T @ white, dtype=np.float64)
@@ -160,9 +150,7 @@ _PART = 0.1
 def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:
     """Information (..., r, r) on rivals once the base (rows) is fitted: the Schur complement.
 
-    Parameters
-    ----------
-    information : (..., k, k).
+    ``information`` (..., k, k).
     """
     rival, fitted = list(rivals), list(base)
     own = information[..., rival, :][..., :, rival]
@@ -180,10 +168,8 @@ def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> 
 def cosines(left: Floats, alone: Floats) -> Floats:
     """Absolute cosines (..., r, r) between effects; 1 on the diagonal, and with an effect that is not seen.
 
-    Parameters
-    ----------
-    left : (..., r, r) information on them, see :func:`left_of`.
-    alone : (..., r) information on each if nothing else were fitted.
+    ``left`` (..., r, r) information on them, see :func:`left_of`; ``alone`` (..., r) information on each if nothing
+    else were fitted.
     """
     size = np.einsum("...ii->...i", left)
     seen = visible(left, alone)

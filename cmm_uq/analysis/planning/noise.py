@@ -31,11 +31,9 @@ _LEAST_RATIO = 0.02
 class PlannedNoise:
     """What is known of the noise before anything is measured.
 
-    Parameters
-    ----------
-    reading : standard deviation of a reading along each axis, mm.
-    placing, growth : of a set-up offset, and of what grows, at the longest length, mm; ``None`` where nothing is known.
-    longest : that length, mm; ``None`` where it is the longest of whatever is planned.
+    ``reading`` standard deviation of a reading along each axis, mm; ``placing``, ``growth`` of a set-up offset, and of
+    what grows, at the longest length, mm; ``None`` where nothing is known; ``longest`` that length, mm; ``None`` where
+    it is the longest of whatever is planned.
     """
 
     reading: tuple[float, float, float]
@@ -71,12 +69,7 @@ class PlannedNoise:
         return Noise(self.reading, placing=float(typical.placing[0]), growth=float(typical.growth[0]))
 
     def spread(self, components: Components) -> tuple[Sizes, Floats]:
-        """All sizes (w,) that are reckoned with, and their weights (w,), which sum up to one.
-
-        Parameters
-        ----------
-        components : say whether growing noise could show at all; without lengths that differ it is none.
-        """
+        """All sizes (w,) that are reckoned with, and their weights (w,), which sum up to one."""
         placing, p = _known(self.placing) if self.placing is not None else _prior(PLACING, self.coordinate)
         unknown_growth = self.growth is None and GROWTH in components.possible
         growth, g = _prior(GROWTH, self.coordinate) if unknown_growth else _known(self.growth or 0.0)
@@ -108,9 +101,7 @@ def white_noise(model: MeasurementModel) -> PlannedNoise:
 def uncorrelated(model: MeasurementModel, values: Floats, noise: PlannedNoise | None) -> LinearModel:
     """The model about parameters (k,) in observations of which each has the noise of one reading, and none is correlated.
 
-    Parameters
-    ----------
-    noise : ``None`` for white noise.
+    ``noise`` ``None`` for white noise.
     """
     linear = model.linearised(values)
     if noise is None:

@@ -31,10 +31,7 @@ _MINUTE = 60.0
 class SetUp:
     """One setting-up of the artefact.
 
-    Parameters
-    ----------
-    title : in words, for the operator.
-    points : everything measured there, as one measurement.
+    ``title`` in words, for the operator; ``points`` everything measured there, as one measurement.
     """
 
     title: Text
@@ -59,12 +56,9 @@ class SetUp:
 class Pattern:
     """What is measured of an artefact in one placing.
 
-    Parameters
-    ----------
-    body : (n, 3) along the artefact's axes about its middle, mm; a bar or gauge lies along the first.
-    point, repeat : (n,) as in a recording.
-    columns : further columns, each (n,).
-    vectors : vectors (n, 3) along the artefact's axes, by the keys of :data:`VECTORS`.
+    ``body`` (n, 3) along the artefact's axes about its middle, mm; a bar or gauge lies along the first; ``point``,
+    ``repeat`` (n,) as in a recording; ``columns`` further columns, each (n,); ``vectors`` vectors (n, 3) along the
+    artefact's axes, by the keys of :data:`VECTORS`.
     """
 
     body: Floats
@@ -140,12 +134,7 @@ def join(
     placings: Sequence[SetUp], *, seconds_per_point: float = 10.0, minutes_per_placing: float = 5.0,
     columns: Mapping[str, float] | None = None, first: int = 1,
 ) -> Points:  # fmt: skip
-    """All placings as one recording, numbered from ``first``, in the order and at the times at which they are measured.
-
-    Raises
-    ------
-    CmmUqError : there is no placing.
-    """
+    """All placings as one recording, numbered from ``first``, in the order and at the times at which they are measured."""
     if not placings:
         raise CmmUqError("a plan without placings", fix="Ask for at least one")
     parts, clock = [], 0.0
@@ -273,12 +262,7 @@ def attitudes_of_lines(size: Floats) -> list[tuple[Text, Floats]]:
 
 
 def planned_length(facts: ArtefactFacts, plan: PlanFacts) -> float:
-    """Length, mm, by which a bar is planned.
-
-    Raises
-    ------
-    CmmUqError : neither its certificate nor the plan gives one.
-    """
+    """Length, mm, by which a bar is planned."""
     length = facts.length_mm or plan.length_mm
     if length is None:
         raise CmmUqError("the length of the artefact is needed", where="job.toml [plan] length_mm",

@@ -30,10 +30,8 @@ ASSUMED_NOISE_UM = 1.0
 class Start:
     """What there is before better placings are searched for.
 
-    Parameters
-    ----------
-    artefact : at the placings of a recording or of a ready plan.
-    again : the first placing of the recording, to be set up elsewhere; ``None`` without a recording.
+    ``artefact`` at the placings of a recording or of a ready plan; ``again`` the first placing of the recording, to be
+    set up elsewhere; ``None`` without a recording.
     """
 
     artefact: Artefact
@@ -44,14 +42,11 @@ class Start:
 class Planning:
     """What a kind of measurement offers to planning.
 
-    Parameters
-    ----------
-    ready : plans by name, the usual one first.
-    candidates : placings that volume and fixtures allow, at most as many as the plan says.
-    elsewhere : a recorded artefact in other places and attitudes, once in each, at most so many.
-    shared : whether the freedoms of its placing are common to all measurements, so that their information does not add.
-    sought : whether it is sizes of the artefact that are sought, so that no effect need be named.
-    free : what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
+    ``ready`` plans by name, the usual one first; ``candidates`` placings that volume and fixtures allow, at most as
+    many as the plan says; ``elsewhere`` a recorded artefact in other places and attitudes, once in each, at most so
+    many; ``shared`` whether the freedoms of its placing are common to all measurements, so that their information does
+    not add; ``sought`` whether it is sizes of the artefact that are sought, so that no effect need be named; ``free``
+    what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
     """
 
     ready: Mapping[str, Callable[[Setting], tuple[SetUp, ...]]]
@@ -66,16 +61,10 @@ class Planning:
 class Setting:
     """An artefact, a plan's wishes, and the room for it.
 
-    Parameters
-    ----------
-    artefact : as the job describes it.
-    observe, planning : makes an artefact of that and of points; what its kind offers here.
-    plan : ``[plan]``.
-    volume : room.
-    named : effects that the job's model names.
-    sigma : standard uncertainty of one coordinate, mm.
-    stated : the same as the job states it; ``None`` where it does not.
-    noise : with its set-up offsets; ``None`` where it is taken as white.
+    ``artefact`` as the job describes it; ``observe``, ``planning`` makes an artefact of that and of points; what its
+    kind offers here; ``plan`` ``[plan]``; ``volume`` room; ``named`` effects that the job's model names; ``sigma``
+    standard uncertainty of one coordinate, mm; ``stated`` the same as the job states it; ``None`` where it does not;
+    ``noise`` with its set-up offsets; ``None`` where it is taken as white.
     """
 
     artefact: ArtefactFacts
@@ -90,12 +79,7 @@ class Setting:
 
     @classmethod
     def of(cls, job: Job, kind: Kind) -> Setting:
-        """What a job says, which is of this kind.
-
-        Raises
-        ------
-        CmmUqError : the kind cannot be planned; no effect is named, or one is unknown; the volume is not known.
-        """
+        """What a job says, which is of this kind."""
         facts, plan = job.facts, job.facts.plan
         planning = kind.needs("plan", Planning, "planned")
         observe = kind.observing("planned") if planning.free is None else None
@@ -139,10 +123,6 @@ class Setting:
         """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here.
 
         Effects with a nonlinear parameter are left out: how well one is seen depends on its value.
-
-        Raises
-        ------
-        CmmUqError : the plan lists an unknown effect, or one whose columns will not be recorded.
         """
         named = {effect.name for effect in self.named}
         if self.plan.rivals is not None:
@@ -165,12 +145,7 @@ class Setting:
 
 
 def _noise(job: Job) -> PlannedNoise:
-    """What an earlier recording showed, and else what the job states.
-
-    Raises
-    ------
-    CmmUqError : what the job names is no results.json with the noise of a recording.
-    """
+    """What an earlier recording showed, and else what the job states."""
     plan, stated = job.facts.plan, job.facts.recording.u_coordinate_um
     name = noise_file(plan)
     if name is None:

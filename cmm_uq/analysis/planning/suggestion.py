@@ -91,7 +91,6 @@ class _Information:
     recorded: Floats
 
     def rows(self, name: str) -> list[int]:
-        """Of an effect."""
         return [i for i, owner in enumerate(self.names) if owner == name]
 
     def left(self, information: Floats, rows: Sequence[int], apart: Sequence[str]) -> Floats:
@@ -110,18 +109,8 @@ def next_plan(
 ) -> NextPlan | None:
     """The fewest set-ups, within the machine's travel or the recorded volume, that part all that cannot be told apart.
 
-    Parameters
-    ----------
-    diagnosis : with groups of effects that look alike.
-    facts : of the artefact.
-    observe : makes the artefact of facts and points.
-    planning : what its kind offers; without it nothing is planned.
-    plan : what the volume and the fixtures allow.
-    wanted : effects that are to be shown besides.
-
-    Returns
-    -------
-    plan, ``None`` where nothing is to be parted or shown, or no set-up helps. What it reaches of what is wanted it says.
+    Gives plan, ``None`` where nothing is to be parted or shown, or no set-up helps. What it reaches of what is wanted
+    it says.
     """
     groups = _groups(diagnosis)
     if not (groups or wanted) or planning is None or planning.elsewhere is None:
@@ -244,13 +233,8 @@ def _size(after: MeasurementModel, name: str, group: Sequence[str]) -> Floats:
 class _Aims:
     """What a plan shall reach.
 
-    Parameters
-    ----------
-    known : information of the recording and of candidates.
-    groups : of effects to part.
-    wanted : effects to show.
-    sizes : of the effects of groups.
-    variances : of a reading and of a set-up, over that of a coordinate.
+    ``known`` information of the recording and of candidates; ``groups`` of effects to part; ``wanted`` effects to show;
+    ``sizes`` of the effects of groups; ``variances`` of a reading and of a set-up, over that of a coordinate.
     """
 
     known: _Information

@@ -29,12 +29,9 @@ _ROUNDING = 1e-6
 class Volume:
     """Room for placings.
 
-    Parameters
-    ----------
-    machine : whose readings they are.
-    box : (3, 2) lowest and highest reading of each axis that points may have, mm.
-    heights : of the artefact's middle, z readings, mm.
-    directions : (d, 3) unit vectors that fixtures allow; none means any.
+    ``machine`` whose readings they are; ``box`` (3, 2) lowest and highest reading of each axis that points may have,
+    mm; ``heights`` of the artefact's middle, z readings, mm; ``directions`` (d, 3) unit vectors that fixtures allow;
+    none means any.
     """
 
     machine: Machine
@@ -44,12 +41,7 @@ class Volume:
 
     @classmethod
     def of(cls, machine: Machine, plan: PlanFacts, recorded: Floats | None = None) -> Volume:
-        """What a job says: ``[plan] volume_mm``, else the machine's travel, else where points were recorded (n, 3).
-
-        Raises
-        ------
-        CmmUqError : none of them is known, the plan's volume exceeds the travel, or the margin leaves nothing.
-        """
+        """What a job says: ``[plan] volume_mm``, else the machine's travel, else where points were recorded (n, 3)."""
         box = np.empty((3, 2))
         for i, axis in enumerate(AXES):
             if axis in plan.volume_mm:
@@ -96,12 +88,7 @@ class Volume:
         return room if room[2, 0] <= room[2, 1] + _ROUNDING else None
 
     def set_up(self, pattern: Pattern, attitude: Floats, place: Sequence[float], title: Text) -> SetUp:
-        """A pattern at a place (3,) of its room, 0 … 1 along each axis.
-
-        Raises
-        ------
-        CmmUqError : it does not fit there, or no fixture holds it so.
-        """
+        """A pattern at a place (3,) of its room, 0 … 1 along each axis."""
         turned = pattern.turned(attitude)
         room = self.room(turned)
         if room is None:
@@ -141,13 +128,7 @@ _FLAT = 1e-3
 
 
 def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]:
-    """Each placing with the artefact turned about its own axes, where it then fits.
-
-    Parameters
-    ----------
-    placings : in each of which the artefact stands by itself.
-    volume : room.
-    """
+    """Each placing with the artefact turned about its own axes, where it then fits."""
     for placing in placings:
         pattern, attitude, _ = Pattern.of_recording(placing.points)
         for words, turn in _turns(pattern.body):

@@ -74,13 +74,7 @@ SENSORS = (*BOUNDS, "time_s")
 
 
 def column_findings(points: Points, *, balls: bool) -> list[Finding]:
-    """All that is odd beside the coordinates, a finding a column.
-
-    Parameters
-    ----------
-    points : the recording.
-    balls : whether its points are centres of balls or cylinders, each of several touches.
-    """
+    """All that is odd beside the coordinates, a finding a column."""
     found = [*_impossible(points), *_fraction(points), *_time(points, balls), *_stuck(points), *_slipped(points)]
     return [*found, *_approach(points)]
 

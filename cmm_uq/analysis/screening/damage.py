@@ -48,15 +48,9 @@ class Damage:
 class DamageSearch:
     """The points that miss an artefact, and what makes them fit.
 
-    Parameters
-    ----------
-    points : the recording.
-    shape : what its artefact asks of them.
-
-    Attributes
-    ----------
-    misfit : (n,) by how much each point misses the artefact, mm.
-    bad : (n,) points that miss it by too much, and a few that lie as far outside the travel as that is long.
+    ``points`` the recording; ``shape`` what its artefact asks of them. ``misfit`` (n,) by how much each point misses
+    the artefact, mm; ``bad`` (n,) points that miss it by too much, and a few that lie as far outside the travel as that
+    is long.
     """
 
     def __init__(self, points: Points, shape: ArtefactShape) -> None:
@@ -277,17 +271,7 @@ def coordinate_findings(
 ) -> list[Finding]:
     """Damaged coordinates, each with the rows to leave out.
 
-    Parameters
-    ----------
-    points : the recording.
-    shape : what the artefact asks of the points.
-    observe : makes the artefact of points, in whose own checks another one shows.
-    set_aside : measurements that the job leaves out of the estimates; however many of them are damaged is no matter.
-    where : the recording's name, for messages.
-
-    Raises
-    ------
-    CmmUqError : a damage of the whole recording, or of too much of it.
+    ``where`` the recording's name, for messages.
     """
     _refuse_absurd_size(shape, where)
     search = DamageSearch(points, shape)

@@ -16,16 +16,11 @@ from cmm_uq.base.points import Floats, Ints, Points
 class Finding:
     """Something odd in a recording.
 
-    Parameters
-    ----------
-    kind : ``impossible``, ``duplicate``, ``repeated block``, ``swapped``, ``reversed``, ``unit``, ``sign``,
-        ``exchanged coordinates``, ``shifted column``, ``stuck`` or ``outlier``.
-    measurements : that it concerns.
-    lines : of the file.
-    why : in words, and how to mend it.
-    column : that it concerns, if one.
-    set_aside : whether the estimates leave these rows, or this column, out.
-    rows : of the recording, from 0, that are left out with it.
+    ``kind`` ``impossible``, ``duplicate``, ``repeated block``, ``swapped``, ``reversed``, ``unit``, ``sign``,
+    ``exchanged coordinates``, ``shifted column``, ``stuck`` or ``outlier``; ``measurements`` that it concerns;
+    ``lines`` of the file; ``why`` in words, and how to mend it; ``column`` that it concerns, if one; ``set_aside``
+    whether the estimates leave these rows, or this column, out; ``rows`` of the recording, from 0, that are left out
+    with it.
     """
 
     kind: str

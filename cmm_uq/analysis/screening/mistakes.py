@@ -27,14 +27,9 @@ COORDINATES = tuple(f"{a}_mm" for a in AXES)
 class Mistake:
     """One mistake, undone.
 
-    Parameters
-    ----------
-    kind : of finding.
-    what : the mistake, as a sentence without its full stop.
-    fix : what to do.
-    columns : that it concerns.
-    apply : coordinates (k, 3) and references (k, j) as they would be without it.
-    edges : rows that it cannot mend.
+    ``kind`` of finding; ``what`` the mistake, as a sentence without its full stop; ``fix`` what to do; ``columns`` that
+    it concerns; ``apply`` coordinates (k, 3) and references (k, j) as they would be without it; ``edges`` rows that it
+    cannot mend.
     """
 
     kind: str

@@ -19,14 +19,7 @@ _SHARE = 2 / 3
 def moved_stretches(points: Points, outliers: Ints) -> list[Ints]:
     """Outliers of one repeat that are most of the points from the first to the last of them.
 
-    Parameters
-    ----------
-    points : the recording.
-    outliers : rows of the recording that are gross outliers, each once.
-
-    Returns
-    -------
-    Rows of each stretch, in the order of their points.
+    Gives rows of each stretch, in the order of their points.
     """
     found = []
     for group in np.unique(points.group[outliers]):
@@ -40,13 +33,7 @@ def moved_stretches(points: Points, outliers: Ints) -> list[Ints]:
 
 
 def stretch_words(points: Points, stretch: Ints, times: Sequence[float]) -> Text:
-    """What a stretch of outliers says.
-
-    Parameters
-    ----------
-    points, stretch : see :func:`moved_stretches`.
-    times : how far off each is, in its own standard deviations.
-    """
+    """What a stretch of outliers says."""
     measurement, repeat = points.run_of(int(points.group[stretch[0]]))
     return say(
         "points {first} to {last} of measurement {measurement}, repeat {repeat} are {low:.1f} to {high:.1f} of their "
@@ -60,13 +47,7 @@ def stretch_words(points: Points, stretch: Ints, times: Sequence[float]) -> Text
 def recurring_points(points: Points, outliers: Ints) -> list[Ints]:
     """Outliers of points that are off in most of their readings, and in several set-ups.
 
-    Parameters
-    ----------
-    points, outliers : see :func:`moved_stretches`.
-
-    Returns
-    -------
-    Rows of each point, in the order of the points' numbers.
+    Gives rows of each point, in the order of the points' numbers.
     """
     found = []
     for point in np.unique(points.point[outliers]):
@@ -78,13 +59,7 @@ def recurring_points(points: Points, outliers: Ints) -> list[Ints]:
 
 
 def point_words(points: Points, rows: Ints, times: Sequence[float]) -> Text:
-    """What a point that is off wherever it stands says.
-
-    Parameters
-    ----------
-    points, rows : see :func:`recurring_points`.
-    times : how far off each is, in its own standard deviations.
-    """
+    """What a point that is off wherever it stands says."""
     point = int(points.point[rows[0]])
     return say(
         "point {point} is {low:.1f} to {high:.1f} of its standard deviations off what the others say in {count} of its "

@@ -42,13 +42,7 @@ def copied_measurements(points: Points) -> dict[int, int]:
 
 
 def counted_with(points: Points, set_aside: Collection[int] = ()) -> Ints:
-    """For every point, a row of the group that it counts with: its own, or that of which it is a copy, (n,).
-
-    Parameters
-    ----------
-    points : the recording.
-    set_aside : measurements that the job leaves out; the copy of one counts in its place.
-    """
+    """For every point, a row of the group that it counts with: its own, or that of which it is a copy, (n,)."""
     first = np.unique(points.group, return_index=True)[1]
     counts = np.arange(len(first))
     for later, original in copied_measurements(points).items():
@@ -71,10 +65,7 @@ _REFUSED_WHOLE = ("unit", "sign", "shifted column")
 class ScreenedRecording:
     """A recording that may be fitted, and what screening found in it.
 
-    Parameters
-    ----------
-    points : without the rows and columns that are left out.
-    findings : all of them.
+    ``points`` without the rows and columns that are left out; ``findings`` all of them.
     """
 
     points: Points
@@ -87,19 +78,8 @@ def screen_recording(
 ) -> ScreenedRecording:  # fmt: skip
     """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it.
 
-    Parameters
-    ----------
-    points : the recording as read.
-    facts : what the job says of the artefact.
-    screening : what its kind asks of a recording; ``None`` when it asks nothing.
-    observe : makes the artefact of facts and points.
-    needed : columns that the model uses.
-    set_aside : measurements that the job leaves out of the estimates.
-    where : the recording's name, for messages.
-
-    Raises
-    ------
-    CmmUqError : a damage of the whole recording, of a whole column, or of one that the model uses.
+    ``screening`` what its kind asks of a recording; ``None`` when it asks nothing; ``where`` the recording's name, for
+    messages.
     """
     shape = screening.shape_of(facts, points) if screening else None
     made = partial(observe, facts, where=where)
@@ -125,17 +105,7 @@ def screen(
 ) -> tuple[Finding, ...]:
     """All that is odd in a recording without regard to its artefact's shape.
 
-    Parameters
-    ----------
-    points : the recording.
-    needed : columns that the model uses.
-    set_aside : measurements that the job leaves out of the estimates.
-    where : the recording's name, for messages.
-    balls : whether its points are centres of balls or cylinders, each of several touches.
-
-    Raises
-    ------
-    CmmUqError : a whole column in another unit or place, or a value that the model uses cannot be.
+    ``where`` the recording's name, for messages.
     """
     impossible = impossible_values(points, balls=balls)
     for found in impossible:
@@ -180,20 +150,15 @@ def repeated_figures(points: Points) -> list[Finding]:
     return [_copied(points, run) for run in _runs(copies)]
 
 
-def gross_outliers(
-    linear: LinearModel, measurement: NDArray[np.int64], least: float = 0.0
-) -> list[tuple[int, float]]:  # fmt: skip
+def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: float = 0.0) -> list[tuple[int, float]]:
     """Observations (index, times of their standard deviation) that noise would hardly ever put so far off.
 
     Externally studentised residuals against their t distribution, the probability multiplied by the number of
     observations (Bonferroni; Barnett & Lewis 1994, 8.2); the worst is taken out and the rest tested again, up to a tenth
     of the recording.
 
-    Parameters
-    ----------
-    linear : with its estimate's observations.
-    measurement : (m,) of each observation.
-    least : mm, noise that the observations have however little they scatter, as that of their last digit.
+    ``linear`` with its estimate's observations; ``measurement`` (m,) of each observation; ``least`` mm, noise that the
+    observations have however little they scatter, as that of their last digit.
     """
     reduced = linear.reduced
     keep = np.ones(len(reduced.observed), dtype=bool)

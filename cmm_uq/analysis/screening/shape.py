@@ -31,15 +31,10 @@ Misfit = Callable[[Floats, Floats, float], Floats]
 class ArtefactShape:
     """What one kind of artefact asks of the points of each of its placings.
 
-    Parameters
-    ----------
-    rows : points of each placing, as rows of the recording.
-    misfit_of : misfit (k,), mm, of a placing's points (k, 3) and references (k, j) for the size common to all placings.
-    size : that size by the certificate, mm; not finite without one.
-    extent : of the artefact, mm, for the tolerance.
-    together : whether a placing is lost with one of its points.
-    names : columns of the references.
-    reference : (n, j) what the recording says of each point.
+    ``rows`` points of each placing, as rows of the recording; ``misfit_of`` misfit (k,), mm, of a placing's points (k,
+    3) and references (k, j) for the size common to all placings; ``size`` that size by the certificate, mm; not finite
+    without one; ``extent`` of the artefact, mm, for the tolerance; ``together`` whether a placing is lost with one of
+    its points; ``names`` columns of the references; ``reference`` (n, j) what the recording says of each point.
     """
 
     rows: tuple[Ints, ...]
@@ -75,10 +70,8 @@ class ArtefactShape:
 class Screening:
     """What a kind of measurement offers to the screening.
 
-    Parameters
-    ----------
-    shape_of : ``(facts, points)``: what its artefact asks of the points; ``None`` where the recording lacks what that needs.
-    balls : whether its points are centres of balls or cylinders, each of several touches.
+    ``shape_of`` ``(facts, points)``: what its artefact asks of the points; ``None`` where the recording lacks what that
+    needs; ``balls`` whether its points are centres of balls or cylinders, each of several touches.
     """
 
     shape_of: Callable[..., ArtefactShape | None]

@@ -34,20 +34,8 @@ from cmm_uq.machine.model.kind import Kind, Observe
 from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
 
 
-def diagnose_read(
-    job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> Found:  # fmt: skip
-    """Diagnose a job that was read, in the way of its kind.
-
-    Parameters
-    ----------
-    seed : of everything random.
-    alpha : rate of false alarms.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be diagnosed as it stands.
-    """
+def diagnose_read(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None) -> Found:
+    """Diagnose a job that was read, in the way of its kind."""
     _check_rate(alpha)
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
         return _recipe(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
@@ -56,12 +44,7 @@ def diagnose_read(
 def diagnose_job(
     folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
 ) -> Diagnosed:
-    """Diagnose a recording of an artefact; see :func:`diagnose_read`.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be diagnosed as it stands, or has no such recording.
-    """
+    """Diagnose a recording of an artefact; see :func:`diagnose_read`."""
     _check_rate(alpha)
     return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
 
@@ -86,25 +69,16 @@ def _against(job: Job, compared: Against, *, seed: int, alpha: float, progress: 
     facts = job.facts.artefact
     model, outliers = without_outliers(compared.model)
     made = partial(compared.observe, facts, where=job.recording_path)
-    diagnosis = diagnose(
-        model, stated_um=compared.stated_um, alpha=alpha, seed=seed, progress=progress, observe=made
-    )  # fmt: skip
+    diagnosis = diagnose(model, stated_um=compared.stated_um, alpha=alpha, seed=seed, progress=progress, observe=made)
     findings = (*compared.findings, *outliers)
     unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
     plan = _next(job, diagnosis, compared.observe, _wanted(job, diagnosis, unseen))
     next_ones = suggestions(plan, model.artefact.title)
-    return Diagnosed(
-        job, findings, diagnosis, next_ones, simulated=compared.simulated, unseen=unseen, next_plan=plan
-    )  # fmt: skip
+    return Diagnosed(job, findings, diagnosis, next_ones, simulated=compared.simulated, unseen=unseen, next_plan=plan)
 
 
 def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
-    """The model that a job names, without gross outliers, and all that the screening found.
-
-    Raises
-    ------
-    CmmUqError : the recording does not fit the model.
-    """
+    """The model that a job names, without gross outliers, and all that the screening found."""
     model, findings = recorded_model(job)
     model, outliers = without_outliers(model)
     return model, (*findings, *outliers)
@@ -121,20 +95,12 @@ def diagnosed(
     known: NoisyPosterior | None = None,
     show: bool = False,
 ) -> Diagnosed:
-    """Diagnose the screened model of a job.
-
-    Parameters
-    ----------
-    known : its posterior where it was sampled already.
-    show : whether what to measure next shall also show what this recording could not have shown.
-    """
+    """Diagnose the screened model of a job."""
     stated = job.facts.recording.u_coordinate_um
     kind, facts = kind_of(job), job.facts.artefact
     observe = kind.observing("diagnosed")
     made = partial(observe, facts, where=job.recording_path)
-    diagnosis = diagnose(
-        model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made
-    )  # fmt: skip
+    diagnosis = diagnose(model, stated_um=stated, alpha=alpha, seed=seed, progress=progress, known=known, observe=made)
     left_out = LeftOut.of(job.points, findings, made)
     changes = consequences(job, diagnosis, made, kind.tested, seed, left_out)
     unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
@@ -170,12 +136,7 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
 
 
 def _recipe(job: Job) -> Recipe:
-    """How a job is diagnosed; see :func:`~cmm_uq.app.commands.model.recipe_of`.
-
-    Raises
-    ------
-    CmmUqError : it cannot be, or names a simulation though its kind compares in a way of its own.
-    """
+    """How a job is diagnosed; see :func:`~cmm_uq.app.commands.model.recipe_of`."""
     if job.facts.simulation is not None and kind_of(job).observe is None:
         raise CmmUqError(f"a job of kind {job.facts.artefact.kind!r} is compared with no simulation: its analysis is its own",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip

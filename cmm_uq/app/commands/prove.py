@@ -53,9 +53,8 @@ Sealed = Callable[[str], None]
 class ProofOptions:
     """What was asked for.
 
-    Parameters
-    ----------
-    cases, workers, seed, alpha : how many cases, processes, seed of the cases, rate of false alarms of the diagnosis.
+    ``cases``, ``workers``, ``seed``, ``alpha`` how many cases, processes, seed of the cases, rate of false alarms of
+    the diagnosis.
     """
 
     cases: int = CASES
@@ -70,34 +69,21 @@ class ProofOptions:
             )
         check_workers(self.workers)
         if not 1e-6 <= self.alpha <= 0.5:
-            raise CmmUqError(f"a false-alarm rate of {self.alpha:g}", where="--alpha",
-                             fix="Give one between 0.000001 and 0.5; 0.01 is usual")  # fmt: skip
+            raise CmmUqError(
+                f"a false-alarm rate of {self.alpha:g}",
+                where="--alpha",
+                fix="Give one between 0.000001 and 0.5; 0.01 is usual",
+            )
         if self.seed < 0:
             raise CmmUqError(f"a seed of {self.seed}", where="--seed", fix="Give 0 or more")
 
 
 def prove_job(
     job: Job, asked: ProofOptions, *, folder: Path | None = None, stage: Stage = silent, sealed: Sealed | None = None
-) -> tuple[DiagnosisProof, AnswersFolder | None]:  # fmt: skip
+) -> tuple[DiagnosisProof, AnswersFolder | None]:
     """Prove the diagnosis on the set-ups of a job.
 
-    Parameters
-    ----------
-    job : that was read; its recording may be missing where its noise is stated.
-    asked : how many cases, and the like.
-    folder : where truth and answers are kept while they come, so that the same call goes on after it was interrupted;
-        nowhere by default.
-    stage : told of progress.
-    sealed : told the hash of the truth before the first diagnosis.
-
-    Returns
-    -------
-    what was found, and what was kept of it, still open.
-
-    Raises
-    ------
-    CmmUqError : the job has an analysis of its own, or nothing to draw cases from, or the folder holds another run.
-    OutputError : the folder cannot be written to.
+    Gives what was found, and what was kept of it, still open.
     """
     stage("Finding the noise of the job", 0.0)
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
@@ -123,7 +109,7 @@ def prove_job(
 
 def _records(
     job: Job, design: Design, cases: tuple[Case, ...], asked: ProofOptions, kept: AnswersFolder | None, stage: Stage
-) -> dict[int, Record]:  # fmt: skip
+) -> dict[int, Record]:
     """What is said of every case, by its number."""
     records = {} if kept is None else kept.records
     if kept is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
@@ -144,14 +130,7 @@ def _records(
     points = design.model.artefact.points
     points = replace(points, columns=dict(points.columns))  # without what it remembers, which cannot be sent
     setting = CaseSetting(
-        dict(job.inputs),
-        points,
-        design.values,
-        design.noise,
-        design.cte_per_k,
-        design.dates,
-        asked.seed,
-        asked.alpha,
+        dict(job.inputs), points, design.values, design.noise, design.cte_per_k, design.dates, asked.seed, asked.alpha
     )
     told()
     with _saying(kept, records, len(cases)):
@@ -172,12 +151,7 @@ def _saying(kept: AnswersFolder | None, records: dict[int, Record], count: int) 
 
 
 def design_of(job: Job) -> tuple[Job, Design]:
-    """The job with the set-ups that cases are drawn on, and these, with the job's own errors and noise.
-
-    Raises
-    ------
-    CmmUqError : see :func:`prove_job`.
-    """
+    """The job with the set-ups that cases are drawn on, and these, with the job's own errors and noise."""
     kind, facts = kind_of(job), job.facts
     offered = kind.offers("own", OwnAnalysis)
     if kind.observe is None or (offered is not None and offered.diagnose is not None):
@@ -269,24 +243,13 @@ UNFINISHED = "cases.unfinished"
 
 @naming_package()
 def prove_outcome(job: Job, asked: ProofOptions, *, stage: Stage = silent) -> Outcome:
-    """Prove the diagnosis on the set-ups of a job that was read; nothing is written.
-
-    Parameters
-    ----------
-    job : that was read; its recording may be missing where its noise is stated.
-    asked : how many cases, and the like.
-    stage : told of progress.
-
-    Raises
-    ------
-    CmmUqError : see :func:`cmm_uq.app.commands.prove.prove_job`.
-    """
+    """Prove the diagnosis on the set-ups of a job that was read; nothing is written."""
     return _outcome(job, asked, stage)[0]
 
 
 def _outcome(
     job: Job, asked: ProofOptions, stage: Stage, folder: Path | None = None, sealed: Sealed | None = None
-) -> tuple[Outcome, AnswersFolder | None]:  # fmt: skip
+) -> tuple[Outcome, AnswersFolder | None]:
     from cmm_uq.certificate.proof.results import proof_outcome
 
     proof, kept = prove_job(job, asked, folder=folder, stage=stage, sealed=sealed)
@@ -303,21 +266,7 @@ def write_proof(
     Truth and answers are kept in ``cases.unfinished`` while they come; the same call goes on with what an interrupted
     one left.
 
-    Parameters
-    ----------
-    job : the job folder; its recording may be missing where its noise is stated.
-    asked : how many cases, and the like.
-    out : where to write; ``reports/<job id>/prove`` by default.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    stage : told of progress.
-    sealed : told the hash of the truth before the first diagnosis.
-    language : of the page, instead of the job's.
-
-    Raises
-    ------
-    CmmUqError : see :func:`cmm_uq.app.commands.prove.prove_job`, or something in the folder that this command did not
-        write for this job.
-    OutputError : the folder cannot be written to.
+    ``language`` of the page, instead of the job's.
     """
     tell = stage or silent
     tell("Reading the job", 0.0)

@@ -38,12 +38,8 @@ _DIGITS = 9
 class CaseSetting:
     """What every process is told first.
 
-    Parameters
-    ----------
-    files : of the job, by name.
-    points : the set-ups.
-    values, noise, cte_per_k, dates : see :class:`~cmm_uq.laboratory.proving.design.Design`.
-    seed, alpha : of the cases, and rate of false alarms.
+    ``files`` of the job, by name; ``points`` the set-ups; ``values``, ``noise``, ``cte_per_k``, ``dates`` see
+    :class:`~cmm_uq.laboratory.proving.design.Design`; ``seed``, ``alpha`` of the cases, and rate of false alarms.
     """
 
     files: dict[str, bytes]
@@ -57,12 +53,7 @@ class CaseSetting:
 
 
 def model_on(job: Job, points: Points) -> MeasurementModel:
-    """What a job names, of its artefact at points.
-
-    Raises
-    ------
-    CmmUqError : the points do not fit the artefact, or the model them.
-    """
+    """What a job names, of its artefact at points."""
     artefact = kind_of(job).observing("proved")(job.facts.artefact, points, where=job.recording_path)
     return model_of(job, artefact)
 

@@ -24,9 +24,7 @@ from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.rounding import alike
 
-STANDING: Mapping[str, Standing] = {
-    "consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad",
-}  # fmt: skip
+STANDING: Mapping[str, Standing] = {"consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad"}
 """What a verdict means for who is to act."""
 
 VERDICT_TITLES: Mapping[str, Text] = {
@@ -311,15 +309,7 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
 
 
 def summary_of(facts: JobFile, verdict: str, told: Sequence[Text], findings: Iterable[Finding]) -> Summary:
-    """Verdict and everything that follows from it, and what the screening found, for the end of a command.
-
-    Parameters
-    ----------
-    facts : of the job.
-    verdict : of the diagnosis.
-    told : the verdict in a sentence, and what follows from it.
-    findings : of the screening.
-    """
+    """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
     first = Verdict(VERDICTS_IN_SHORT[verdict], STANDING[verdict], told[0], ())
     warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
     machine = Verbatim(facts.machine.name)

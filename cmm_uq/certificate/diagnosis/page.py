@@ -54,11 +54,14 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
     return {
         **head(found.job),
         "sampling": {
-            "sampler": posterior.sampler, "seed": posterior.seed, "ess_min": posterior.ess_min,
-            "rhat_max": posterior.rhat_max, "converged": posterior.converged,
+            "sampler": posterior.sampler,
+            "seed": posterior.seed,
+            "ess_min": posterior.ess_min,
+            "rhat_max": posterior.rhat_max,
+            "converged": posterior.converged,
         },
         "diagnosis": diagnosis_data(found),
-    }  # fmt: skip
+    }
 
 
 def diagnosis_document(found: Diagnosed) -> Document:
@@ -196,11 +199,7 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
             "Residual of each observation before and after, with U (k = {k}) from the noise.",
             k=number(factor_of_noise(d.noise.coordinate), ".2f"),
         ),
-        alternative=say(
-            "Residual rms {before} µm before and {after} µm after.",
-            before=left[0],
-            after=left[1],
-        ),
+        alternative=say("Residual rms {before} µm before and {after} µm after.", before=left[0], after=left[1]),
     )
     table = improvement_table(
         gain, say("Residual rms"), say("Rms on held-out {unseen}", unseen=gain.unseen),

@@ -121,7 +121,7 @@ def _partings(plan: NextPlan) -> Table:
             say("{odds} : 1", odds=rounded(parting.after)),
         )
         for parting in plan.partings
-    )  # fmt: skip
+    )
     heads = (
         Column(say("Cannot be told apart"), numeric=False), Column(say("Odds now, first over second")),
         Column(say("Odds expected then")),
@@ -172,7 +172,7 @@ def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | Non
             for parting in plan.partings
         ],
         "shows": [_shown_data(one, _acting(one, artefact)) for one in plan.shown],
-    }  # fmt: skip
+    }
 
 
 def _shown_data(one: DetectionChange, effect: Effect) -> dict[str, Any]:

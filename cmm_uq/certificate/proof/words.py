@@ -88,11 +88,7 @@ INTERVAL_WORDS: Mapping[str, Text] = MappingProxyType(
 )
 ANSWER_WORDS: Mapping[str, Text] = MappingProxyType({**VERDICT_WORDS, REFUSED: say("no answer")})
 STANDING_WORDS: Mapping[str, Text] = MappingProxyType(
-    {
-        MET: say("shown"),
-        OPEN: say("too few cases to decide"),
-        MISSED: say("missed"),
-    }
+    {MET: say("shown"), OPEN: say("too few cases to decide"), MISSED: say("missed")}
 )
 
 
@@ -153,14 +149,9 @@ def standing(one: AcceptanceFigure) -> Text:
 class DiagnosisProof:
     """A job whose diagnosis was tried on sealed cases.
 
-    Parameters
-    ----------
-    job : with the set-ups that cases were drawn on.
-    design : these, with the job's own errors and noise.
-    seed, alpha : of the cases, and rate of false alarms that the diagnosis was asked for.
-    truth : contents of the sealed file.
-    records : what was said of each case, by number.
-    judgement : of all.
+    ``job`` with the set-ups that cases were drawn on; ``design`` these, with the job's own errors and noise; ``seed``,
+    ``alpha`` of the cases, and rate of false alarms that the diagnosis was asked for; ``truth`` contents of the sealed
+    file; ``records`` what was said of each case, by number; ``judgement`` of all.
     """
 
     job: Job
@@ -173,7 +164,6 @@ class DiagnosisProof:
 
     @property
     def sha256(self) -> str:
-        """Of the truth."""
         return sha256_of(self.truth)
 
     @property

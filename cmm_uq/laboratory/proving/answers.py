@@ -28,15 +28,8 @@ TRUTH, RECORDS, LOCK = "truth.json", "cases.jsonl", "lock"
 class AnswersFolder:
     """A folder with the sealed truth and the answers so far; this process alone writes to it while it is open.
 
-    Parameters
-    ----------
-    folder : that may hold a run which was interrupted.
-    truth : contents of the sealed file: the run is the same if and only if these are.
-
-    Raises
-    ------
-    CmmUqError : it holds another run, or another process is at it.
-    OutputError : it cannot be written to.
+    ``folder`` that may hold a run which was interrupted; ``truth`` contents of the sealed file: the run is the same if
+    and only if these are.
     """
 
     def __init__(self, folder: Path, truth: bytes) -> None:
@@ -111,21 +104,8 @@ def _whole_lines(content: bytes) -> tuple[dict[int, Record], int]:
 
 def answer_tasks(
     program: str, setting: Any, tasks: Mapping[int, Any], workers: int, *, keep: Callable[[Record], None]
-) -> None:  # fmt: skip
-    """Have every task answered.
-
-    Parameters
-    ----------
-    program : module that a process runs; see :func:`cmm_uq.laboratory.schedule.processes.serve`.
-    setting : what every process is told first.
-    tasks : by number.
-    workers : processes at once.
-    keep : given every answer as it comes.
-
-    Raises
-    ------
-    CmmUqError : a task that is refused, or over which processes ended; what was answered before is kept.
-    """
+) -> None:
+    """Have every task answered."""
     with contextlib.closing(answers(WorkerTask(program, setting), tasks.items(), workers)) as found:
         for answer in found:
             if answer.failure is not None:

@@ -44,10 +44,8 @@ WEAKEST, STRONGEST = 3.0, 15.0
 class HiddenEffect:
     """An effect of the catalogue that acts and that the job does not name.
 
-    Parameters
-    ----------
-    effect, parameters : its name, and its reported parameters.
-    strength : √λ, with the other one that is hidden projected out too.
+    ``effect``, ``parameters`` its name, and its reported parameters; ``strength`` √λ, with the other one that is hidden
+    projected out too.
     """
 
     effect: str
@@ -59,14 +57,9 @@ class HiddenEffect:
 class UnknownCause:
     """A cause that no catalogue has.
 
-    Parameters
-    ----------
-    what : a function, or a fault of the artefact.
-    size_um : its size.
-    strength, left : √λ of it, and of what the nearest effect of the catalogue leaves of it.
-    like : that effect; empty where none takes anything.
-    form : of a function.
-    errors : of the nodes of the artefact, on the scale of ``size_um``.
+    ``what`` a function, or a fault of the artefact; ``size_um`` its size; ``strength``, ``left`` √λ of it, and of what
+    the nearest effect of the catalogue leaves of it; ``like`` that effect; empty where none takes anything; ``form`` of
+    a function; ``errors`` of the nodes of the artefact, on the scale of ``size_um``.
     """
 
     what: str
@@ -82,13 +75,9 @@ class UnknownCause:
 class Case:
     """What is true of one case.
 
-    Parameters
-    ----------
-    number, kind : which case, and what it hides, one of :data:`KINDS`.
-    noise_kind, noise : of its recording.
-    sizes : true sizes of the artefact, of its certificate's distribution.
-    hidden : effects.
-    stranger : what else acts.
+    ``number``, ``kind`` which case, and what it hides, one of :data:`KINDS`; ``noise_kind``, ``noise`` of its
+    recording; ``sizes`` true sizes of the artefact, of its certificate's distribution; ``hidden`` effects; ``stranger``
+    what else acts.
     """
 
     number: int
@@ -124,14 +113,7 @@ SCHEMA = "cmm-uq/prove-truth/1"
 
 
 def truth_file(cases: Sequence[Case], common: Mapping[str, Any]) -> bytes:
-    """The truth as the bytes of a file.
-
-    Parameters
-    ----------
-    cases : all of them, by number.
-    common : what holds for all: job, hashes of its inputs, program, seed, options, true parameters of what the job
-        names.
-    """
+    """The truth as the bytes of a file."""
     whole = {"schema": SCHEMA, **common, "cases": [case.as_data() for case in cases]}
     return canonical_json(whole)
 

@@ -34,7 +34,7 @@ from cmm_uq.laboratory.proving.cases import (
     WEAKEST,
     WHITE,
     Case,
-    HiddenEffect,  # fmt: skip
+    HiddenEffect,
     UnknownCause,
 )
 from cmm_uq.laboratory.proving.sensitivity import ALLOWED, Sensitivity, possible_effects, remaining_length, white_of
@@ -68,14 +68,10 @@ _AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2
 class Design:
     """The set-ups that cases are drawn on.
 
-    Parameters
-    ----------
-    model : what the job names, with its artefact in its set-ups.
-    values : (k,) true parameters of what it names, and sizes of the artefact.
-    noise : the job's own.
-    cte_per_k : expansion of the artefact; 0 where it is not stated.
-    dates : recordings of which the observations are differences, each with the noise: two where the artefact was
-        recorded earlier, which is not drawn again.
+    ``model`` what the job names, with its artefact in its set-ups; ``values`` (k,) true parameters of what it names,
+    and sizes of the artefact; ``noise`` the job's own; ``cte_per_k`` expansion of the artefact; 0 where it is not
+    stated; ``dates`` recordings of which the observations are differences, each with the noise: two where the artefact
+    was recorded earlier, which is not drawn again.
     """
 
     model: MeasurementModel
@@ -87,7 +83,6 @@ class Design:
 
     @property
     def coefficients(self) -> Floats:
-        """Of the effects that the job names."""
         return self.values[: len(self.values) - len(self.model.artefact.sizes)]
 
     def sight(self, noise: Noise) -> Sensitivity:
@@ -248,18 +243,7 @@ class Design:
         return artefact_fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
 
     def recording(self, case: Case, seed: int, effects: Mapping[str, Effect]) -> Points:
-        """What is recorded of a case.
-
-        Parameters
-        ----------
-        case : what is true of it.
-        seed : of its noise, with its number.
-        effects : of the catalogue, by name.
-
-        Raises
-        ------
-        CmmUqError : errors that no machine has.
-        """
+        """What is recorded of a case."""
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.number, 1)))
         given = [(effects[h.effect], *effects[h.effect].from_reported(h.parameters)) for h in case.hidden]
         acting_ = [*self.model.effects, *(effect for effect, _, _ in given)]

@@ -44,16 +44,11 @@ _BINS = (3.0, 4.5, 6.0, 9.0, 12.0, 15.0)
 class JudgedCase:
     """One case.
 
-    Parameters
-    ----------
-    case : what was true.
-    verdict : what was said; ``refused`` where the diagnosis gave no answer.
-    found, alone : hidden effects that were found, and those of them that no group was named with.
-    wrong : effects that were named wrongly.
-    said : probability of each asserted effect, and whether it acts.
-    intervals : which, as :data:`STATED`; how many hold the truth, and how many there are.
-    right : whether the verdict is.
-    heldout_um : rms of predictions of what the fit has not seen, before and after; ``None`` where nothing was asserted.
+    ``case`` what was true; ``verdict`` what was said; ``refused`` where the diagnosis gave no answer; ``found``,
+    ``alone`` hidden effects that were found, and those of them that no group was named with; ``wrong`` effects that
+    were named wrongly; ``said`` probability of each asserted effect, and whether it acts; ``intervals`` which, as
+    :data:`STATED`; how many hold the truth, and how many there are; ``right`` whether the verdict is; ``heldout_um``
+    rms of predictions of what the fit has not seen, before and after; ``None`` where nothing was asserted.
     """
 
     case: Case
@@ -69,16 +64,8 @@ class JudgedCase:
 
 def judge(
     case: Case, record: Mapping[str, Any], named: Mapping[str, float], of_artefact: Callable[[str], bool]
-) -> JudgedCase:  # fmt: skip
-    """Judge what was said of a case.
-
-    Parameters
-    ----------
-    case : what was true.
-    record : what was said.
-    named : true values of what the job names, ``effect.parameter``.
-    of_artefact : whether an effect is one of the artefact.
-    """
+) -> JudgedCase:
+    """Judge what was said of a case."""
     if REFUSED in record:
         return JudgedCase(case, REFUSED)
     hidden = {h.effect: h for h in case.hidden}
@@ -148,9 +135,7 @@ def _inside(said: Mapping[str, Sequence[float | None]], true: Mapping[str, float
 class Judgement:
     """All cases together.
 
-    Parameters
-    ----------
-    cases : each of them.
+    ``cases`` each of them.
     """
 
     cases: tuple[JudgedCase, ...]
@@ -279,11 +264,7 @@ MET, OPEN, MISSED = "met", "open", "missed"
 class AcceptanceFigure:
     """A figure with its limits.
 
-    Parameters
-    ----------
-    key, what : in results.json, and in words.
-    rate : that was counted.
-    low, high : limits of the rate.
+    ``key``, ``what`` in results.json, and in words; ``rate`` that was counted; ``low``, ``high`` limits of the rate.
     """
 
     key: str

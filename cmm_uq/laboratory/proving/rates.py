@@ -25,11 +25,9 @@ LEVEL = 0.95
 class Rate:
     """So many of so many, with the interval of Clopper and Pearson (Biometrika 26 (1934), 404–413).
 
-    Parameters
-    ----------
-    count, of : how many of how many.
-    clusters : where those come in clusters, such as the intervals of one recording, (count, of) of each: what one
-        cluster says is then worth less than as many that know nothing of each other.
+    ``count``, ``of`` how many of how many; ``clusters`` where those come in clusters, such as the intervals of one
+    recording, (count, of) of each: what one cluster says is then worth less than as many that know nothing of each
+    other.
     """
 
     count: int
@@ -126,10 +124,9 @@ _CURVE = np.linspace(3.0, 15.0, 49)
 class DetectionCurve:
     """How finding grows with strength.
 
-    Parameters
-    ----------
-    often, interval : strength found in nine of ten, median and 95 % interval; beyond :data:`LARGEST` it is infinite.
-    strengths, curve, low, high : (p,) strengths, and the probability to be found there, median and 95 % interval.
+    ``often``, ``interval`` strength found in nine of ten, median and 95 % interval; beyond :data:`LARGEST` it is
+    infinite; ``strengths``, ``curve``, ``low``, ``high`` (p,) strengths, and the probability to be found there, median
+    and 95 % interval.
     """
 
     often: float

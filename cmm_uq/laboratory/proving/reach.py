@@ -30,15 +30,10 @@ _TRIALS = 5
 class Reach:
     """What the set-ups show of an effect under the job's own noise.
 
-    Parameters
-    ----------
-    effect, title : its name, and in words.
-    standing : ``drawn``; or why no case hides it.
-    parameter, unit : its first reported parameter.
-    per_unit : √λ of one unit of it; 0 where nothing shows.
-    allowed : largest size that physics allows, in the unit.
-    columns : that it goes by and that the recording has not.
-    alike : another effect that these set-ups hardly tell from it; empty where there is none.
+    ``effect``, ``title`` its name, and in words; ``standing`` ``drawn``; or why no case hides it; ``parameter``,
+    ``unit`` its first reported parameter; ``per_unit`` √λ of one unit of it; 0 where nothing shows; ``allowed`` largest
+    size that physics allows, in the unit; ``columns`` that it goes by and that the recording has not; ``alike`` another
+    effect that these set-ups hardly tell from it; empty where there is none.
     """
 
     effect: str
@@ -102,12 +97,9 @@ def _alike(sight: Sensitivity, name: str) -> str:
 class FaultReach:
     """What the set-ups show of a fault of the artefact.
 
-    Parameters
-    ----------
-    what : one of :data:`~cmm_uq.laboratory.proving.unknown_causes.FAULTS`.
-    shows : whether it shows at a size that is reckoned with.
-    left : part of it that the nearest effect of the machine leaves, typically; 0 where nothing shows.
-    like : that effect.
+    ``what`` one of :data:`~cmm_uq.laboratory.proving.unknown_causes.FAULTS`; ``shows`` whether it shows at a size that
+    is reckoned with; ``left`` part of it that the nearest effect of the machine leaves, typically; 0 where nothing
+    shows; ``like`` that effect.
     """
 
     what: str

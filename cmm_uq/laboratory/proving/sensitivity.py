@@ -35,12 +35,9 @@ _SHAPES = 6
 class Sensitivity:
     """What observations show under one noise.
 
-    Parameters
-    ----------
-    model, values : what the job names, and its parameters (k,).
-    white : makes columns (m, b) of the observations white.
-    sigma : standard deviation of what is white, mm.
-    taken : (m, r) orthonormal, what the job names takes of white columns.
+    ``model``, ``values`` what the job names, and its parameters (k,); ``white`` makes columns (m, b) of the
+    observations white; ``sigma`` standard deviation of what is white, mm; ``taken`` (m, r) orthonormal, what the job
+    names takes of white columns.
     """
 
     model: MeasurementModel

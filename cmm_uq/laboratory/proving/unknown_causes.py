@@ -48,13 +48,10 @@ class ForeignEffect(Effect):
 class FunctionForm:
     """A function that no effect has.
 
-    Parameters
-    ----------
-    what : one of :data:`FUNCTIONS`.
-    over, along : axis whose reading it is a function of, and along which it displaces points.
-    low, high : readings, mm, between which that axis was read; of a jump, times in s.
-    at, width : where it is and how wide, on a scale from −1 to 1; of a wave its phase, and its half turns.
-    measurement : the set-up that a load stands on.
+    ``what`` one of :data:`FUNCTIONS`; ``over``, ``along`` axis whose reading it is a function of, and along which it
+    displaces points; ``low``, ``high`` readings, mm, between which that axis was read; of a jump, times in s; ``at``,
+    ``width`` where it is and how wide, on a scale from −1 to 1; of a wave its phase, and its half turns;
+    ``measurement`` the set-up that a load stands on.
     """
 
     what: str
@@ -104,7 +101,6 @@ class FormEffect(ForeignEffect):
         self.form = form
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return self.form.displacement(points)
 
 
@@ -116,7 +112,6 @@ class PointwiseEffect(ForeignEffect):
         self.displacement_of_rows = displacement
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return self.displacement_of_rows
 
 
@@ -147,15 +142,10 @@ def possible_faults(model: MeasurementModel) -> Iterator[str]:
 
 def artefact_fault(
     model: MeasurementModel, values: Floats, what: str, cte_per_k: float, errors: Sequence[Sequence[float]] = ()
-) -> PointwiseEffect:  # fmt: skip
+) -> PointwiseEffect:
     """A fault of the artefact as an error of its points.
 
-    Parameters
-    ----------
-    model, values : with the artefact, and its parameters (k,).
-    what : one of :data:`FAULTS`.
-    cte_per_k : expansion of the artefact, of steel where it is 0.
-    errors : of every node along the axes of its frame, for ``nodes``.
+    ``model``, ``values`` with the artefact, and its parameters (k,).
     """
     xyz, points = model.placed(values), model.artefact.points
     if what == "length":

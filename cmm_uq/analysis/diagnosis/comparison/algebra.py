@@ -97,15 +97,10 @@ def eigen(blocks: Floats) -> tuple[Floats, Floats]:
 def woodbury(gain: Floats, seen: Floats) -> tuple[Floats, Floats] | None:
     """What columns explain beside others, from what they explain by themselves (Woodbury's identity).
 
-    Parameters
-    ----------
-    gain : (…, a, r) a²/(1 + a²λ) along each principal axis, of strength λ, for coefficients of standard deviation a.
-    seen : (…, r, 1 + g) what is seen along the axes of the data, and of rows of what is given (see ``Beside``).
-
-    Returns
-    -------
-    The sum of squares (…, a) that is explained, and what is given's part (…, a) of half the logarithm of the determinant.
-    ``None`` where digits would be lost, because what is given takes nearly all of the columns.
+    ``gain`` (…, a, r) a²/(1 + a²λ) along each principal axis, of strength λ, for coefficients of standard deviation a;
+    ``seen`` (…, r, 1 + g) what is seen along the axes of the data, and of rows of what is given (see ``Beside``). Gives
+    the sum of squares (…, a) that is explained, and what is given's part (…, a) of half the logarithm of the
+    determinant. ``None`` where digits would be lost, because what is given takes nearly all of the columns.
     """
     g = seen.shape[-1] - 1
     pairs = (seen[..., :, None] * seen[..., None, :]).reshape(*seen.shape[:-1], -1)
@@ -176,13 +171,8 @@ class Precision:
 
 
 def precisions(kinds: Sequence[NoiseKind], reached: Floats, certified: Floats) -> list[Precision]:
-    """Of each kind of noise.
-
-    Parameters
-    ----------
-    kinds : of noise.
-    reached : (m, q) orthonormal basis of what the baseline reaches.
-    certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
+    """``reached`` (m, q) orthonormal basis of what the baseline reaches; ``certified`` (m, c) what a certificate leaves
+    open, for one standard deviation, in units of the noise.
     """
     found = []
     for kind in kinds:

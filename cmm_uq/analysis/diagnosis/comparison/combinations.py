@@ -47,12 +47,9 @@ class Combination:
 class Combinations:
     """All combinations worth following.
 
-    Parameters
-    ----------
-    explanations : of which they are made.
-    found : by the indices of their explanations.
-    counts : probability, beforehand, of none, one, two … known effects that act by themselves.
-    imitated : nonparametric terms that leave next to nothing of an effect in this recording.
+    ``explanations`` of which they are made; ``found`` by the indices of their explanations; ``counts`` probability,
+    beforehand, of none, one, two … known effects that act by themselves; ``imitated`` nonparametric terms that leave
+    next to nothing of an effect in this recording.
     """
 
     explanations: Sequence[Explanation]
@@ -62,7 +59,6 @@ class Combinations:
 
     @cached_property
     def probability(self) -> dict[Key, float]:
-        """Of each combination."""
         log = np.array([c.log_posterior for c in self.found.values()])
         return dict(zip(self.found, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
 
@@ -137,14 +133,7 @@ class Combinations:
 def explore(
     comparison: CandidateComparison, before: Combinations | None = None, changed: Key = frozenset()
 ) -> Combinations:
-    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best.
-
-    Parameters
-    ----------
-    comparison : of all explanations.
-    before : what was found of the same ones, but for some that have other versions now.
-    changed : these.
-    """
+    """Follow the most probable combinations, level by level, then every exchange of one explanation of the best."""
     found = _explored(comparison, before, changed, _counts(comparison) if before is None else before.counts)
     # there may be more than were looked for; unknown functions may stand for several of them
     while len(found.counts) - 1 <= min(found.most_members, MOST - 2):

@@ -29,10 +29,7 @@ _ABSORBED = 1e-5
 class Version:
     """One version of an explanation at one size.
 
-    Parameters
-    ----------
-    explanation, member : which.
-    amplitude : standard deviation of its coefficients, in units of the noise.
+    ``explanation``, ``member`` which; ``amplitude`` standard deviation of its coefficients, in units of the noise.
     """
 
     explanation: int
@@ -107,11 +104,8 @@ def stack_members(
 ) -> tuple[Floats, tuple[MemberGroup, ...]]:
     """Columns (m, K) that the baseline leaves of all members, over the noise scale (m,), and their groups.
 
-    Parameters
-    ----------
-    rest : what the baseline leaves of columns (m, b).
-    least_noise : mm; with it the largest coefficients are as large as physics allows.
-    degrees_of_freedom : how many observations are left.
+    ``rest`` what the baseline leaves of columns (m, b); ``least_noise`` mm; with it the largest coefficients are as
+    large as physics allows.
     """
     found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
     whole = [
@@ -170,15 +164,10 @@ class ConditionedData:
 
     With Σ = N + C·Cᵀ and rows = root(1 + CᵀN⁻¹C)⁻¹·CᵀN⁻¹, any square root, Σ⁻¹ = N⁻¹ − rowsᵀ·rows.
 
-    Parameters
-    ----------
-    weighed : (k, m, b) N⁻¹·data.
-    rows : (k, g, m) of what is given.
-    seen : (k, g, b) rows·data.
-    squares : (k, b) dataᵀ·Σ⁻¹·data.
-    log : (k,) probability of the noise less that of its determinant.
-    made_of : of the recording's own data beside few columns, how ``seen_by`` follows from what the members that are given
-        are by themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
+    ``weighed`` (k, m, b) N⁻¹·data; ``rows`` (k, g, m) of what is given; ``seen`` (k, g, b) rows·data; ``squares`` (k,
+    b) dataᵀ·Σ⁻¹·data; ``log`` (k,) probability of the noise less that of its determinant; ``made_of`` of the
+    recording's own data beside few columns, how ``seen_by`` follows from what the members that are given are by
+    themselves, besides N⁻¹·data: a factor (k, r, b + g) of each.
     """
 
     weighed: Floats
@@ -206,11 +195,8 @@ class ConditionedData:
 class Conditioning:
     """Members that were given, and what is kept of them.
 
-    Parameters
-    ----------
-    stack : (m, K) columns of all members.
-    where : columns of the stack of each.
-    by_noise : precision times columns (m, b), by kind of noise (k, m, b).
+    ``stack`` (m, K) columns of all members; ``where`` columns of the stack of each; ``by_noise`` precision times
+    columns (m, b), by kind of noise (k, m, b).
     """
 
     stack: Floats
@@ -219,14 +205,11 @@ class Conditioning:
 
     def beside(
         self, given: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool
-    ) -> ConditionedData:  # fmt: skip
+    ) -> ConditionedData:
         """Data beside explanations at their sizes.
 
-        Parameters
-        ----------
-        plain, weighed : data (m, b), and (k, m, b) times the precision of each kind of noise.
-        log : (k,) of the noise.
-        own : whether the data are the recording's, so that inner products with them are kept.
+        ``plain``, ``weighed`` data (m, b), and (k, m, b) times the precision of each kind of noise; ``log`` (k,) of the
+        noise; ``own`` whether the data are the recording's, so that inner products with them are kept.
         """
         squares = np.einsum("mb,kmb->kb", plain, weighed)
         if not given:
@@ -254,10 +237,8 @@ class Conditioning:
         The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
         needs another length only; to what it leaves the others are added by Cholesky's factors.
 
-        Returns
-        -------
-        The versions in this order; the rows; as factors (k, g, r) of the members' weighed columns or principal axes; half
-        the logarithm (k,) of the determinant.
+        Gives the versions in this order; the rows; as factors (k, g, r) of the members' weighed columns or principal
+        axes; half the logarithm (k,) of the determinant.
         """
         order = list(given)
         widest = max(order, key=lambda version: self.columns(version).shape[1])

@@ -29,14 +29,8 @@ def draw_noise(
 ) -> Floats:  # fmt: skip
     """Noise (m, draws) of one kind, over the noise scale, a reading's standard deviation being one.
 
-    Parameters
-    ----------
-    kind : of noise.
-    random : source of the draws.
-    draws : how many.
-    noise_scale : (m,) of the observations.
-    standing : see :func:`order_and_side`.
-    wider : (m, draws) by how much each is wider than a normal one; see :func:`tail_widths`.
+    ``noise_scale`` (m,) of the observations; ``wider`` (m, draws) by how much each is wider than a normal one; see
+    :func:`tail_widths`.
     """
     order, side = standing
     white = np.empty((len(order), draws))
@@ -72,14 +66,8 @@ def _root(kind: NoiseKind, count: int) -> Floats:
 def order_and_side(left: Floats, reached: Floats) -> tuple[Ints, Floats]:
     """Order and side of the observations that follow from their values alone.
 
-    Parameters
-    ----------
-    left : (m,) what the baseline leaves of them.
-    reached : (m, q) orthonormal basis of what it reaches.
-
-    Returns
-    -------
-    (m,) indices by the size of what is left, equal ones by how much the baseline reaches of them; (m,) sign of what is left.
+    ``left`` (m,) what the baseline leaves of them; ``reached`` (m, q) orthonormal basis of what it reaches. Gives (m,)
+    indices by the size of what is left, equal ones by how much the baseline reaches of them; (m,) sign of what is left.
     """
     size = float(np.sqrt(np.mean(left**2))) or 1.0
     keys = (left / size, np.sum(reached**2, axis=1), np.abs(left) / size)

@@ -63,18 +63,13 @@ _BLOCK, _COLUMNS = 150_000, 500
 class CandidateComparison:
     """Explanations against "nothing is missing".
 
-    Parameters
-    ----------
-    observed : (m,) observations over their noise scale, mm.
-    baseline : (m, p) columns over their noise scale that may take any coefficient.
-    kinds : of noise.
-    sigma, log_sigma : (s,) grid of the noise, mm, and its log probability.
-    explanations : candidates; columns in mm.
-    noise_scale : (m,).
-    least_noise : mm, the least that the noise may be; with it the largest coefficients are as large as physics allows.
-    certified : (m, c) what a certificate leaves open, for one standard deviation, in units of the noise.
-    display : steps to which all coordinates are rounded, where they matter.
-    often_heavy : probability, beforehand, that recordings of which nothing is missing have heavy tails.
+    ``observed`` (m,) observations over their noise scale, mm; ``baseline`` (m, p) columns over their noise scale that
+    may take any coefficient; ``kinds`` of noise; ``sigma``, ``log_sigma`` (s,) grid of the noise, mm, and its log
+    probability; ``explanations`` candidates; columns in mm; ``noise_scale`` (m,); ``least_noise`` mm, the least that
+    the noise may be; with it the largest coefficients are as large as physics allows; ``certified`` (m, c) what a
+    certificate leaves open, for one standard deviation, in units of the noise; ``display`` steps to which all
+    coordinates are rounded, where they matter; ``often_heavy`` probability, beforehand, that recordings of which
+    nothing is missing have heavy tails.
     """
 
     observed: Floats
@@ -141,10 +136,7 @@ class CandidateComparison:
 
         Where the display's steps matter, coordinates are rounded as the recording's were.
 
-        Parameters
-        ----------
-        sigma : (draws,) of a reading, mm.
-        heavy : (draws,) which have heavy tails; none by default.
+        ``sigma`` (draws,) of a reading, mm; ``heavy`` (draws,) which have heavy tails; none by default.
         """
         fine = kind.unrounded if self.display else None
         # of a stream of its own: the others stay as they are
@@ -249,9 +241,7 @@ class CandidateComparison:
     def noise_posterior(self, left: Floats | None = None) -> Floats:
         """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline.
 
-        Parameters
-        ----------
-        left : (m,) of the observations, by default what the baseline leaves of them.
+        ``left`` (m,) of the observations, by default what the baseline leaves of them.
         """
         every = self.squares if left is None else self._by_noise(left[:, None])[:, :, 0] @ left
         log = np.stack([
@@ -289,18 +279,11 @@ class CandidateComparison:
         return probable_tails(own[enough] / np.sqrt(left[enough]), self.often_heavy)
 
     def log_evidence(
-        self,
-        left: Floats | None = None,
-        given: Sequence[Version] = (),
-        among: Container[int] | None = None,
+        self, left: Floats | None = None, given: Sequence[Version] = (), among: Container[int] | None = None
     ) -> tuple[Floats, Floats]:
         """Log evidence (b,) of what is given, and (c, b) of each explanation beside it.
 
-        Parameters
-        ----------
-        left : (m, b) data, by default the recording's.
-        given : explanations that it is conditional on.
-        among : explanations that are wanted, by default all; of others the evidence may be minus infinity.
+        ``left`` (m, b) data, by default the recording's.
         """
         known = self._beside(left, given)
         return self._of_given(known), self._total(known, among)
@@ -323,9 +306,7 @@ class CandidateComparison:
 
         It is nearly what a signal shows on average.
 
-        Parameters
-        ----------
-        noise : (m,) that counts by its size alone.
+        ``noise`` (m,) that counts by its size alone.
         """
         known = self._beside(signal, ())
         known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
@@ -346,9 +327,7 @@ class CandidateComparison:
         """What was found beside what: a search asks again for what it found when it looked for one more."""
         return {}
 
-    def _beside_each(
-        self, given: Sequence[Version], among: Collection[int] | None
-    ) -> dict[int, tuple[float, Version]]:  # fmt: skip
+    def _beside_each(self, given: Sequence[Version], among: Collection[int] | None) -> dict[int, tuple[float, Version]]:
         total = np.full(len(self.explanations), -np.inf)
         most, best = total.copy(), {}
         for group, cube in self.each(None, given, among):
@@ -428,7 +407,7 @@ class CandidateComparison:
                 these = slice(begin, begin + size)
                 total[these] = self._under(
                     known, some.amplitudes[these], blocks[:, part][:, these], seen[:, these], sizes
-                )  # fmt: skip
+                )
             yield some, total
 
     def _seen(self, known: ConditionedData, group: MemberGroup, *, kept: bool) -> Floats:
@@ -472,11 +451,8 @@ class CandidateComparison:
     def _under(self, known: ConditionedData, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
         """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
 
-        Parameters
-        ----------
-        amplitudes : (M, a) to try.
-        blocks : (k, M, r, r) their inner products.
-        seen : (k, M, r, b + g) theirs with the data and with what is given.
+        ``amplitudes`` (M, a) to try; ``blocks`` (k, M, r, r) their inner products; ``seen`` (k, M, r, b + g) theirs
+        with the data and with what is given.
         """
         b = known.squares.shape[1]
         shown, hidden = seen[..., :b], seen[..., b:]
@@ -500,10 +476,8 @@ class CandidateComparison:
     def _integrated(self, squares: Floats, gain: Floats, square: Floats, constant: Floats) -> Floats:
         """Log evidence (k, M, a, b) over the noise.
 
-        Parameters
-        ----------
-        squares : (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along them.
-        constant : (k, M, a) to be added.
+        ``squares`` (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along
+        them; ``constant`` (k, M, a) to be added.
         """
         if squares.shape[1] == 1:
             explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None]

@@ -52,13 +52,9 @@ _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 class Member:
     """One version of an explanation.
 
-    Parameters
-    ----------
-    columns : (m, r) mm.
-    shape : nonlinear parameter that they belong to.
-    weight : how probable, among the versions.
-    values : (p, r) mm, a nonparametric function where its covariate is given, for one unit of each coefficient.
-    rough : whether an effect has another form here than its own, though the same mechanism.
+    ``columns`` (m, r) mm; ``shape`` nonlinear parameter that they belong to; ``weight`` how probable, among the
+    versions; ``values`` (p, r) mm, a nonparametric function where its covariate is given, for one unit of each
+    coefficient; ``rough`` whether an effect has another form here than its own, though the same mechanism.
     """
 
     columns: Floats
@@ -72,18 +68,12 @@ class Member:
 class Explanation:
     """A candidate.
 
-    Parameters
-    ----------
-    name : the effect's name; for a nonparametric term what it depends on.
-    kind : ``effect``, ``several`` (known effects at once) or ``unknown`` (a nonparametric term).
-    members : versions, as probable as their weights say.
-    covariate : (p,) what a nonparametric term depends on, of the points or of the observations.
-    covariate_name : its name in the recording.
-    term : of a nonparametric one that effects may be imitated by.
-    imitated_by : of an effect.
-    weight : how readily it is thought of, beside others of its kind.
-    effect : that it is, if it is one.
-    together : whether it is one of what a machine out of adjustment has, and long enough an artefact shows it.
+    ``name`` the effect's name; for a nonparametric term what it depends on; ``kind`` ``effect``, ``several`` (known
+    effects at once) or ``unknown`` (a nonparametric term); ``members`` versions, as probable as their weights say;
+    ``covariate`` (p,) what a nonparametric term depends on, of the points or of the observations; ``covariate_name``
+    its name in the recording; ``term`` of a nonparametric one that effects may be imitated by; ``imitated_by`` of an
+    effect; ``weight`` how readily it is thought of, beside others of its kind; ``effect`` that it is, if it is one;
+    ``together`` whether it is one of what a machine out of adjustment has, and long enough an artefact shows it.
     """
 
     name: Text
@@ -115,11 +105,7 @@ def effect_of(explanation: Explanation) -> Effect:
 def known_effects(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
     """Every effect of the catalogue that could act here and is not named in the model already.
 
-    Parameters
-    ----------
-    model : what is named, with its recording.
-    values : (k,) parameters about which it is linear.
-    named : effects to leave out.
+    ``values`` (k,) parameters about which it is linear.
     """
     points = model.artefact.points.at(model.where(values))
     found = []
@@ -239,9 +225,7 @@ def effects_together(singles: Sequence[Explanation]) -> list[Explanation]:
 
     It names none of them, but lets the lack-of-fit test see those that are visible together only.
     """
-    columns = [
-        e.members[0].columns for e in singles if not e.shaped and (e.effect is None or not e.effect.of_artefact)
-    ]  # fmt: skip
+    columns = [e.members[0].columns for e in singles if not e.shaped and (e.effect is None or not e.effect.of_artefact)]
     if len(columns) < 2:
         return []
     together = np.hstack(columns)

@@ -36,10 +36,7 @@ _LEAST = 0.05
 def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tuple[int, CandidateComparison]]:
     """Columns of data for which heavy tails matter, each with its own comparison under them.
 
-    Parameters
-    ----------
-    normal : the candidates under kinds of noise that are normal.
-    data : (m, b) mm, of which the baseline has been taken.
+    ``data`` (m, b) mm, of which the baseline has been taken.
     """
     often = normal.often_heavy
     evidence = normal.of_nothing(data)
@@ -104,12 +101,6 @@ def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None 
     """Probability, under nothing, of as much evidence for something.
 
     Also what is drawn under nothing: the statistic, and the largest log evidence of a nonparametric term.
-
-    Parameters
-    ----------
-    comparison : the candidates.
-    seed : of the draws.
-    alpha : false-alarm rate; a probability near it is found from more draws, and from odds under noise with heavy tails.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
     draws = comparison.nothing(random, DRAWS)
@@ -154,11 +145,7 @@ def statistic_of(comparison: CandidateComparison, data: Floats) -> tuple[Floats,
 def robust_statistic_of(normal: CandidateComparison, data: Floats, least: float) -> Floats:
     """Log odds (b,) as :func:`statistic_of` has them, the noise of each data having heavy tails as that is probable.
 
-    Parameters
-    ----------
-    normal : the candidates under kinds of noise that are normal.
-    data : (m', b) mm.
-    least : log odds under these up to which they stay as they are: tails mostly lower what outliers raised.
+    ``data`` (m', b) mm.
     """
     found, often = _Evidence.of(normal, data), normal.often_heavy
     high = np.flatnonzero(found.log_odds() > least)
@@ -175,13 +162,9 @@ def robust_statistic_of(normal: CandidateComparison, data: Floats, least: float)
 class _Evidence:
     """Log evidence of data (m, b).
 
-    Parameters
-    ----------
-    explanations : candidates.
-    nothing, something : (b,) of nothing, and (c, b) of each explanation.
-    single : known effects of which two are tried together.
-    lead : the best of them for each of the data; ``None`` where there are no two.
-    alone, both : (b,) of it, and (c, b) of each of them beside it.
+    ``explanations`` candidates; ``nothing``, ``something`` (b,) of nothing, and (c, b) of each explanation; ``single``
+    known effects of which two are tried together; ``lead`` the best of them for each of the data; ``None`` where there
+    are no two; ``alone``, ``both`` (b,) of it, and (c, b) of each of them beside it.
     """
 
     explanations: Sequence[Explanation]
@@ -193,9 +176,7 @@ class _Evidence:
     both: Floats
 
     @classmethod
-    def of(
-        cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None
-    ) -> _Evidence:  # fmt: skip
+    def of(cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None) -> _Evidence:
         """Of data (m', b), beside a leading effect or the best."""
         nothing, something = comparison.log_evidence(data)
         single = [

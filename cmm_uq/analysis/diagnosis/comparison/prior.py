@@ -47,15 +47,9 @@ def with_two_more(counts: tuple[float, ...]) -> tuple[float, ...]:
 class CombinationPrior:
     """Probability, beforehand, of every combination: of how many, and among as many by the product of their weights.
 
-    Parameters
-    ----------
-    explanations : of which combinations are made.
-    counts : probability of none, one, two … known effects that act by themselves.
-    visible : explanations of which a recording shows anything; all by default.
-
-    Attributes
-    ----------
-    machine : scales and squarenesses that may belong together: those that are seen, where the job names none.
+    ``explanations`` of which combinations are made; ``counts`` probability of none, one, two … known effects that act
+    by themselves; ``visible`` explanations of which a recording shows anything; all by default. ``machine`` scales and
+    squarenesses that may belong together: those that are seen, where the job names none.
     """
 
     def __init__(
@@ -83,13 +77,7 @@ class CombinationPrior:
         )
 
     def log(self, key: Iterable[int], *, alike: bool = False) -> float:
-        """Logarithm of the probability; minus infinity for a combination that is not considered.
-
-        Parameters
-        ----------
-        alike : whether those of a machine out of adjustment are of one order of magnitude. Sizes of single effects are spread
-            evenly over the logarithm of what is possible; of these the first is, and the others lie about it.
-        """
+        """Logarithm of the probability; minus infinity for a combination that is not considered."""
         effects, rest, machine, artefact, functions = 0, 0, 0, 0, 0
         of_effects = of_rest = of_functions = 0.0
         for i in key:
@@ -141,12 +129,7 @@ def _of_counts(weights: Sequence[float], counts: Sequence[float]) -> Floats:
 
 
 def _of_subsets(count: int, weight: float) -> Floats:
-    """Log probability (``count`` + 1,) of one set of none, one, two … of some effects that act as readily as one another.
-
-    Parameters
-    ----------
-    weight : how readily any of them is thought of, over that it follows from :data:`READILY` alone.
-    """
+    """Log probability (``count`` + 1,) of one set of none, one, two … of some effects that act as readily as one another."""
     a, b = READILY
     size = np.arange(count + 1)
     log = special.betaln(a + size, b + count - size) - special.betaln(a, b)

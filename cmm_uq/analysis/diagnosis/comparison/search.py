@@ -73,15 +73,10 @@ NOT_TOLD_APART = 0.02
 class ModelComparison:
     """The candidates that a model's misfit is compared with.
 
-    Parameters
-    ----------
-    model, values : what is explained so far, and its estimate.
-    comparison : candidates.
-    log_odds : (c,) log evidence of each over nothing.
-    probability : (c,) of each explanation, nothing included in the comparison.
-    p_value : of "nothing is missing".
-    null : (draws,) test statistic under nothing.
-    null_maximum : (draws,) largest log evidence of a nonparametric term over nothing, under nothing.
+    ``model``, ``values`` what is explained so far, and its estimate; ``comparison`` candidates; ``log_odds`` (c,) log
+    evidence of each over nothing; ``probability`` (c,) of each explanation, nothing included in the comparison;
+    ``p_value`` of "nothing is missing"; ``null`` (draws,) test statistic under nothing; ``null_maximum`` (draws,)
+    largest log evidence of a nonparametric term over nothing, under nothing.
     """
 
     model: MeasurementModel
@@ -103,17 +98,12 @@ class ModelComparison:
 class SearchResult:
     """What a search ends with.
 
-    Parameters
-    ----------
-    first : comparison before anything is found.
-    last : what is left after everything is, without candidates.
-    combinations : of explanations, with their probabilities; ``None`` where the lack-of-fit test does not reject.
-    chosen : indices, among the candidates, of the known effects that are found.
-    versions : of them, and of what is unknown besides, in the most probable combination.
-    model : the job's model with what was left out.
-    unexplained : probability that something unknown acts besides.
-    rough : of the effects found, those of which another form is more probable than their own.
-    stated : standard uncertainty of a coordinate, mm, as the job states it.
+    ``first`` comparison before anything is found; ``last`` what is left after everything is, without candidates;
+    ``combinations`` of explanations, with their probabilities; ``None`` where the lack-of-fit test does not reject;
+    ``chosen`` indices, among the candidates, of the known effects that are found; ``versions`` of them, and of what is
+    unknown besides, in the most probable combination; ``model`` the job's model with what was left out; ``unexplained``
+    probability that something unknown acts besides; ``rough`` of the effects found, those of which another form is more
+    probable than their own; ``stated`` standard uncertainty of a coordinate, mm, as the job states it.
     """
 
     first: ModelComparison
@@ -138,12 +128,7 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     Squarenesses that are found so large that the model bends are modelled, and everything is compared again about them: else
     what they leave out to first order would be taken for further effects.
 
-    Parameters
-    ----------
-    model : what the job names, with its recording.
-    stated : standard uncertainty of a coordinate, mm, as the job states it.
-    alpha : false-alarm rate.
-    seed : of the null distribution.
+    ``stated`` standard uncertainty of a coordinate, mm, as the job states it.
     """
     found = _search(model, stated, alpha, seed)
     for _ in range(_AGAIN):
@@ -214,12 +199,6 @@ def substitute(found: SearchResult, index: int, tried: Key) -> tuple[SearchResul
     """The same search with the next most probable in the place of an effect, and which that is; ``None`` where none may be.
 
     It is one that these data cannot tell from it, is probable enough to be named, and has with all such one half, as any.
-
-    Parameters
-    ----------
-    found : the search.
-    index : of the effect.
-    tried : effects that are none to be found.
     """
     combinations = found.combinations
     if combinations is None:
@@ -373,13 +352,7 @@ def rivals_of(combinations: Combinations, chosen: Key, index: int) -> Key:
 def model_comparison(
     model: MeasurementModel, stated: float | None, seed: int, alpha: float | None = None
 ) -> ModelComparison:
-    """Compare all candidates for what a model leaves.
-
-    Parameters
-    ----------
-    seed : of the null distribution.
-    alpha : false-alarm rate near which the p-value is found more closely.
-    """
+    """Compare all candidates for what a model leaves."""
     values = model.estimate().about
     singles = known_effects(model, values, tuple(effect.name for effect in model.effects))
     known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
