@@ -61,16 +61,10 @@ def period_modes(found: SearchResult, index: int) -> tuple[Mode, ...]:
     if not (effect.shape and effect.shape[0].period_along):
         return ()
     given = [v for v in found.versions if v.explanation != index]
-    log, before, shape = [np.zeros(0)], [np.zeros(0)], [np.zeros(0)]
-    for group, cube in found.first.comparison.each(None, given, (index,)):
-        own = group.explanation == index
-        log.append(special.logsumexp(cube[own, :, 0], axis=1))
-        before.append(group.weight[own])
-        shape.append(np.array([explanation.members[m].shape[0] for m in group.member[own]]))
-    evidence = np.concatenate(log)
-    total = evidence + np.concatenate(before)
+    member, evidence, before = found.first.comparison.of_versions(index, given)
+    total = evidence + before
     weight = np.exp(total - special.logsumexp(total))
-    frequency = even_scale(effect, np.concatenate(shape))
+    frequency = even_scale(effect, np.array([explanation.members[m].shape[0] for m in member]))
     likely = np.flatnonzero(weight > _LIKELY * weight.max())
     likely = likely[np.argsort(frequency[likely])]
     span = _span(found, effect.shape[0].period_along)
@@ -174,9 +168,8 @@ def _nodes(found: SearchResult, effect: Effect) -> Floats:
     comparison = found.first.comparison
     index = next(i for i in found.chosen if found.first.explanations[i].name == effect.name)
     given = [v for v in found.versions if v.explanation != index]
-    ((group, cube),) = comparison.each(None, given, (index,))
-    even = even_scale(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in group.member]))
-    evidence = special.logsumexp(cube[:, :, 0], axis=1)
+    member, evidence, _ = comparison.of_versions(index, given)
+    even = even_scale(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in member]))
     step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
     likely = even[evidence > evidence.max() - _IMPROBABLE]
     offsets = np.arange(-_FINER, _FINER + 1) / _FINER

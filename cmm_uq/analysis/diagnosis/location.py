@@ -195,14 +195,13 @@ class _Fit:
 def _jump(compared: ModelComparison, index: int, x: Floats, order: Ints) -> tuple[float, float]:
     """Range of the sorted covariate that holds a step with 95 % probability."""
     members = compared.explanations[index].members
-    evidence = np.full(len(members), -np.inf)
-    for group, cube in compared.comparison.each(None, (), (index,)):
-        if group.r == 1:
-            evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1)
+    member, evidence, _ = compared.comparison.of_versions(index)
+    steps = np.array([members[m].columns.shape[1] == 1 for m in member])
+    member, evidence = member[steps], evidence[steps]
     probability = np.exp(evidence - special.logsumexp(evidence))
     likely = np.argsort(-probability)
     likely = likely[: int(np.searchsorted(np.cumsum(probability[likely]), 0.95)) + 1]
-    jumps = [int(np.flatnonzero(np.diff(members[m].values[order, 0]))[0]) for m in likely]
+    jumps = [int(np.flatnonzero(np.diff(members[m].values[order, 0]))[0]) for m in member[likely]]
     return float(x[min(jumps)]), float(x[max(jumps) + 1])
 
 

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
+from cmm_uq.analysis.diagnosis.comparison.draws import draw_nothing
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, Explanation
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import DRAWS, statistic_of
@@ -220,7 +221,7 @@ class _Rule:
         """
         comparison = self.comparison
         random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))
-        draws = comparison.nothing(random, DRAWS)
+        draws = draw_nothing(comparison, random, DRAWS)
         found = []
         for larger in _LARGER:
             statistic = statistic_of(comparison, larger * draws)[0]

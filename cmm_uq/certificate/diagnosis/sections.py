@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -149,11 +149,8 @@ def _acting(one: DetectionChange, artefact: Artefact) -> Effect:
 
 
 def _amplitude(effect: Effect, size: float) -> Text:
-    parameter = effect.coefficients[0]
-    if size > ALLOWED:
-        return say("not found")
-    value = size * parameter.prior_sd
-    return say("{value}\u00a0{unit}", value=number(value, ".2g" if value < 100 else ".0f"), unit=parameter.unit)
+    first = effect.coefficients[0]
+    return say("not found") if size > ALLOWED else _size(size * first.prior_sd, first.unit)
 
 
 def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
@@ -180,12 +177,8 @@ def _shown_data(one: DetectionChange, effect: Effect) -> dict[str, Any]:
     before, after = (
         size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None for size in (one.before, one.after)
     )
-    return {
-        "effect": one.effect,
-        "parameter": effect.reported[0].name,
-        "detected_before": before,
-        "detected_after": after,
-    }
+    name = effect.reported[0].name
+    return {"effect": one.effect, "parameter": name, "detected_before": before, "detected_after": after}
 
 
 _SHOWN = 4
@@ -195,7 +188,7 @@ _SHOWN = 4
 def costs_section(found: Diagnosed) -> Section:
     """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
     title, rivals = say("What the choice of an explanation costs"), found.diagnosis.remaining.rivals
-    rows = (*_named(found), *_figures(found), *_decisions(found)) if rivals else ()
+    rows = tuple(_cost_rows(found)) if rivals else ()
     if not rows:  # as against a simulation, where no effect of the job takes part
         return Section(title, ())
     heads = (
@@ -254,33 +247,20 @@ def explanation(rival: Rival) -> Text:
     return commas(words) if words else say("nothing missing")
 
 
-def _named(found: Diagnosed) -> list[tuple[Text, ...]]:
-    remaining = found.diagnosis.remaining
-    return [
-        (
-            parameter_title(effect, name),
-            *(_size(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN]), _size(quantity), quantity.unit,
-        )
-        for effect, parameters in remaining.averaged.items() for name, quantity in parameters.items()
-    ]  # fmt: skip
-
-
-def _figures(found: Diagnosed) -> list[tuple[Text, ...]]:
-    costs = found.costs
+def _cost_rows(found: Diagnosed) -> Iterator[tuple[Text, ...]]:
+    """Of what the job names, of every figure and of every decision: under each explanation, and averaged."""
+    remaining, costs = found.diagnosis.remaining, found.costs
+    for effect, parameters in remaining.averaged.items():
+        for name, quantity in parameters.items():
+            each = (with_uncertainty(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN])
+            yield (parameter_title(effect, name), *each, with_uncertainty(quantity), quantity.unit)
     if costs is None:
-        return []
-    return [
-        (TITLES[name], *(_size(cost.figures[name]) for cost in costs.each[:_SHOWN]), _size(quantity), UNITS[name])
-        for name, quantity in costs.figures.items()
-    ]
-
-
-def _decisions(found: Diagnosed) -> list[tuple[Text, ...]]:
-    costs = found.costs
-    if costs is None:
-        return []
-    return [
-        (
+        return
+    for name, quantity in costs.figures.items():
+        each = (with_uncertainty(cost.figures[name]) for cost in costs.each[:_SHOWN])
+        yield (TITLES[name], *each, with_uncertainty(quantity), UNITS[name])
+    for i, first in enumerate(costs.each[0].statements):
+        yield (
             say("{standard}, {quantity}", standard=Verbatim(first.facts.standard), quantity=first.quantity),
             *(OUTCOME_WORDS[cost.statements[i].outcome] for cost in costs.each[:_SHOWN]),
             commas(
@@ -289,12 +269,6 @@ def _decisions(found: Diagnosed) -> list[tuple[Text, ...]]:
             ),
             NOTHING,
         )
-        for i, first in enumerate(costs.each[0].statements)
-    ]
-
-
-def _size(quantity: Quantity) -> Text:
-    return with_uncertainty(quantity)
 
 
 def _data(named: EffectParameters) -> dict[str, Any]:
@@ -320,17 +294,17 @@ def without_power(found: Diagnosed) -> Text:
     if not blind:
         return NOTHING
     words = [
-        say("{title:small} up to {size}", title=row.title, size=_size_of_unseen(_invisible(row), row.unit))
+        say(
+            "{title:small} up to {size}",
+            title=row.title,
+            size=_size(min(row.detected or row.allowed, row.allowed), row.unit),
+        )
         for row in blind
     ]
     more = len(words) - _NAMED
     if more > 1:
         words = [*words[:_NAMED], say("{more} more", more=more)]
     return say("But this recording could not have shown: {effects}.", effects=listed(words))
-
-
-def _invisible(row: SmallestEffect) -> float:
-    return row.allowed if row.detected is None else min(row.detected, row.allowed)
 
 
 def unseen_section(found: Diagnosed) -> Section:
@@ -340,7 +314,7 @@ def unseen_section(found: Diagnosed) -> Section:
             row.title,
             _found(row, row.detected),
             _found(row, row.named),
-            _size_of_unseen(row.allowed, row.unit),
+            _size(row.allowed, row.unit),
             _why(row),
         )
         for row in found.unseen
@@ -369,10 +343,10 @@ def unseen_section(found: Diagnosed) -> Section:
 
 
 def _found(row: SmallestEffect, size: float | None) -> Text:
-    return say("not found") if size is None or size > row.allowed else _size_of_unseen(size, row.unit)
+    return say("not found") if size is None or size > row.allowed else _size(size, row.unit)
 
 
-def _size_of_unseen(value: float, unit: Unit) -> Text:
+def _size(value: float, unit: Unit) -> Text:
     return say("{value}\u00a0{unit}", value=number(value, ".2g" if value < 100 else ".0f"), unit=unit)
 
 
@@ -381,18 +355,14 @@ def _why(row: SmallestEffect) -> Text:
     if row.share == 0 and not row.taken_up:
         said.append(say("moves nothing that is observed here"))
     elif row.taken_up and row.share < 1e-3:
-        said.append(say("taken up by {effects}", effects=listed(_titles(row.taken_up))))
+        said.append(say("taken up by {effects}", effects=listed([*map(_taker, row.taken_up)])))
     elif row.taken_up:
-        said.append(say("mostly taken up by {effects}", effects=listed(_titles(row.taken_up))))
+        said.append(say("mostly taken up by {effects}", effects=listed([*map(_taker, row.taken_up)])))
     if row.detected is not None and row.detected > row.allowed and row.detected < 100 * row.allowed:
-        said.append(say("it would take {size}", size=_size_of_unseen(row.detected, row.unit)))
+        said.append(say("it would take {size}", size=_size(row.detected, row.unit)))
     if row.periods is not None:
         said.append(_periods(row.periods, row))
     return commas(said) if said else DASH
-
-
-def _titles(owners: Sequence[str]) -> list[Text]:
-    return [_taker(name) for name in owners]
 
 
 def _taker(name: str) -> Text:
@@ -409,7 +379,7 @@ def _periods(periods: PeriodRange, row: SmallestEffect) -> Text:
     every_one = say("{low:.3g} to {high:.3g}\u00a0{unit}", low=periods.low, high=periods.high, unit=periods.unit)
     if periods.worst is None:
         return say("none of {every_one} resolved by these positions", every_one=every_one)
-    worst = say("{every_one}, at worst {size}", every_one=every_one, size=_size_of_unseen(periods.worst, row.unit))
+    worst = say("{every_one}, at worst {size}", every_one=every_one, size=_size(periods.worst, row.unit))
     if not periods.unresolved:
         return worst
     ranges = [
@@ -428,14 +398,10 @@ def unseen_data(rows: Sequence[SmallestEffect]) -> list[dict[str, Any]]:
             "effect": row.effect, "parameter": row.parameter, "detected": row.detected, "named": row.named,
             "allowed": row.allowed, "shown": row.shown, "share": row.share,
             "taken_up_by": [name for name in row.taken_up if name != PLACES],
-            **({} if row.periods is None else {"periods": _periods_data(row.periods)}),
+            **({} if row.periods is None else {"periods": {
+                "parameter": row.periods.parameter, "low": row.periods.low, "high": row.periods.high,
+                "worst": row.periods.worst, "unresolved": [list(each) for each in row.periods.unresolved],
+            }}),
         }
         for row in rows
     ]  # fmt: skip
-
-
-def _periods_data(periods: PeriodRange) -> dict[str, Any]:
-    return {
-        "parameter": periods.parameter, "low": periods.low, "high": periods.high, "worst": periods.worst,
-        "unresolved": [list(each) for each in periods.unresolved],
-    }  # fmt: skip

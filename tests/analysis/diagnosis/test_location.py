@@ -67,11 +67,10 @@ def compared(
     def rest(columns: Floats) -> Floats:
         return columns - columns.mean(axis=0) if without_mean else columns
 
-    def each(*_: object) -> Any:
+    def of_versions(*_: object) -> tuple[Any, Floats, Floats]:
         count = len(terms[0].members)
-        cube = np.log(np.ones(count) if evidence is None else 1e3 * evidence)[:, None, None]
-        yield SimpleNamespace(r=1, member=np.arange(count)), cube
-        yield SimpleNamespace(r=2, member=np.arange(count)), cube[::-1]
+        log = np.log(np.ones(count) if evidence is None else 1e3 * evidence)
+        return np.arange(count), log, np.zeros(count)
 
     def weighed(given: Any, among: Any) -> Any:
         kept = (beside or {}).get(given[-1].explanation, {}) if given else {}
@@ -80,7 +79,7 @@ def compared(
         }
 
     comparison = SimpleNamespace(
-        noise_scale=np.full(12, 2.0), rest=rest, left=rest(data), least_noise=LEAST, each=each,
+        noise_scale=np.full(12, 2.0), rest=rest, left=rest(data), least_noise=LEAST, of_versions=of_versions,
         degrees_of_freedom=12 - without_mean,
         beside=weighed, log_evidence_of=lambda given: np.array([7.0]),
     )  # fmt: skip

@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import sparse, special
 
 from cmm_uq.analysis.diagnosis.noise import NoiseKind
 from cmm_uq.base.points import Floats
 
 _LEAST_PIVOT = 1e-3
 """Of a factor of one less what is taken: six digits of sixteen are lost there."""
+
+_LARGEST_EXPONENT = 600.0
+"""Of a factor that says how little something counts."""
 
 _LEAST_BASE = 1e-300
 """Of a sum of squares that rounding took below it."""
@@ -133,6 +136,70 @@ def squared(rows: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
+class SigmaIntegral:
+    """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ: in closed form if ln σ is uniform, else from a table.
+
+    ``sigma``, ``log_sigma`` (s,) grid, mm, and its log probability; ``degrees`` m'; ``square`` typical of the squares, mm².
+    """
+
+    sigma: Floats
+    log_sigma: Floats
+    degrees: int
+    square: float
+
+    def __call__(self, squares: Floats) -> Floats:
+        """Of the shape of the squares, which are overwritten."""
+        np.maximum(squares, 1e-300, out=squares)
+        np.log(squares, out=squares)
+        if self.table is not None:
+            return interpolated(squares, *self.table)
+        squares *= -0.5 * self.degrees
+        squares += self.uniform
+        return squares
+
+    def beside(self, squares: Floats, gain: Floats, square: Floats, constant: Floats, *, sizes: bool) -> Floats:
+        """Log evidence (M, a, b) of members at every size, or (M, b) of all sizes together, summed over kinds of noise.
+
+        ``squares`` (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along
+        them; ``constant`` (k, M, a) to be added. In closed form constants are factors of the squares, which are few
+        ahead of many data.
+        """
+        axes: int | tuple[int, ...] = 0 if sizes else (0, 2)
+        if squares.shape[1] == 1:
+            explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None]
+            return log_sum_in(self(squares[:, None, None, :] - explained) + constant[..., None], axes)
+        every = np.broadcast_to(squares[:, None, None, :], (*square.shape[:2], 1, squares.shape[1]))
+        whole = np.concatenate([square, every], axis=2)
+        if self.table is not None or not self.degrees:
+            left = np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ whole
+            return log_sum_in(self(left) + constant[..., None], axes)
+        half, most = 0.5 * self.degrees, float(constant.max())
+        factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
+        left = np.concatenate([-factor * gain, factor], axis=3) @ whole
+        if not sizes:
+            return log_sum_of_powers(left, self.degrees, axes) + (most + self.uniform)
+        # of versions that nothing parts the last digit chooses one: it stays the one that logarithms give
+        np.log(np.maximum(left, 1e-300, out=left), out=left)
+        left *= -half
+        return log_sum_in(left, 0) + (most + self.uniform)
+
+    @cached_property
+    def uniform(self) -> float:
+        """Constant of the gamma integral over a uniform ln σ."""
+        half, step = 0.5 * self.degrees, float(np.log(self.sigma[1] / self.sigma[0]))
+        return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
+
+    @cached_property
+    def table(self) -> tuple[Floats, Floats] | None:
+        """Logarithms of squares and of the integrals over them; none where these have a closed form."""
+        if np.ptp(self.log_sigma) == 0:
+            return None
+        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(self.square, 1e-300))
+        exponent = self.log_sigma - self.degrees * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
+        return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
 class Precision:
     """Of one kind of noise, what the baseline reaches projected out.
 
@@ -171,8 +238,9 @@ class Precision:
 
 
 def precisions(kinds: Sequence[NoiseKind], reached: Floats, certified: Floats) -> list[Precision]:
-    """``reached`` (m, q) orthonormal basis of what the baseline reaches; ``certified`` (m, c) what a certificate leaves
-    open, for one standard deviation, in units of the noise.
+    """Of each kind of noise, where the baseline reaches ``reached`` (m, q), orthonormal.
+
+    ``certified`` (m, c) is what a certificate leaves open, for one standard deviation, in units of the noise.
     """
     found = []
     for kind in kinds:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from cmm_uq.analysis.diagnosis.noise import NoiseKind
+from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
+from cmm_uq.analysis.diagnosis.noise import NoiseKind, probable_tails
 from cmm_uq.base.points import Floats, Ints
 
 _ORTHOGONAL = 1e-9
@@ -21,6 +22,65 @@ DEGREES = (3.0, 4.0)
 
 _DIGITS = 7
 """Of what is left, over its root mean square, that rounding spares."""
+
+
+_LEAST_LEFT = 0.1
+"""Part of a residual's variance that the fit must leave for it to tell of tails."""
+
+
+def draw_nothing(comparison: CandidateComparison, random: np.random.Generator, draws: int) -> Floats:
+    """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior.
+
+    A few readings do not tell whether their noise is normal; so many draws have heavy tails as that is probable.
+    """
+    weight = comparison.noise_posterior()
+    chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
+    kind, size = np.unravel_index(chosen, weight.shape)
+    uniform = random.spawn(1)[0].random(draws)
+    drawn = np.empty((len(comparison.left), draws))
+    for g in np.unique(kind):
+        columns = np.flatnonzero(kind == g)
+        heavy = uniform[columns] < probability_of_tails(comparison, comparison.kinds[g])
+        drawn[:, columns] = left_of_noise(
+            comparison, comparison.kinds[g], random, comparison.sigma[size[columns]], heavy
+        )
+    return drawn
+
+
+def probability_of_tails(comparison: CandidateComparison, kind: NoiseKind) -> float:
+    """Probability of heavy tails beside what a kind of noise is otherwise."""
+    if kind.name == "tails":
+        return 0.0
+    reached = np.linalg.qr(kind.white(comparison.reached))[0]
+    own = kind.white(comparison.left[:, None])[:, 0]
+    own -= reached @ (reached.T @ own)
+    left = 1 - np.sum(reached**2, axis=1)
+    enough = left > _LEAST_LEFT
+    return probable_tails(own[enough] / np.sqrt(left[enough]), comparison.often_heavy)
+
+
+def left_of_noise(
+    comparison: CandidateComparison,
+    kind: NoiseKind,
+    random: np.random.Generator,
+    sigma: Floats,
+    heavy: NDArray[np.bool_] | None = None,
+) -> Floats:
+    """What the baseline leaves (m, draws), mm, of noise of one kind and sizes (draws,), in heavy tails where these are.
+
+    Where the display's steps matter, coordinates are rounded as the recording's were.
+    """
+    fine = kind.unrounded if comparison.display else None
+    # of a stream of its own: the others stay as they are
+    wider = None if heavy is None else tail_widths(random.spawn(1)[0], heavy, len(comparison.left))
+    standing = order_and_side(comparison.left, comparison.reached)
+    drawn = draw_noise(fine or kind, random, len(sigma), comparison.noise_scale, standing, wider)
+    if comparison.certified.size:
+        drawn += comparison.certified @ random.standard_normal((comparison.certified.shape[1], len(sigma)))
+    if not (comparison.display and fine):
+        return sigma * comparison.rest(drawn)
+    drawn, scale = sigma * drawn, comparison.noise_scale[:, None]
+    return comparison.rest(drawn + comparison.display.rounded(scale * drawn) / scale)
 
 
 def draw_noise(

@@ -15,16 +15,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, special
 
 from cmm_uq.analysis.diagnosis.comparison.algebra import (
     Precision,
+    SigmaIntegral,
     eigen,
-    interpolated,
     log_sum,
     log_sum_in,
-    log_sum_of_powers,
     precisions,
     squared,
     woodbury,
@@ -37,20 +35,13 @@ from cmm_uq.analysis.diagnosis.comparison.conditional import (
     Version,
     stack_members,
 )
-from cmm_uq.analysis.diagnosis.comparison.draws import draw_noise, order_and_side, tail_widths
 from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
-from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind, probable_tails
+from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.display import Display
 
 _KEPT = 8_000_000
 """Numbers that are kept of what follows from what was given last."""
-
-_LEAST_LEFT = 0.1
-"""Part of a residual's variance that the fit must leave for it to tell of tails."""
-
-_LARGEST_EXPONENT = 600.0
-"""Of a factor that says how little something counts."""
 
 _CORRECTED = 3
 """Columns of a member, over those of what is given, from which on its own principal axes are corrected for that."""
@@ -83,9 +74,12 @@ class CandidateComparison:
     certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     display: Display | None = None
     often_heavy: float = OFTEN
+    _axes: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False)
+    _best: dict[frozenset[Version], dict[int, tuple[float, Version]]] = field(default_factory=dict, init=False)
+    _weighed: dict[frozenset[Version], ConditionedData] = field(default_factory=dict, init=False)
 
     @cached_property
-    def _reached(self) -> Floats:
+    def reached(self) -> Floats:
         """(m, m − m') orthonormal basis of what the baseline reaches."""
         if not self.baseline.shape[1]:
             return np.zeros((len(self.observed), 0))
@@ -95,21 +89,17 @@ class CandidateComparison:
 
     def rest(self, columns: Floats) -> Floats:
         """What the baseline leaves of columns (m, b)."""
-        return columns - self._reached @ (self._reached.T @ columns)
+        return columns - self.reached @ (self.reached.T @ columns)
 
     @cached_property
     def left(self) -> Floats:
         """(m,) what the baseline leaves of the observations."""
         return self.rest(self.observed[:, None])[:, 0]
 
-    @cached_property
-    def _standing(self) -> tuple[Ints, Floats]:
-        return order_and_side(self.left, self._reached)
-
     @property
     def degrees_of_freedom(self) -> int:
         """m', how many observations that is worth."""
-        return int(len(self.observed) - self._reached.shape[1])
+        return int(len(self.observed) - self.reached.shape[1])
 
     @cached_property
     def _stack(self) -> tuple[Floats, tuple[MemberGroup, ...]]:
@@ -129,29 +119,9 @@ class CandidateComparison:
         """Explanations of which the baseline leaves anything."""
         return frozenset(i for i, _ in self._where)
 
-    def noise(
-        self, kind: NoiseKind, random: np.random.Generator, sigma: Floats, heavy: NDArray[np.bool_] | None = None
-    ) -> Floats:
-        """What the baseline leaves (m, draws), mm, of noise of one kind.
-
-        Where the display's steps matter, coordinates are rounded as the recording's were.
-
-        ``sigma`` (draws,) of a reading, mm; ``heavy`` (draws,) which have heavy tails; none by default.
-        """
-        fine = kind.unrounded if self.display else None
-        # of a stream of its own: the others stay as they are
-        wider = None if heavy is None else tail_widths(random.spawn(1)[0], heavy, len(self.left))
-        found = draw_noise(fine or kind, random, len(sigma), self.noise_scale, self._standing, wider)
-        if self.certified.size:
-            found += self.certified @ random.standard_normal((self.certified.shape[1], len(sigma)))
-        if not (self.display and fine):
-            return sigma * self.rest(found)
-        found, scale = sigma * found, self.noise_scale[:, None]
-        return self.rest(found + self.display.rounded(scale * found) / scale)
-
     @cached_property
     def _noises(self) -> list[Precision]:
-        return precisions(self.kinds, self._reached, self.certified)
+        return precisions(self.kinds, self.reached, self.certified)
 
     @cached_property
     def _blocks(self) -> list[Floats]:
@@ -183,41 +153,14 @@ class CandidateComparison:
         """Sum of squares (k,) of what the baseline leaves, mm², whitened by each kind of noise."""
         return np.asarray(self._left_weighed[:, :, 0] @ self.left, dtype=np.float64)
 
-    def over_sigma(self, squares: Floats) -> Floats:
-        """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ, same shape: in closed form if ln σ is uniform, else from a table."""
-        return self._over_sigma(squares.copy())
-
-    def _over_sigma(self, squares: Floats) -> Floats:
-        """The same, in the place of the squares where that is possible."""
-        np.maximum(squares, 1e-300, out=squares)
-        np.log(squares, out=squares)
-        if self._table is not None:
-            return interpolated(squares, *self._table)
-        squares *= -0.5 * self.degrees_of_freedom
-        squares += self._uniform
-        return squares
-
     @cached_property
-    def _uniform(self) -> float:
-        """Constant of the gamma integral over a uniform ln σ."""
-        half, step = 0.5 * self.degrees_of_freedom, float(np.log(self.sigma[1] / self.sigma[0]))
-        return float(special.gammaln(half) + (half - 1) * np.log(2) + self.log_sigma[0] - np.log(step))
-
-    @cached_property
-    def _table(self) -> tuple[Floats, Floats] | None:
-        """Logarithms of squares and of the integrals over them; none where these have a closed form."""
-        if np.ptp(self.log_sigma) == 0:
-            return None
-        nodes = np.linspace(-16.0, 8.0, 1500) + np.log(max(float(self.left @ self.left), 1e-300))
-        exponent = (
-            self.log_sigma - self.degrees_of_freedom * np.log(self.sigma) - 0.5 * np.exp(nodes)[:, None] / self.sigma**2
-        )
-        return nodes, np.asarray(special.logsumexp(exponent, axis=1), dtype=np.float64)
+    def _integral(self) -> SigmaIntegral:
+        return SigmaIntegral(self.sigma, self.log_sigma, self.degrees_of_freedom, float(self.left @ self.left))
 
     def of_nothing(self, data: Floats) -> Floats:
         """Log evidence (k, b) of nothing beyond the baseline, by kind of noise, for data (m, b)."""
         known = self._weigh(data, ())
-        return np.asarray(self.over_sigma(known.squares) + known.log[:, None], dtype=np.float64)
+        return np.asarray(self._integral(known.squares.copy()) + known.log[:, None], dtype=np.float64)
 
     def precision(self, kind: int) -> Precision:
         """Of a kind of noise, by its index."""
@@ -234,7 +177,7 @@ class CandidateComparison:
     def under(self, kinds: Sequence[NoiseKind], left: Floats) -> CandidateComparison:
         """The same candidates for what the baseline leaves (m,) of other observations, under other kinds of noise."""
         found = replace(self, observed=left, kinds=kinds)
-        shared = {name: getattr(self, name) for name in ("_reached", "_stack", "_where", "_table", "visible")}
+        shared = {name: getattr(self, name) for name in ("reached", "_stack", "_where", "_integral", "visible")}
         found.__dict__.update(shared, left=left)  # what none of the two changes
         return found
 
@@ -250,33 +193,6 @@ class CandidateComparison:
             for noise, squares in zip(self._noises, every, strict=True)
         ])  # fmt: skip
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
-
-    def nothing(self, random: np.random.Generator, draws: int) -> Floats:
-        """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior.
-
-        A few readings do not tell whether their noise is normal; so many draws have heavy tails as that is probable.
-        """
-        weight = self.noise_posterior()
-        chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
-        kind, size = np.unravel_index(chosen, weight.shape)
-        uniform = random.spawn(1)[0].random(draws)
-        found = np.empty((len(self.left), draws))
-        for g in np.unique(kind):
-            columns = np.flatnonzero(kind == g)
-            heavy = uniform[columns] < self.heavy_tails(self.kinds[g])
-            found[:, columns] = self.noise(self.kinds[g], random, self.sigma[size[columns]], heavy)
-        return found
-
-    def heavy_tails(self, kind: NoiseKind) -> float:
-        """Probability of heavy tails beside what a kind of noise is otherwise."""
-        if kind.name == "tails":
-            return 0.0
-        reached = np.linalg.qr(kind.white(self._reached))[0]
-        own = kind.white(self.left[:, None])[:, 0]
-        own -= reached @ (reached.T @ own)
-        left = 1 - np.sum(reached**2, axis=1)
-        enough = left > _LEAST_LEFT
-        return probable_tails(own[enough] / np.sqrt(left[enough]), self.often_heavy)
 
     def log_evidence(
         self, left: Floats | None = None, given: Sequence[Version] = (), among: Container[int] | None = None
@@ -297,6 +213,20 @@ class CandidateComparison:
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return total
 
+    def of_versions(self, index: int, given: Sequence[Version] = ()) -> tuple[Ints, Floats, Floats]:
+        """Visible versions (v,) of an explanation, log evidence of each beside what is given, and its log weight.
+
+        Their sizes are summed.
+        """
+        found = [
+            (group.member, special.logsumexp(cube[:, :, 0], axis=1), group.weight)
+            for group, cube in self.each(None, given, (index,))
+        ]
+        if not found:
+            return np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
+        member, evidence, weight = (np.concatenate(each) for each in zip(*found, strict=True))
+        return member, evidence, weight
+
     def lengths(self, columns: Floats) -> Floats:
         """Sum of squares (k, b) of columns (m, b), of which the baseline has been taken, whitened by each kind of noise."""
         return np.asarray(np.einsum("mb,kmb->kb", columns, self._by_noise(columns)))
@@ -316,16 +246,11 @@ class CandidateComparison:
         self, given: Sequence[Version] = (), among: Collection[int] | None = None
     ) -> dict[int, tuple[float, Version]]:
         """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
-        known = self._found.setdefault(frozenset(given), {})
+        known = self._best.setdefault(frozenset(given), {})
         if among is None or not known.keys() >= set(among):
             found = self._beside_each(given, among)
             known.update(found if among is None else {i: found[i] for i in found.keys() & set(among)})
         return known
-
-    @cached_property
-    def _found(self) -> dict[frozenset[Version], dict[int, tuple[float, Version]]]:
-        """What was found beside what: a search asks again for what it found when it looked for one more."""
-        return {}
 
     def _beside_each(self, given: Sequence[Version], among: Collection[int] | None) -> dict[int, tuple[float, Version]]:
         total = np.full(len(self.explanations), -np.inf)
@@ -371,12 +296,12 @@ class CandidateComparison:
 
     def _of_given(self, known: ConditionedData) -> Floats:
         """Log evidence (b,) of what data are beside."""
-        return log_sum(self.over_sigma(known.squares) + known.log[:, None], 0)
+        return log_sum(self._integral(known.squares.copy()) + known.log[:, None], 0)
 
     def noise_probability(self, given: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
         known = self._beside(None, given)
-        log = self.over_sigma(known.squares)[:, 0] + known.log
+        log = self._integral(known.squares.copy())[:, 0] + known.log
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def each(
@@ -444,7 +369,7 @@ class CandidateComparison:
         if gains is None:
             return None
         explained, log = gains
-        found = self._over_sigma(known.squares[:, None, None, 0] - explained)
+        found = self._integral(known.squares[:, None, None, 0] - explained)
         found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
         return log_sum_in(found, 0)[..., None]
 
@@ -467,53 +392,14 @@ class CandidateComparison:
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
         gain, square = variance / (1 + ratio), shown**2
         constant = known.log[:, None, None] - 0.5 * np.einsum("kmar->kma", np.log1p(ratio))
-        if b > 1 and self._table is None and self.degrees_of_freedom:
-            log = self._of_many(known.squares, gain, square, constant, sizes)
-        else:
-            log = log_sum_in(self._integrated(known.squares, gain, square, constant), 0 if sizes else (0, 2))
+        log = self._integral.beside(known.squares, gain, square, constant, sizes=sizes)
         return log.reshape(len(amplitudes), -1, b)
-
-    def _integrated(self, squares: Floats, gain: Floats, square: Floats, constant: Floats) -> Floats:
-        """Log evidence (k, M, a, b) over the noise.
-
-        ``squares`` (k, b) of the data; members with gains (k, M, a, r) explain of them the squares (k, M, r, b) along
-        them; ``constant`` (k, M, a) to be added.
-        """
-        if squares.shape[1] == 1:
-            explained = np.einsum("kmar,kmr->kma", gain, square[..., 0])[..., None]
-            found = self._over_sigma(squares[:, None, None, :] - explained)
-        else:
-            found = self._over_sigma(
-                np.concatenate([-gain, np.ones_like(gain[..., :1])], axis=3) @ _with(squares, square)
-            )
-        found += constant[..., None]
-        return found
-
-    def _of_many(self, squares: Floats, gain: Floats, square: Floats, constant: Floats, sizes: bool) -> Floats:
-        """Logarithm of sums over the kinds, or the sizes too, of what :meth:`_integrated` has the logarithms of; closed form.
-
-        Constants are factors of the squares, which are few ahead of many data.
-        """
-        half, most = 0.5 * self.degrees_of_freedom, float(constant.max())
-        factor = np.exp(np.minimum((most - constant) / half, _LARGEST_EXPONENT))[..., None]
-        found = np.concatenate([-factor * gain, factor], axis=3) @ _with(squares, square)
-        if not sizes:
-            return log_sum_of_powers(found, self.degrees_of_freedom, (0, 2)) + (most + self._uniform)
-        # of versions that nothing parts the last digit chooses one: it stays the one that logarithms give
-        np.log(np.maximum(found, 1e-300, out=found), out=found)
-        found *= -half
-        return log_sum_in(found, 0) + (most + self._uniform)
-
-    @cached_property
-    def _axes(self) -> dict[int, tuple[Floats, Floats]]:
-        """Principal axes of the members of wide groups, by the number of their columns."""
-        return {}
 
     def _beside(self, data: Floats | None, given: Sequence[Version]) -> ConditionedData:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
         if data is not None:
             return self._weigh(data, given)
-        kept, key = self._besides, frozenset(given)
+        kept, key = self._weighed, frozenset(given)
         if key not in kept:
             new = self._weigh(None, given)
             most = max(1, _KEPT // (len(new.squares) * len(self.left) * new.width))
@@ -521,11 +407,6 @@ class CandidateComparison:
                 del kept[next(iter(kept))]
             kept[key] = new
         return kept[key]
-
-    @cached_property
-    def _besides(self) -> dict[frozenset[Version], ConditionedData]:
-        """The recording beside what was given last: a search comes back to it within some steps."""
-        return {}
 
     def _weigh(self, data: Floats | None, given: Sequence[Version]) -> ConditionedData:
         own = data is None
@@ -541,9 +422,3 @@ class CandidateComparison:
     def _left_with_all(self) -> Floats:
         """Inner products (k, K, 1) of the stack's columns with what the baseline leaves."""
         return self._given.with_all(self._left_weighed)
-
-
-def _with(squares: Floats, square: Floats) -> Floats:
-    """Squares (k, M, r, b) along members, and (k, b) of the data below them (k, M, r + 1, b)."""
-    every = np.broadcast_to(squares[:, None, None, :], (*square.shape[:2], 1, squares.shape[1]))
-    return np.concatenate([square, every], axis=2)

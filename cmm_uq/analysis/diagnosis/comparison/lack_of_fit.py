@@ -18,6 +18,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.draws import draw_nothing
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
 from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
@@ -103,7 +104,7 @@ def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None 
     Also what is drawn under nothing: the statistic, and the largest log evidence of a nonparametric term.
     """
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
-    draws = comparison.nothing(random, DRAWS)
+    draws = draw_nothing(comparison, random, DRAWS)
     statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
     unknowns = [i for i, e in enumerate(comparison.explanations) if e.kind == UNKNOWN]
     maxima = odds[unknowns, 1:].max(axis=0) if unknowns else np.zeros(0)
@@ -129,7 +130,7 @@ def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Ge
         error = np.sqrt((1 + np.log(share / p_value) ** 2) / (share * len(found)))
         if len(found) >= _MOST or abs(np.log(p_value / alpha)) > _CLEAR * error:
             return p_value
-        more = comparison.nothing(random, DRAWS)
+        more = draw_nothing(comparison, random, DRAWS)
         found = np.append(found, robust_statistic_of(normal, more, least))
 
 

@@ -215,12 +215,10 @@ def substitute(found: SearchResult, index: int, tried: Key) -> tuple[SearchResul
 
 def _rough(comparison: CandidateComparison, versions: Sequence[Version], index: int) -> float:
     """Probability that an effect, beside the others, has another form than its own."""
-    members = comparison.explanations[index].members
-    evidence = np.full(len(members), -np.inf)
-    for group, cube in comparison.each(None, [v for v in versions if v.explanation != index], (index,)):
-        evidence[group.member] = special.logsumexp(cube[:, :, 0], axis=1) + group.weight
-    weight = np.exp(evidence - special.logsumexp(evidence))
-    return float(weight[[member.rough for member in members]].sum())
+    member, evidence, weight = comparison.of_versions(index, [v for v in versions if v.explanation != index])
+    probability = np.exp(evidence + weight - special.logsumexp(evidence + weight))
+    rough = [comparison.explanations[index].members[i].rough for i in member]
+    return float(probability[rough].sum())
 
 
 def _shaped(combinations: Combinations) -> set[int]:
@@ -264,9 +262,8 @@ def _gains(first: ModelComparison, explanation: Explanation, others: Sequence[Ve
     comparison = replace(first.comparison, explanations=[explanation, *beside])
     given = [Version(k, 0, v.amplitude) for k, v in enumerate(others, 1)]
     evidence = np.full(len(explanation.members), -np.inf)
-    for group, cube in comparison.each(None, given, (0,)):
-        own = group.explanation == 0
-        evidence[group.member[own]] = special.logsumexp(cube[own, :, 0], axis=1) - np.log(AMPLITUDES)
+    member, of_each, _ = comparison.of_versions(0, given)
+    evidence[member] = of_each - np.log(AMPLITUDES)
     return np.asarray(evidence - comparison.log_evidence_of(given)[0], dtype=np.float64)
 
 

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
+from cmm_uq.analysis.diagnosis.comparison import draws as draws_of_noise
 from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.draws import draw_nothing, left_of_noise, probability_of_tails
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, Explanation, Member
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
@@ -218,7 +220,7 @@ def test_strong_evidence_for_nothing_is_as_rare_as_it_says() -> None:
     g, s = np.divmod(chosen, len(c.sigma))
     data = np.empty((len(c.left), count))
     for i in range(count):
-        data[:, i] = c.noise(c.kinds[g[i]], random, c.sigma[[s[i]]])[:, 0]
+        data[:, i] = left_of_noise(c, c.kinds[g[i]], random, c.sigma[[s[i]]])[:, 0]
     nothing, something = c.log_evidence(data)
     for k in (3, 10, 30):
         rate = np.mean(something - nothing >= np.log(k), axis=1)
@@ -256,7 +258,7 @@ def test_nothing_is_rounded_as_the_recording_was() -> None:
     rows, along = np.arange(8)[:, None], np.repeat([[[1.0, 0.0, 0.0]]], 8, axis=0)
     c = CandidateComparison(np.zeros(8), np.zeros((8, 0)), [kind], *sigma_grid(None, 1e-3), [], scale, 1e-4,
                    display=Display(step, xyz, rows, along))  # fmt: skip
-    found = c.noise(kind, np.random.default_rng(1), np.full(5, 1e-5))
+    found = left_of_noise(c, kind, np.random.default_rng(1), np.full(5, 1e-5))
     assert found == pytest.approx(np.full((8, 5), -2e-3), abs=1e-9)
 
 
@@ -362,15 +364,15 @@ def test_heavy_tails_are_as_probable_as_studentised_residuals_make_them() -> Non
         X = W @ c.baseline
         M = np.eye(len(W)) - X @ np.linalg.pinv(X)
         z = (M @ W @ c.observed)[np.diag(M) > 0.1] / np.sqrt(np.diag(M)[np.diag(M) > 0.1])
-        assert c.heavy_tails(kind) == pytest.approx(0.0 if kind.name == "tails" else probable_tails(z))
+        assert probability_of_tails(c, kind) == pytest.approx(0.0 if kind.name == "tails" else probable_tails(z))
 
 
 def test_as_many_recordings_of_nothing_have_heavy_tails_as_that_is_probable(monkeypatch: pytest.MonkeyPatch) -> None:
     c = comparison(12)
     draws = {}
     for share in (0.0, 0.4):
-        monkeypatch.setattr(CandidateComparison, "heavy_tails", lambda *_, share=share: share)
-        draws[share] = c.nothing(np.random.default_rng(1), 2000)
+        monkeypatch.setattr(draws_of_noise, "probability_of_tails", lambda *_, share=share: share)
+        draws[share] = draw_nothing(c, np.random.default_rng(1), 2000)
     changed = np.any(draws[0.0] != draws[0.4], axis=0)
     assert stats.binomtest(int(changed.sum()), 2000, 0.4).pvalue > 1e-4
     variance = [np.mean(each[:, ~changed] ** 2) for each in draws.values()]
