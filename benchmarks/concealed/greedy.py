@@ -13,7 +13,7 @@ from scipy import stats
 
 from cmm_uq.analysis.diagnosis.comparison.explanations import known_effects
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 
 ALPHA, MOST = 0.01, 5

@@ -17,7 +17,7 @@ from rich.progress import track
 from benchmarks.concealed.generator import DESIGNS, NOTHING, SIGNALS, case, seal
 from benchmarks.concealed.greedy import searched
 from benchmarks.concealed.physics import holds
-from cmm_uq.app.commands.diagnosing import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_job
 
 
 def make(folder: Path, cases: int, seed: int) -> list[dict]:

@@ -17,7 +17,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 import cmm_uq
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import parameters, with_doubt, with_noise
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model.doubt import causes_of

@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.coverage.artefacts import ARTEFACTS
 from benchmarks.coverage.cells import Cell
 from benchmarks.coverage.recordings import recording
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.linear_model import LinearModel

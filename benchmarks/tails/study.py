@@ -21,7 +21,7 @@ from benchmarks.coverage.measuring import kept
 from benchmarks.coverage.recordings import Recording, recording
 from benchmarks.coverage.study import measure
 from benchmarks.tails.joint import DOF, Found, Readings, prior, sample
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.measurement import MeasurementModel

@@ -14,7 +14,7 @@ from benchmarks.coverage.artefacts import ARTEFACTS, Placed
 from benchmarks.coverage.cells import STATED, Cell, cells
 from benchmarks.coverage.noises import NOISES, Readings
 from benchmarks.coverage.recordings import error, recording
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from tests.conftest import ROOT
 
 ARCSECOND = np.pi / 648000

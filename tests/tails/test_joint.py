@@ -12,7 +12,7 @@ from scipy import stats
 from benchmarks.coverage.cells import Cell
 from benchmarks.coverage.recordings import recording
 from benchmarks.tails.joint import DOF, Readings, log_tails, prior
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.measurement import MeasurementModel
 from cmm_uq.maths.inference.marginal import Marginal

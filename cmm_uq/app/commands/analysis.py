@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
 from cmm_uq.analysis.conformity.standards import statement
-from cmm_uq.app.commands.diagnosing import diagnosed, screened_model
+from cmm_uq.app.commands.diagnose import diagnose_model, screened_model
 from cmm_uq.app.commands.estimation import (
     accuracy,
     contradictions,
@@ -87,7 +87,9 @@ def analyse_observations(job: Job, *, seed: int = 0, progress: Progress | None =
         statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, left_out)
         for i, wish in enumerate(job.facts.conformity, 1)
     ]
-    found = diagnosed(job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None)
+    found = diagnose_model(
+        job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None
+    )
     averaged = found.diagnosis.remaining.draws
     values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
     denied = () if averaged is None else contradictions(model, estimate, posterior, averaged)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
-from cmm_uq.app.commands.diagnosing import diagnose_read
+from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.model import model_of
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.artefacts import kind_of

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from cmm_uq.analysis.conformity.accuracy import figures
-from cmm_uq.app.commands.diagnosing import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.certificate.result import Diagnosed
 

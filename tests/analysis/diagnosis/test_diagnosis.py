@@ -11,7 +11,7 @@ from scipy import stats
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.held_out import improvement
-from cmm_uq.app.commands.diagnosing import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points

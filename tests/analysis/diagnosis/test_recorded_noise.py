@@ -13,7 +13,7 @@ from cmm_uq.analysis.diagnosis import noise_shapes as shapes
 from cmm_uq.analysis.diagnosis.comparison.functions import unknown_functions
 from cmm_uq.analysis.diagnosis.comparison.search import comparison_of
 from cmm_uq.analysis.diagnosis.noise_shapes import noise_kinds
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model import MeasurementModel
 

@@ -11,7 +11,7 @@ import pytest
 
 import cmm_uq
 from cmm_uq.analysis.screening.screening import copied_measurements, counted_with
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.least_squares import LeastSquares

@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.analysis.screening.outliers import moved_stretches, point_words, recurring_points
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of

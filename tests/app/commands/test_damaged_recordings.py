@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cmm_uq.app.commands.diagnosing import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import OBSERVATIONS

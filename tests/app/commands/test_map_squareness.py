@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.diagnosing import diagnose_read
+from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.app.commands.jobs.compensate import write_compensated
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts.error_maps.results import maps_results

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from cmm_uq.analysis.screening.finding import Finding
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model import MeasurementModel
 from tests.conftest import ROOT

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.jobs.simulate import simulated_job
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of

@@ -9,7 +9,7 @@ import pytest
 import cmm_uq
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
 from cmm_uq.app.commands.analysis import Result, analyse_job
-from cmm_uq.app.commands.diagnosing import diagnose_read
+from cmm_uq.app.commands.diagnose import diagnose_read
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 

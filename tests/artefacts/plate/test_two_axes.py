@@ -10,7 +10,7 @@ import pytest
 
 import cmm_uq
 from cmm_uq.analysis.screening.finding import Finding
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import MeasurementModel

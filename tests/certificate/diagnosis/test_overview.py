@@ -12,7 +12,7 @@ import pytest
 
 import cmm_uq
 from cmm_uq.analysis.diagnosis.model_average import ModelAverage, Rival
-from cmm_uq.app.commands.diagnosing import diagnose_job
+from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
 from cmm_uq.certificate.diagnosis.page import diagnosis_document

@@ -11,7 +11,7 @@ from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.app.commands.analysis import analyse_job
-from cmm_uq.app.commands.diagnosing import screened_model
+from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import job_of
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.units import unit

@@ -1,0 +1,142 @@
+"""A job carried from data to diagnosis: read, screen, find what the model leaves out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
+from cmm_uq.analysis.conformity.consequences import consequences, costs
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, diagnose
+from cmm_uq.analysis.diagnosis.power import ALLOWED
+from cmm_uq.analysis.diagnosis.smallest import USUAL_LENGTH, SmallestEffect, smallest_effects
+from cmm_uq.analysis.planning.advice import DetectionGoal, suggestions
+from cmm_uq.analysis.planning.setting import Planning
+from cmm_uq.analysis.planning.suggestion import next_plan
+from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.app.commands.against import Against, against_simulation
+from cmm_uq.app.commands.estimation import without_outliers
+from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of, recorded_model, refuse_planned
+from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import kind_of
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.overflow import refusing_overflow
+from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
+from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
+from cmm_uq.certificate.outcome import Found, Outcome, Recipe
+from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.simulation import KEY
+from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
+
+
+def diagnose_read(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None) -> Found:
+    """Diagnose a job that was read, in the way of its kind."""
+    _check_rate(alpha)
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        return _recipe(job).analyse(job, seed=seed, alpha=alpha, progress=progress)
+
+
+def diagnose_job(
+    folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
+) -> Diagnosed:
+    """Diagnose a recording of an artefact; see :func:`diagnose_read`."""
+    _check_rate(alpha)
+    return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
+
+
+def _check_rate(alpha: float) -> None:
+    if not 1e-6 <= alpha <= 0.5:
+        raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
+
+
+def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> Diagnosed:
+    refuse_planned(job)
+    kind_of(job).observing("diagnosed as a recording of an artefact")
+    simulation = job.facts.simulation
+    if simulation is None:
+        model, findings = screened_model(job)
+        return diagnose_model(job, model, findings, seed=seed, alpha=alpha, progress=progress, show=True)
+    against = against_simulation(job, simulation)
+    model, outliers = without_outliers(against.model)
+    findings = (*against.findings, *outliers)
+    return diagnose_model(job, model, findings, seed=seed, alpha=alpha, progress=progress, show=True, against=against)
+
+
+def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+    """The model that a job names, without gross outliers, and all that the screening found."""
+    model, findings = recorded_model(job)
+    model, outliers = without_outliers(model)
+    return model, (*findings, *outliers)
+
+
+def diagnose_model(
+    job: Job, model: MeasurementModel, findings: tuple[Finding, ...], *, seed: int, alpha: float = FALSE_ALARMS,
+    progress: Progress | None = None, known: NoisyPosterior | None = None, show: bool = False,
+    against: Against | None = None,
+) -> Diagnosed:  # fmt: skip
+    """Diagnose the screened model of a job, or what a simulation leaves of its recording.
+
+    ``known`` is its posterior where it was sampled already; ``show`` whether what to measure next shall also show what
+    this recording could not have shown. Against a simulation, figures and decisions are the recording's own: none is
+    corrected.
+    """
+    facts, kind = job.facts, kind_of(job)
+    observe = kind.observing("diagnosed") if against is None else against.observe
+    stated_um = facts.recording.u_coordinate_um if against is None else against.stated_um
+    artefact_at = partial(observe, facts.artefact, where=job.recording_path)
+    diagnosis = diagnose(
+        model, stated_um=stated_um, alpha=alpha, seed=seed, progress=progress, known=known, observe=artefact_at
+    )
+    unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
+    goals = detection_goals(job, diagnosis, unseen) if show else ()
+    plan = next_plan(diagnosis, facts.artefact, observe, kind.offers("plan", Planning), facts.plan, goals)
+    found = Diagnosed(job, findings, diagnosis, suggestions(plan, model.artefact.title), unseen=unseen, next_plan=plan)
+    if against is not None:
+        return replace(found, simulated=against.simulated)
+    outside = OutsideReadings.of(job.points, findings, artefact_at)
+    corrected = consequences(job, diagnosis, artefact_at, kind.tested, seed, outside)
+    each = costs(job, diagnosis, artefact_at, kind.tested, seed, outside)
+    return replace(found, consequences=corrected, costs=each)
+
+
+def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEffect]) -> tuple[DetectionGoal, ...]:
+    """What further set-ups shall show: as the job says, else what a recording that agrees could not have shown.
+
+    Of each effect all that physics allows, or half of what shows already.
+    """
+    show = job.facts.plan.unseen
+    if not (diagnosis.verdict == "consistent" if show is None else show):
+        return ()
+    usual = max((row.length for row in unseen if row.length is not None), default=USUAL_LENGTH)
+    goals = []
+    for row in unseen:
+        if row.blind and row.periods is None:
+            part = 1.0 if row.detected is None or not row.shown else 0.5 * row.detected / row.allowed
+            goals.append(DetectionGoal(row.effect, ALLOWED * part, row.length or usual))
+    return tuple(goals)
+
+
+def diagnosis_outcome(found: Found, seed: int = 0) -> Outcome:
+    """What there is to write of what :func:`diagnose_read` found."""
+    return _recipe(found.job).outcome(found, seed)
+
+
+def _recipe(job: Job) -> Recipe:
+    """How a job is diagnosed; see :func:`~cmm_uq.app.commands.model.recipe_of`."""
+    if job.facts.simulation is not None and kind_of(job).observe is None:
+        raise CmmUqError(f"a job of kind {job.facts.artefact.kind!r} is compared with no simulation: its analysis is its own",
+                         where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip
+    usual = Recipe(_diagnose, lambda found, seed: _outcome(found))
+    return recipe_of(job, lambda own: own.diagnose, lambda kind: usual, "diagnosed as a recording of an artefact")
+
+
+def _outcome(found: Diagnosed) -> Outcome:
+    from cmm_uq.app.commands.jobs.simulate import to_fill_in
+
+    plan = found.next_plan
+    files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
+    return replace(diagnosed_outcome(found), files=files)
