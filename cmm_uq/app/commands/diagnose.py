@@ -120,7 +120,7 @@ def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEff
     return tuple(goals)
 
 
-def diagnosis_outcome(found: Found, seed: int = 0) -> Outcome:
+def outcome_of(found: Found, seed: int = 0) -> Outcome:
     """What there is to write of what :func:`diagnose_read` found."""
     return _recipe(found.job).outcome(found, seed)
 

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.app.commands import analysis
+from cmm_uq.app.commands import analysis, diagnose
 from cmm_uq.app.commands.certificates.reissue import reissued, with_replaced
-from cmm_uq.app.commands.diagnose import diagnose_read, diagnosis_outcome
 from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.reading import compared_with, in_language, read_job
 from cmm_uq.base.languages.language import Code
@@ -108,11 +107,11 @@ def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, s
     """
     readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""
     stage(f"Searching for what was left out{readings}", 0.0)
-    found = diagnose_read(
+    found = diagnose.diagnose_read(
         job, seed=seed, alpha=alpha, progress=lambda part: stage(_sampled("Sampling", part), 0.7 + 0.2 * part)
     )
     stage("Composing the page", 0.9)
-    return diagnosis_outcome(found, seed)
+    return diagnose.outcome_of(found, seed)
 
 
 def write_diagnosis(
