@@ -25,15 +25,9 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel
 
-_COVERED = 0.95
-"""Of the region of a size that must not hold zero, and of the phases that must lie within half a turn."""
-
-_BY_NOISE = 0.05
-"""Probability, under noise, of taking as much of the misfit, from which on it is the noise's share."""
-
-_FEW = 100
-"""Draws within the most probable mode from which its sizes are judged by these."""
-
+_COVERED = 0.95  # of the region of a size that must not hold zero, and of the phases that must lie within half a turn
+_BY_NOISE = 0.05  # probability, under noise, of taking as much of the misfit, from which on it is the noise's share
+_FEW = 100  # draws within the most probable mode from which its sizes are judged by these
 UNRESOLVED = say("the positions do not tell its period from others that fit as well")
 NOT_WHOLE = say("the readings do not hold a whole one of its periods, of which any curve can be a part")
 PHASE_OPEN = say("the positions leave its phase open")

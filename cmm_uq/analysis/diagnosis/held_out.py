@@ -17,9 +17,7 @@ from cmm_uq.maths.inference.freedoms import Freedoms
 from cmm_uq.maths.inference.posterior import Density
 
 FOLDS = 10
-
-_SINGULAR = 1e-9
-"""Part of the largest singular value below which another counts as zero."""
+_SINGULAR = 1e-9  # part of the largest singular value below which another counts as zero
 
 
 @dataclass(frozen=True)

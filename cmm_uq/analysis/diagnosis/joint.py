@@ -22,17 +22,13 @@ from cmm_uq.maths.inference.sampling import sample_with_noise
 from cmm_uq.maths.inference.shaped import Shaped, sample_shaped
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
-_LIKELY = 1e-4
-"""Part of the largest probability below which a trial parts one mode from the next."""
+_LIKELY = 1e-4  # part of the largest probability below which a trial parts one mode from the next
 
 _APART = 0.5
 """Frequencies that are this far apart, over one in the range of the readings, with nothing likely between, are two modes."""
 
-_VALLEY = 0.1
-"""Evidence over that of the lower of two peaks below which what lies between parts two modes."""
-
-_TOLD = 1e-3
-"""Probability from which a mode is told."""
+_VALLEY = 0.1  # evidence over that of the lower of two peaks below which what lies between parts two modes
+_TOLD = 1e-3  # probability from which a mode is told
 
 
 @dataclass(frozen=True)
@@ -111,11 +107,8 @@ def _within(periods: Floats, weight: Floats, unit: Unit, ends: Floats) -> Quanti
     return Quantity(value, u, (value - 1.96 * u, value + 1.96 * u), unit)
 
 
-_FINER = 12
-"""Nodes of a shape between two of the search's."""
-
-_IMPROBABLE = 12.0
-"""Shapes less probable than the best by this, in logarithm, are not followed."""
+_FINER = 12  # nodes of a shape between two of the search's
+_IMPROBABLE = 12.0  # shapes less probable than the best by this, in logarithm, are not followed
 
 
 @dataclass(frozen=True, eq=False)

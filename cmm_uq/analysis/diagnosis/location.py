@@ -31,14 +31,9 @@ from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
-_UNSEEN = 0.05
-"""Part of a constant or a line that must show in the observations; with less, nothing is known of it."""
-
-_AS_WELL = float(np.log(20.0))
-"""Log odds within which another covariate fits as well."""
-
-_MOST = 4
-"""Places that are told."""
+_UNSEEN = 0.05  # part of a constant or a line that must show in the observations; with less, nothing is known of it
+_AS_WELL = float(np.log(20.0))  # log odds within which another covariate fits as well
+_MOST = 4  # places that are told
 
 
 @dataclass(frozen=True, eq=False)

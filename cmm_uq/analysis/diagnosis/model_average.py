@@ -26,11 +26,8 @@ from cmm_uq.maths.inference.posterior import Density
 from cmm_uq.maths.uncertainty.mixture import mixed
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
-REMAINS = 0.01
-"""Probability from which a combination of explanations remains."""
-
-SETTLED = 0.95
-"""Probability of one combination from which no other remains."""
+REMAINS = 0.01  # probability from which a combination of explanations remains
+SETTLED = 0.95  # probability of one combination from which no other remains
 
 _WORTH = float(np.log(3.2))
 """Log evidence up to which an explanation more is not worth more than a bare mention (Kass & Raftery 1995, JASA 90, 777)."""
@@ -38,9 +35,7 @@ _WORTH = float(np.log(3.2))
 _MOST = 12
 _DRAWS = 4000
 _ROUNDS = 3
-_AS_READINGS = 12
-"""Readings that a stated noise is worth: it is good to a fifth."""
-
+_AS_READINGS = 12  # readings that a stated noise is worth: it is good to a fifth
 EffectParameters = Mapping[str, Mapping[str, Quantity]]
 
 

@@ -14,8 +14,7 @@ from scipy import sparse, special
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.noise import NEGLIGIBLE, Components, Sizes
 
-TAILS = 0.05
-"""Probability of heavy tails."""
+TAILS = 0.05  # probability of heavy tails
 
 OFTEN = 0.25
 """The same for the test whether anything is missing, whose false alarms are promised whatever the tails are.
@@ -25,18 +24,13 @@ Many series of routine measurements have longer tails than the normal distributi
 """
 
 _TAILS_DOF = 4.0
-_SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF
-"""Square of the t distribution's scale over its standard deviation."""
+_SHRINK = (_TAILS_DOF - 2) / _TAILS_DOF  # square of the t distribution's scale over its standard deviation
 
 _FEWEST, _BETTER = 15, 4.0
 """Residuals of which tails can be told, and logarithm of the ratio of likelihoods from which they are."""
 
-_SCALES = np.geomspace(0.3, 1.2, 40)
-"""Of the t distribution, over the residuals' root mean square, that are tried."""
-
-_NANOMETRE = 1e-6
-"""mm: of residuals that are smaller, as of exact figures, the last bits say nothing of tails."""
-
+_SCALES = np.geomspace(0.3, 1.2, 40)  # of the t distribution, over the residuals' root mean square, that are tried
+_NANOMETRE = 1e-6  # mm: of residuals that are smaller, as of exact figures, the last bits say nothing of tails
 _STATED_IS_RIGHT = 0.9
 _STATED_SPREAD = 0.2
 _POINTS = 400

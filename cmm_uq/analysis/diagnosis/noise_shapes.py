@@ -27,23 +27,15 @@ from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import NEGLIGIBLE, SLOW, Components, Sizes
 from cmm_uq.maths.inference.presence import beginning, present
 
-SHAPES, KEPT = 512, 7
-"""How many are drawn from the prior, and how many stand for all."""
+SHAPES, KEPT = 512, 7  # how many are drawn from the prior, and how many stand for all
 
 _MORE, _ENOUGH = 256, 32
 """Drawn from what the recording says, with and without something missing; how many draws must matter for none of these."""
 
-_SLOW = 0.5
-"""Probability of slow noise from which it is asked what the noise is beside a jump."""
-
-_TRIED = 600
-"""Draws by which it is found what the recording says of them, in each round."""
-
-_NANOMETRE = 1e-6
-"""mm: noise is not taken for less."""
-
-_READINGS = 24
-"""Sizes of the reading noise that are tried beside a display's steps."""
+_SLOW = 0.5  # probability of slow noise from which it is asked what the noise is beside a jump
+_TRIED = 600  # draws by which it is found what the recording says of them, in each round
+_NANOMETRE = 1e-6  # mm: noise is not taken for less
+_READINGS = 24  # sizes of the reading noise that are tried beside a display's steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,8 +238,7 @@ def _without_rivals(estimate: LeastSquares, count: int) -> LeastSquares:
     return replace(estimate, value=np.append(estimate.value, np.zeros(count)))
 
 
-_FEW = 2
-"""Columns."""
+_FEW = 2  # columns
 
 
 def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> list[NoiseKind]:

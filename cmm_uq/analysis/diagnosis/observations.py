@@ -36,11 +36,8 @@ def numbered_by_place(model: MeasurementModel, group: Ints) -> Ints:
     return rank[index]
 
 
-MOST = 1000
-"""Observations that candidates are compared on."""
-
-LEAST_OF_PLACING = 30
-"""Observations that a placing keeps where it has as many: its freedoms cost six of them at most."""
+MOST = 1000  # observations that candidates are compared on
+LEAST_OF_PLACING = 30  # observations that a placing keeps where it has as many: its freedoms cost six of them at most
 
 
 def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = MOST) -> MeasurementModel:

@@ -29,18 +29,10 @@ from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.freedoms import reached
 from cmm_uq.maths.inference.root import root
 
-PLACES = "placing"
-"""Name among what takes an effect up: the free places of the artefact."""
-
-HIDDEN = 0.3
-"""Part of an effect's length, what is fitted taken away, below which it is that which hides it."""
-
-_PART = 0.1
-"""Share from which on a fitted effect counts as part of what takes another one up."""
-
-_ALIKE = 0.96
-"""Mean square cosine from which on two periods look alike."""
-
+PLACES = "placing"  # name among what takes an effect up: the free places of the artefact
+HIDDEN = 0.3  # part of an effect's length, what is fitted taken away, below which it is that which hides it
+_PART = 0.1  # share from which on a fitted effect counts as part of what takes another one up
+_ALIKE = 0.96  # mean square cosine from which on two periods look alike
 _NEIGHBOURS = 2
 _RIDGE = 1e-13
 
@@ -226,11 +218,8 @@ def _reached(probability: Callable[[Floats], Floats], power: float) -> float:
     return root(short, SHORTEST, LONGEST, 1e-10) if short(SHORTEST) < 0 else SHORTEST
 
 
-SIZES = (1.0, 2.0, 5.0)
-"""Visible lengths, over a first guess of the threshold, at which the statistic is computed."""
-
+SIZES = (1.0, 2.0, 5.0)  # visible lengths, over a first guess of the threshold, at which the statistic is computed
 LENGTHS = np.geomspace(SHORTEST, LONGEST, 160)
-
 _CLOSEST = 0.9999
 _RIVALS = 4
 

@@ -13,11 +13,8 @@ from cmm_uq.base.messages import Text, Verbatim, number, plural, say, semicolons
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.catalogue import every
 
-ODDS = 20.0
-"""Odds that a plan is expected to reach for every pair, whichever of the two is true."""
-
-_OF_FITS = ("radius_mm", "fit_rms_um", "n_points")
-"""Columns of a recording that tell of the fit that gave a point."""
+ODDS = 20.0  # odds that a plan is expected to reach for every pair, whichever of the two is true
+_OF_FITS = ("radius_mm", "fit_rms_um", "n_points")  # columns of a recording that tell of the fit that gave a point
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,7 @@ from cmm_uq.machine.model.artefact import Artefact
 
 THIRDS = (0.0, 0.5, 1.0)
 _FIFTHS = (0.0, 0.25, 0.5, 0.75, 1.0)
-
-PatternFor = Callable[[Floats], Pattern | None]
-"""The pattern for an attitude; ``None`` where it does not fit."""
+PatternFor = Callable[[Floats], Pattern | None]  # the pattern for an attitude; ``None`` where it does not fit
 
 Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
 """Ways of setting up an artefact that the fixtures of a volume allow, by their words."""
@@ -121,11 +119,8 @@ def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Patte
                 yield pattern.placed(volume.machine, attitude, middle, title)
 
 
-MIDDLE = (0.5, 0.5, 0.5)
-"""Of the room that a placing has, along each axis."""
-
-ACROSS = " (across it)"
-"""How a plate stands to the direction by which it is held."""
+MIDDLE = (0.5, 0.5, 0.5)  # of the room that a placing has, along each axis
+ACROSS = " (across it)"  # how a plate stands to the direction by which it is held
 
 
 def ready_plan(setting: Setting) -> tuple[Text, tuple[SetUp, ...]]:

@@ -19,14 +19,10 @@ CRITERIA = ("separation", "D", "A", "worst")
 _FLOOR = 1e-3
 """Square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others."""
 
-_GAIN = 1e-6
-"""Least gain in the score by which a placing is chosen; else the one that tells most of everything."""
-
+_GAIN = 1e-6  # least gain in the score by which a placing is chosen; else the one that tells most of everything
 _BETTER = 1e-9
 _MOST_TRIES = 2000
-
-Score = Callable[[Floats], Floats]
-"""What is to become small, (c,), of information (c, k, k)."""
+Score = Callable[[Floats], Floats]  # what is to become small, (c,), of information (c, k, k)
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,8 +101,7 @@ def _averaged(values: Floats, weight: Floats) -> Floats:
         return np.asarray(np.exp(weight @ np.log(values)) if len(weight) > 1 else values[0])
 
 
-COMPARED = 10
-"""Repeats that are compared, or one more than the plan has."""
+COMPARED = 10  # repeats that are compared, or one more than the plan has
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,16 +23,13 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.least_squares import LeastSquares, solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 
-Pair = tuple[str, str, float]
-"""Two effects and the absolute cosine between them."""
+Pair = tuple[str, str, float]  # two effects and the absolute cosine between them
 
 NOT_TOLD_APART = 0.98
 """Cosine from which on two effects could hardly be told apart: a fifth of one is all that the other cannot imitate."""
 
 _ROUNDING = 1e-9
-
-WEAK = 0.1
-"""Part of the prior variance from which on a parameter counts as weakly determined."""
+WEAK = 0.1  # part of the prior variance from which on a parameter counts as weakly determined
 
 
 @dataclass(frozen=True)

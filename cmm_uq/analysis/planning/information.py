@@ -143,8 +143,7 @@ FAINT = 1.0
 """Information, for an effect of its prior standard deviation, below which it does not stand out of the noise."""
 
 _RIDGE = 1e-13
-_PART = 0.1
-"""Share from which on a column counts as part of what looks like another."""
+_PART = 0.1  # share from which on a column counts as part of what looks like another
 
 
 def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:

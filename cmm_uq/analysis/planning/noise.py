@@ -20,11 +20,8 @@ from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import ABSENT, GROWTH, LARGEST_RATIO, PLACING, RATIO, SLOW, Components, Sizes
 
-_NODES = 10
-"""Sizes of a component that stand for its prior, beside none at all."""
-
-_LEAST_RATIO = 0.02
-"""Ratio to the reading noise below which a component does not count."""
+_NODES = 10  # sizes of a component that stand for its prior, beside none at all
+_LEAST_RATIO = 0.02  # ratio to the reading noise below which a component does not count
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,7 @@ from cmm_uq.machine.model.kind import Kind, Observe
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
-ASSUMED_NOISE_UM = 1.0
-"""Standard uncertainty of a coordinate where the job states none."""
+ASSUMED_NOISE_UM = 1.0  # standard uncertainty of a coordinate where the job states none
 
 
 @dataclass(frozen=True, eq=False)

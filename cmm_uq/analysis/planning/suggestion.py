@@ -34,33 +34,19 @@ from cmm_uq.machine.model.kind import Observe, Observed
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
 
-SET_UPS, REPEATS = 8, 10
-"""Most set-ups of a plan, and most repeats of each."""
-
-_NEVER = 1e6
-"""Amplitude, over the prior standard deviation, of what does not show at all."""
-
-_UNSEEN = 1e-13
-"""Part of what an effect by itself would tell, that rounding may leave of one that is not seen."""
+SET_UPS, REPEATS = 8, 10  # most set-ups of a plan, and most repeats of each
+_NEVER = 1e6  # amplitude, over the prior standard deviation, of what does not show at all
+_UNSEEN = 1e-13  # part of what an effect by itself would tell, that rounding may leave of one that is not seen
 
 _ROUNDING = 1e-9
 """Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
 
-_HOPELESS = 3
-"""Repeats of a plan that cannot reach everything."""
-
-_WORTH = 0.1
-"""Least gain in the logarithm of odds for which a plan that does not reach everything is told."""
-
-_SAME_ODDS = 1e-9
-"""Of their logarithm, by rounding."""
-
+_HOPELESS = 3  # repeats of a plan that cannot reach everything
+_WORTH = 0.1  # least gain in the logarithm of odds for which a plan that does not reach everything is told
+_SAME_ODDS = 1e-9  # of their logarithm, by rounding
 _CANDIDATES = 120
-_TURNED = 12
-"""Of the candidates, how many are tried turned besides."""
-
-_OF_A_GROUP = 5
-"""Effects of a group of which all pairs are parted."""
+_TURNED = 12  # of the candidates, how many are tried turned besides
+_OF_A_GROUP = 5  # effects of a group of which all pairs are parted
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.jobs.plan import PlanFacts
 
-_ALONG = np.cos(np.radians(3.0))
-"""Cosine from which on a direction is one that a fixture allows."""
-
+_ALONG = np.cos(np.radians(3.0))  # cosine from which on a direction is one that a fixture allows
 _ROUNDING = 1e-6
 
 
@@ -123,8 +121,7 @@ def _within_travel(machine: Machine, axis: str, wanted: Sequence[float]) -> Sequ
     return wanted
 
 
-_FLAT = 1e-3
-"""Extent across an artefact, over its length, below which it has none."""
+_FLAT = 1e-3  # extent across an artefact, over its length, below which it has none
 
 
 def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]:

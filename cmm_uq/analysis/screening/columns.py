@@ -14,7 +14,6 @@ from cmm_uq.base.messages import Text, Verbatim, alternatives, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 
 Rows = NDArray[np.bool_]
-
 SCALES = tuple(f"temp_{a}_c" for a in AXES)
 TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bottom_c", "temp_air_c")
 
@@ -69,8 +68,7 @@ BOUNDS: Mapping[str, Bounds] = MappingProxyType(
 )  # fmt: skip
 """What each column may hold."""
 
-SENSORS = (*BOUNDS, "time_s")
-"""Columns that are left out where they cannot be trusted."""
+SENSORS = (*BOUNDS, "time_s")  # columns that are left out where they cannot be trusted
 
 
 def column_findings(points: Points, *, balls: bool) -> list[Finding]:

@@ -24,9 +24,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.placings import Placings
 
-MOST = 0.2
-"""Part of the rows that may be left out; with more damage the recording is refused."""
-
+MOST = 0.2  # part of the rows that may be left out; with more damage the recording is refused
 _PART, _STRAYS = 0.2, 0.05
 _FEW, _MANY = 16, 60
 _MOST_BALLS = 400
@@ -262,8 +260,7 @@ def outside_travel(points: Points) -> NDArray[np.bool_]:
 
 _SEVERAL = 4
 _EDGES = 0.05
-_ABSURD = (1.0, 2e4)
-"""mm; a bar shorter or longer than this is in another unit."""
+_ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
 
 
 def coordinate_findings(

@@ -19,7 +19,6 @@ UNITS = ((25.4, say("inches")), (1e3, say("metres")), (1e-3, say("micrometres"))
 """Millimetres in what the recording may hold instead."""
 
 TWICE = ((1 / 25.4, say("inches converted twice")),)
-
 COORDINATES = tuple(f"{a}_mm" for a in AXES)
 
 

@@ -9,11 +9,8 @@ import numpy as np
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Ints, Points
 
-LEAST = 3
-"""Points that follow one another; two may be neighbours by chance."""
-
-_SHARE = 2 / 3
-"""Of the points from the first to the last outlier of a repeat, from which on they are one stretch."""
+LEAST = 3  # points that follow one another; two may be neighbours by chance
+_SHARE = 2 / 3  # of the points from the first to the last outlier of a repeat, from which on they are one stretch
 
 
 def moved_stretches(points: Points, outliers: Ints) -> list[Ints]:

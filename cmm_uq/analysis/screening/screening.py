@@ -51,12 +51,8 @@ def counted_with(points: Points, set_aside: Collection[int] = ()) -> Ints:
     return first[counts[points.group]]
 
 
-GROSS = 1e-3
-"""Probability, over all observations together, that noise alone makes one look like an outlier."""
-
-REVERSED = "reversed"
-"""Kind of a finding whose rows are sound, but not what was recorded beside them."""
-
+GROSS = 1e-3  # probability, over all observations together, that noise alone makes one look like an outlier
+REVERSED = "reversed"  # kind of a finding whose rows are sound, but not what was recorded beside them
 _UNIT_LENGTH = 0.02
 _REFUSED_WHOLE = ("unit", "sign", "shifted column")
 

@@ -21,9 +21,7 @@ TOLERANCE_MM, TOLERANCE_RATIO = 0.5, 5e-3
 _SAMPLES = 120
 _JUDGED = 1000
 _PAIRS = 60
-_ACROSS = 10.0
-"""Where on a face the probe touched is nobody's business: misfit across a line counts by this less."""
-
+_ACROSS = 10.0  # where on a face the probe touched is nobody's business: misfit across a line counts by this less
 Misfit = Callable[[Floats, Floats, float], Floats]
 
 

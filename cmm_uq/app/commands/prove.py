@@ -40,13 +40,9 @@ from cmm_uq.machine.physics.catalogue import every, plugins
 from cmm_uq.maths.inference.sampling import sample_with_noise
 
 CASES, FEWEST, MOST = 200, 1, 20_000
-
 _PROGRAM = "cmm_uq.app.commands.prove_case"
-_OF_ARTEFACT = "artefact"
-"""Mechanism of effects that a fault of the artefact may be called."""
-
-Sealed = Callable[[str], None]
-"""Told the SHA-256 of the truth, before anything is diagnosed."""
+_OF_ARTEFACT = "artefact"  # mechanism of effects that a fault of the artefact may be called
+Sealed = Callable[[str], None]  # told the SHA-256 of the truth, before anything is diagnosed
 
 
 @dataclass(frozen=True)

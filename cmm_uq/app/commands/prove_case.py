@@ -30,8 +30,7 @@ from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
-_DIGITS = 9
-"""Significant digits that are kept: what differs beyond them says nothing."""
+_DIGITS = 9  # significant digits that are kept: what differs beyond them says nothing
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,11 +35,8 @@ VERDICT_TITLES: Mapping[str, Text] = {
 }
 """A verdict as the title of its overview."""
 
-_RAREST = 1e-4
-"""Probability below which only this is told."""
-
-_TOLD = 0.05
-"""Probability from which another explanation is told beside what is asserted."""
+_RAREST = 1e-4  # probability below which only this is told
+_TOLD = 0.05  # probability from which another explanation is told beside what is asserted
 
 
 def overview_of(found: Diagnosed) -> Overview:
@@ -185,8 +182,7 @@ def _nothing_to_do(findings: Sequence[Finding]) -> Text:
     return say("Nothing on account of this recording.")
 
 
-_SAME = 0.01
-"""Difference of two probabilities that is not worth telling."""
+_SAME = 0.01  # difference of two probabilities that is not worth telling
 
 VERDICTS: Mapping[str, Text] = {
     "consistent": say("The recording agrees with the model that the job names."),

@@ -40,11 +40,8 @@ from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
-_PARTED = 3.0
-"""Odds from which on two are parted at all."""
-
-TO_FILL_IN = "next_plan.csv"
-"""File that a diagnosis writes the set-ups to."""
+_PARTED = 3.0  # odds from which on two are parted at all
+TO_FILL_IN = "next_plan.csv"  # file that a diagnosis writes the set-ups to
 
 
 def next_section(found: Diagnosed) -> Section:
@@ -181,8 +178,7 @@ def _shown_data(one: DetectionChange, effect: Effect) -> dict[str, Any]:
     return {"effect": one.effect, "parameter": name, "detected_before": before, "detected_after": after}
 
 
-_SHOWN = 4
-"""Explanations that a table has columns for."""
+_SHOWN = 4  # explanations that a table has columns for
 
 
 def costs_section(found: Diagnosed) -> Section:
@@ -279,9 +275,7 @@ def _each(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
     return {name: quantity_data(quantity) for name, quantity in quantities.items()}
 
 
-_NAMED = 5
-"""Effects that the sentence beside the verdict names."""
-
+_NAMED = 5  # effects that the sentence beside the verdict names
 _RANGES = 3
 
 

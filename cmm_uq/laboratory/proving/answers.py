@@ -19,9 +19,7 @@ from cmm_uq.base.output.locking import locked
 from cmm_uq.laboratory.proving.cases import canonical_json
 from cmm_uq.laboratory.schedule.processes import WorkerTask, answers
 
-Record = dict[str, Any]
-"""What was said of a task: plain data with its ``number``."""
-
+Record = dict[str, Any]  # what was said of a task: plain data with its ``number``
 TRUTH, RECORDS, LOCK = "truth.json", "cases.jsonl", "lock"
 
 

@@ -29,15 +29,13 @@ from cmm_uq.machine.model import Noise
 
 NOTHING, ONE, TWO, OUTSIDE, ARTEFACT = "nothing", "one effect", "two effects", "outside", "artefact"
 KINDS = (NOTHING, ONE, TWO, OUTSIDE, ARTEFACT)
-CYCLE = (NOTHING, ONE, TWO, NOTHING, OUTSIDE, ONE, NOTHING, ONE, ARTEFACT, TWO)
-"""What each case of ten hides."""
+CYCLE = (NOTHING, ONE, TWO, NOTHING, OUTSIDE, ONE, NOTHING, ONE, ARTEFACT, TWO)  # what each case of ten hides
 
 OWN, WHITE, SET_UP, AXIS, GROWING, SLOWLY, WALKING, TAILS, RESOLUTION = (
     "own", "white", "set-up", "axis", "growing", "slow", "walk", "tails", "resolution",
 )  # fmt: skip
 
-WEAKEST, STRONGEST = 3.0, 15.0
-"""√λ between which hidden causes are drawn."""
+WEAKEST, STRONGEST = 3.0, 15.0  # √λ between which hidden causes are drawn
 
 
 @dataclass(frozen=True)

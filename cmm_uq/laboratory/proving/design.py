@@ -56,9 +56,7 @@ from cmm_uq.maths.inference.noise import AXES as AXIS_NOISE
 from cmm_uq.maths.inference.noise import GROWTH, PLACING, SLOW
 
 _LARGEST_FOREIGN_UM = 200.0
-_SHORTEST_PERIOD_MM = 6.0
-"""As the diagnosis tries them; beyond the range of the readings a wave is no wave."""
-
+_SHORTEST_PERIOD_MM = 6.0  # as the diagnosis tries them; beyond the range of the readings a wave is no wave
 _ATTEMPTS = 40
 _AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2.0, 4.0, 3.0, 0.125, 2.0
 """How the kinds of noise differ from the job's own, in units of its reading noise; forgetting over a part of the duration."""

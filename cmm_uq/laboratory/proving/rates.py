@@ -109,12 +109,8 @@ def tenths(said: Sequence[tuple[float, bool]]) -> tuple[Tenth, ...]:
 
 
 OFTEN = 0.9
-LARGEST = 30.0
-"""Strength up to which the answer is looked for: twice the strongest that is drawn."""
-
-FEWEST = 8
-"""Hidden effects from which on there is an answer."""
-
+LARGEST = 30.0  # strength up to which the answer is looked for: twice the strongest that is drawn
+FEWEST = 8  # hidden effects from which on there is an answer
 _MIDDLE = np.linspace(0.0, LARGEST, 241)
 _SLOPE = np.geomspace(0.15, 6.0, 40)
 _CURVE = np.linspace(3.0, 15.0, 49)

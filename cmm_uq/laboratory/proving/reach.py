@@ -15,15 +15,9 @@ from cmm_uq.laboratory.proving.unknown_causes import possible_faults
 from cmm_uq.machine.physics.catalogue import every
 
 DRAWN, UNRECORDED, TAKEN, TOO_SMALL, NO_TRAVEL = "drawn", "unrecorded", "taken", "too small", "no travel"
-
-_NOTHING_SHOWS = 0.05
-"""√λ of the largest size that physics allows below which an effect shows nothing at all."""
-
-_ALIKE = 0.1
-"""Part of an effect that another leaves of it below which the two look alike."""
-
-_TRIALS = 5
-"""Draws of a fault by which it is judged."""
+_NOTHING_SHOWS = 0.05  # √λ of the largest size that physics allows below which an effect shows nothing at all
+_ALIKE = 0.1  # part of an effect that another leaves of it below which the two look alike
+_TRIALS = 5  # draws of a fault by which it is judged
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,9 @@ from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.noise import FASTEST, Components, Sizes
 
-ALLOWED = 3.0
-"""Prior standard deviations up to which an effect is reckoned with, as a plan does."""
-
-_RANK = 1e-9
-"""Part of the largest singular value from which on a direction counts as taken by what the job names."""
-
-_SHAPES = 6
-"""Nonlinear parameters of an effect by which it is judged whether anything looks like it."""
+ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned with, as a plan does
+_RANK = 1e-9  # part of the largest singular value from which on a direction counts as taken by what the job names
+_SHAPES = 6  # nonlinear parameters of an effect by which it is judged whether anything looks like it
 
 
 @dataclass(frozen=True, eq=False)

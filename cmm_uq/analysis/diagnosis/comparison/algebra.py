@@ -14,14 +14,9 @@ from scipy import sparse, special
 from cmm_uq.analysis.diagnosis.noise import NoiseKind
 from cmm_uq.base.points import Floats
 
-_LEAST_PIVOT = 1e-3
-"""Of a factor of one less what is taken: six digits of sixteen are lost there."""
-
-_LARGEST_EXPONENT = 600.0
-"""Of a factor that says how little something counts."""
-
-_LEAST_BASE = 1e-300
-"""Of a sum of squares that rounding took below it."""
+_LEAST_PIVOT = 1e-3  # of a factor of one less what is taken: six digits of sixteen are lost there
+_LARGEST_EXPONENT = 600.0  # of a factor that says how little something counts
+_LEAST_BASE = 1e-300  # of a sum of squares that rounding took below it
 
 
 def log_sum(log: Floats, axis: int) -> Floats:

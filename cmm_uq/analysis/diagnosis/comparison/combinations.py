@@ -19,11 +19,8 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, E
 from cmm_uq.analysis.diagnosis.comparison.prior import ALIKE, EFFECTS, CombinationPrior, with_two_more
 from cmm_uq.base.points import Floats, Ints
 
-MOST = 12
-"""The most known effects that are looked for."""
-
-WINDOW = 7.0
-"""A combination less probable than one of its parts by more than this, in logarithm, is not followed."""
+MOST = 12  # the most known effects that are looked for
+WINDOW = 7.0  # a combination less probable than one of its parts by more than this, in logarithm, is not followed
 
 LIKE = 0.02
 """Part of an effect's squared visible length up to which two others that leave no more of it are tried in its place."""

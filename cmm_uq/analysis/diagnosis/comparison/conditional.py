@@ -18,11 +18,8 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
 from cmm_uq.base.points import Floats, Ints
 
 AMPLITUDES = 7
-_SMALLEST = 0.4
-"""Smallest rms of an explanation that is considered, over the noise."""
-
-_ABSORBED = 1e-5
-"""Part of its length below which a column is the baseline's own."""
+_SMALLEST = 0.4  # smallest rms of an explanation that is considered, over the noise
+_ABSORBED = 1e-5  # part of its length below which a column is the baseline's own
 
 
 @dataclass(frozen=True)
@@ -142,20 +139,14 @@ def stack_members(
     return np.hstack(stack), tuple(groups)
 
 
-_WIDE = 30
-"""Columns of a version from which on its principal axes are kept where it is given."""
-
-_KEPT = 12_000_000
-"""Numbers that are kept of the inner products of what was given last."""
+_WIDE = 30  # columns of a version from which on its principal axes are kept where it is given
+_KEPT = 12_000_000  # numbers that are kept of the inner products of what was given last
 
 _FEW = 3
 """Observations over columns that are given, from which on it pays to make inner products of those that are kept."""
 
-Member = tuple[int, int]
-"""An explanation and its member."""
-
-Basis = tuple[Member, bool]
-"""A member, and whether it is seen along its principal axes in place of its columns."""
+MemberKey = tuple[int, int]  # an explanation and its member
+Basis = tuple[MemberKey, bool]  # a member, and whether it is seen along its principal axes in place of its columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +191,7 @@ class Conditioning:
     """
 
     stack: Floats
-    where: dict[Member, slice]
+    where: dict[MemberKey, slice]
     by_noise: Callable[[Floats], Floats]
 
     def beside(
@@ -317,7 +308,7 @@ class Conditioning:
         return self._axes[key]
 
     @cached_property
-    def _axes(self) -> dict[Member, tuple[Floats, Floats]]:
+    def _axes(self) -> dict[MemberKey, tuple[Floats, Floats]]:
         """Principal axes of wide members that were ever given."""
         return {}
 
@@ -328,7 +319,7 @@ class Conditioning:
         return self._weighed[key]
 
     @cached_property
-    def _weighed(self) -> dict[Member, Floats]:
+    def _weighed(self) -> dict[MemberKey, Floats]:
         """Precision times the columns of members that were ever given (k, m, r)."""
         return {}
 

@@ -40,14 +40,12 @@ from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.display import Display
 
-_KEPT = 8_000_000
-"""Numbers that are kept of what follows from what was given last."""
+_KEPT = 8_000_000  # numbers that are kept of what follows from what was given last
 
 _CORRECTED = 3
 """Columns of a member, over those of what is given, from which on its own principal axes are corrected for that."""
 
-_BLOCK, _COLUMNS = 150_000, 500
-"""Numbers of a block that a processor's cache holds; columns weighed at a time."""
+_BLOCK, _COLUMNS = 150_000, 500  # numbers of a block that a processor's cache holds; columns weighed at a time
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,13 +25,9 @@ from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.analysis.diagnosis.noise import tail_precision, with_tails
 from cmm_uq.base.points import Floats
 
-_STEPS = 50
-"""Of reweighting: whatever weights it ends with, the evidence is not overstated."""
-
+_STEPS = 50  # of reweighting: whatever weights it ends with, the evidence is not overstated
 _TINY = 1e-300
-
-_LEAST = 0.05
-"""Part of the evidence of nothing below which tails are left out: log odds would change by no more."""
+_LEAST = 0.05  # part of the evidence of nothing below which tails are left out: log odds would change by no more
 
 
 def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tuple[int, CandidateComparison]]:
@@ -74,18 +70,14 @@ SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}
 """Probability, beforehand, of one effect of the catalogue, of several, and of the unknown; the rest is for nothing missing."""
 
 NOTHING = 1 - sum(SHARES.values())
-
 DRAWS = 200
 _TAIL = 0.8
 _NEAR = 10.0
 """Factor from the false-alarm rate within which a probability is found more closely: 200 draws know one of 0.01 to a factor of
 three, and heavy tails that are reckoned with make it as much smaller."""
-_MOST = 1000
-"""Draws that there are then at most."""
-_CLEAR = 3.0
-"""Standard errors from the false-alarm rate at which a probability is on one side of it."""
-_STEEPEST = 1.0
-"""Mean excess of log odds whose tail is that of Markov's inequality."""
+_MOST = 1000  # draws that there are then at most
+_CLEAR = 3.0  # standard errors from the false-alarm rate at which a probability is on one side of it
+_STEEPEST = 1.0  # mean excess of log odds whose tail is that of Markov's inequality
 _CROWDED = 0.25
 """Mean excess below which draws lie at the floor: tails of tests with a few candidates have one half or more."""
 

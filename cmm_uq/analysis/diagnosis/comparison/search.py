@@ -35,38 +35,26 @@ from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import SMALL_LEAN
 from cmm_uq.machine.model.noise import display_of
 
-_MISFIT = 20.0
-"""Largest misfit, over the noise, that is reckoned with when the noise is not stated."""
-
-ASSERTED = 0.5
-"""Probability from which an effect, or one of those that cannot be told from it, is asserted."""
+_MISFIT = 20.0  # largest misfit, over the noise, that is reckoned with when the noise is not stated
+ASSERTED = 0.5  # probability from which an effect, or one of those that cannot be told from it, is asserted
 
 _MECHANISM = 0.2
 """Probability from which an effect is asserted when all that is asked is whether it has its own form or any other."""
 
-_PROBABLE = 0.02
-"""Probability of a combination from which the period in it is refined."""
-
-_SHOWN = 6.0
-"""Log evidence of a period from which shorter ones are tried besides: less shows none."""
-
-_FEW = 6
-"""Periods that are refined where none shows."""
+_PROBABLE = 0.02  # probability of a combination from which the period in it is refined
+_SHOWN = 6.0  # log evidence of a period from which shorter ones are tried besides: less shows none
+_FEW = 6  # periods that are refined where none shows
 
 _BETWEEN = 0.12
 """Part of the log evidence that a period may lose where it lies between two trials (sinc² at half of a step, and more)."""
 
-_IMPROBABLE = 12.0
-"""Log evidence below that of the best from which a period is not followed."""
-
-_AGAIN = 3
-"""Times that everything is compared again about what was found."""
+_IMPROBABLE = 12.0  # log evidence below that of the best from which a period is not followed
+_AGAIN = 3  # times that everything is compared again about what was found
 
 _PASSES = 0.1
 """Part of an effect's squared visible length up to which a nonparametric term that leaves no more of it could pass for it."""
 
-NOT_TOLD_APART = 0.02
-"""Odds from which another effect in the place of one counts as not told apart from it."""
+NOT_TOLD_APART = 0.02  # odds from which another effect in the place of one counts as not told apart from it
 
 
 @dataclass(frozen=True, eq=False)
