@@ -125,7 +125,6 @@ def diagnose(
     known: NoisyPosterior | None = None,
     observe: Observed | None = None,
 ) -> Diagnosis:
-    """Diagnose a recording."""
     stated = None if stated_um is None else stated_um * MICROMETRE
     model = _with_last_digit(model)
     some = model if observe is None else thin_out(model, observe, seed)

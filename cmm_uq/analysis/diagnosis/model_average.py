@@ -202,7 +202,6 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
 
 
 def _reported(model: MeasurementModel, draws: Floats) -> dict[str, dict[str, Quantity]]:
-    """Parameters of every effect as they are reported, by effect and name."""
     found: dict[str, dict[str, Quantity]] = {}
     column = 0
     for effect in model.effects:

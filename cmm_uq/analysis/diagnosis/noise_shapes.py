@@ -242,7 +242,6 @@ _FEW = 2  # columns
 
 
 def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> list[NoiseKind]:
-    """Kinds of noise of the used observations."""
     estimate = model.estimate()
     columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))

@@ -68,7 +68,6 @@ class Power:
         return float(np.mean(self.detected_at <= abs(amplitude) * self.per_unit))
 
     def named(self, amplitude: float) -> float:
-        """Probability that it is called by its name."""
         return float(np.mean(self.named_at <= abs(amplitude) * self.per_unit))
 
     @property

@@ -174,7 +174,6 @@ class _Signal:
         return cls(index, effect, raws[middle] @ way[middle], column, length, values, worst, typical, resolved)
 
     def smallest(self, view: Visibility, thresholds: Thresholds | None) -> SmallestEffect:
-        """The row of this effect."""
         effect, parameter = self.effect, self.effect.coefficients[0]
         whole = float(np.linalg.norm(self.raw))
         share = float(np.linalg.norm(self.column)) / whole if whole else 0.0

@@ -55,7 +55,6 @@ class Visibility:
 
     @classmethod
     def of(cls, found: SearchResult) -> Visibility:
-        """The view of a search."""
         comparison = found.first.comparison
         scale = comparison.noise_scale[:, None]
         columns = [
@@ -78,7 +77,6 @@ class Visibility:
 
     @property
     def explanations(self) -> Sequence[Explanation]:
-        """All that were compared."""
         return self.found.first.explanations
 
     def rest(self, columns: Floats) -> Floats:
@@ -199,7 +197,6 @@ class Thresholds:
         return np.asarray(passed.mean(axis=0) @ density / density.sum())
 
     def length_detected(self, power: float) -> float:
-        """Visible length detected with this probability."""
         return _reached(self.detects, power)
 
     def length_named(self, power: float) -> float:
@@ -270,7 +267,6 @@ def _pair(explanations: Sequence[Explanation], visible: frozenset[int]) -> float
 
 
 def _gate(null: Floats, alpha: float) -> float:
-    """Statistic that the test rejects from."""
     low, high = float(null.min()) - 1.0, float(null.max()) + 50.0
     return root(lambda value: float(np.log(tail_probability(null, value) / alpha)), low, high, 1e-6)
 

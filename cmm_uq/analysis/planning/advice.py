@@ -98,7 +98,6 @@ class Suggestion:
 
 
 def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:
-    """A plan for each pair that it parts."""
     if plan is None:
         return ()
     times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))

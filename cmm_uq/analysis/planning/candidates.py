@@ -135,7 +135,6 @@ def ready_plan(setting: Setting) -> tuple[Text, tuple[SetUp, ...]]:
 
 
 def check_allowed(setting: Setting, direction: Floats, how: str = "") -> None:
-    """Refuse a direction that no fixture holds."""
     if not setting.volume.allows(direction):
         raise CmmUqError(
             f"no fixture holds the artefact {direction_words(direction)}{how}, which this plan wants",

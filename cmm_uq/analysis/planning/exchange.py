@@ -39,7 +39,6 @@ class Selection:
 
 
 def score_of(criterion: str, told: Information, targets: Sequence[int]) -> Score:
-    """A criterion as a function of information."""
     targets = list(targets)
     least = 2 if criterion == "separation" else 1
     if criterion not in CRITERIA:

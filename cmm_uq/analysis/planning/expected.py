@@ -45,7 +45,6 @@ class ExpectedUncertainty:
 
 
 def expected_uncertainty(model: MeasurementModel, noise: PlannedNoise) -> ExpectedUncertainty:
-    """What placings will determine under a noise."""
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear, components = model.linearised(values), noise.components(model, values)
     sizes, weight = noise.spread(components)

@@ -69,7 +69,6 @@ class Identifiability:
 
     @property
     def complete(self) -> bool:
-        """Whether every parameter is determined."""
         return all(parameter.status != "free" for parameter in self.parameters)
 
 
@@ -170,7 +169,6 @@ def _among_rivals(
 
 
 def _named_pairs(information: Floats, names: Sequence[str]) -> list[Pair]:
-    """Pairs of named effects, each with everything else fitted."""
     found = []
     effects = [i for i, name in enumerate(names) if name != ARTEFACT]
     for i, j in combinations(effects, 2):

@@ -47,7 +47,6 @@ class Information:
     prior: Floats
 
     def where(self, effects: Sequence[Effect]) -> list[int]:
-        """Rows of some effects."""
         names = {effect.name for effect in effects}
         return [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] in names]
 

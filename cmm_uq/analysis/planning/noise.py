@@ -49,7 +49,6 @@ class PlannedNoise:
         return PlannedNoise((self.coordinate,) * 3, longest=self.longest)
 
     def times(self, factor: float) -> PlannedNoise:
-        """All of it so many times as large."""
         x, y, z = (factor * each for each in self.reading)
         placing, growth = (None if size is None else factor * size for size in (self.placing, self.growth))
         return replace(self, reading=(x, y, z), placing=placing, growth=growth)
@@ -61,7 +60,6 @@ class PlannedNoise:
 
     @property
     def drawn(self) -> Noise:
-        """The same, to draw recordings with."""
         typical = self.typical
         return Noise(self.reading, placing=float(typical.placing[0]), growth=float(typical.growth[0]))
 

@@ -85,7 +85,6 @@ class Pattern:
         return pattern, attitude, middle
 
     def once(self) -> Pattern:
-        """Without its repeats."""
         first = self.repeat == self.repeat.min()
         return Pattern(
             self.body[first], self.point[first], np.ones(int(first.sum()), dtype=np.int64),
@@ -94,7 +93,6 @@ class Pattern:
         )  # fmt: skip
 
     def repeated(self, times: int) -> Pattern:
-        """Everything that many times over."""
         n = len(self.body)
         return Pattern(
             np.tile(self.body, (times, 1)), np.tile(self.point, times),
@@ -257,7 +255,6 @@ PLANES: tuple[tuple[Text, Floats], ...] = (
 
 
 def attitudes_of_lines(size: Floats) -> list[tuple[Text, Floats]]:
-    """Attitudes of a bar or gauge, by their words."""
     return [(direction_words(direction), attitude_along(direction)) for direction in lines(size)]
 
 

@@ -78,7 +78,6 @@ class Setting:
 
     @classmethod
     def of(cls, job: Job, kind: Kind) -> Setting:
-        """What a job says, which is of this kind."""
         facts, plan = job.facts, job.facts.plan
         planning = kind.needs("plan", Planning, "planned")
         observe = kind.observing("planned") if planning.free is None else None
@@ -95,7 +94,6 @@ class Setting:
 
     @property
     def machine(self) -> Machine:
-        """That is measured."""
         return self.volume.machine
 
     def sized(self, points: Points) -> Setting:
@@ -113,7 +111,6 @@ class Setting:
         return MeasurementModel(self.observed(points), (*self.named, *also), self.sigma)
 
     def observed(self, points: Points) -> Artefact:
-        """The artefact at these points."""
         if self.observe is None:
             raise ValueError("a kind that names no effects has no artefact")
         return self.observe(self.artefact, points)

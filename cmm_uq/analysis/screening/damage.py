@@ -145,7 +145,6 @@ class DamageSearch:
         return np.asarray(np.any(keys[rows] != keys[others], axis=1))
 
     def _swapped(self, most: int) -> Iterator[Damage]:
-        """Two points that fit once they are exchanged."""
         rows = np.flatnonzero(self._open)
         if len(rows) > most:
             return

@@ -33,7 +33,6 @@ class Finding:
 
 
 def finding(kind: str, points: Points, rows: NDArray[np.bool_] | Ints, why: Text, column: str | None = None) -> Finding:
-    """A finding about some rows of a recording."""
     lines = tuple(points.lines[rows].tolist()) if len(points.lines) else ()
     return Finding(kind, tuple(dict.fromkeys(points.measurement[rows].tolist())), lines, why, column)
 

@@ -30,7 +30,6 @@ def moved_stretches(points: Points, outliers: Ints) -> list[Ints]:
 
 
 def stretch_words(points: Points, stretch: Ints, times: Sequence[float]) -> Text:
-    """What a stretch of outliers says."""
     measurement, repeat = points.run_of(int(points.group[stretch[0]]))
     return say(
         "points {first} to {last} of measurement {measurement}, repeat {repeat} are {low:.1f} to {high:.1f} of their "
@@ -56,7 +55,6 @@ def recurring_points(points: Points, outliers: Ints) -> list[Ints]:
 
 
 def point_words(points: Points, rows: Ints, times: Sequence[float]) -> Text:
-    """What a point that is off wherever it stands says."""
     point = int(points.point[rows[0]])
     return say(
         "point {point} is {low:.1f} to {high:.1f} of its standard deviations off what the others say in {count} of its "

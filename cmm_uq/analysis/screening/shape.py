@@ -77,7 +77,6 @@ class Screening:
 
 
 def bar_misfit(xyz: Floats, _: Floats, length: float) -> Floats:
-    """The distance of two points against the length."""
     return np.full(2, abs(float(np.linalg.norm(xyz[1] - xyz[0])) - length))
 
 

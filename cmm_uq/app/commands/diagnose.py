@@ -126,7 +126,6 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
 
 
 def _recipe(job: Job) -> Recipe:
-    """How a job is diagnosed; see :func:`~cmm_uq.app.commands.model.recipe_of`."""
     if job.facts.simulation is not None and kind_of(job).observe is None:
         raise CmmUqError(f"a job of kind {job.facts.artefact.kind!r} is compared with no simulation: its analysis is its own",
                          where=f"job.toml {KEY}", fix="Leave the simulation out")  # fmt: skip

@@ -106,7 +106,6 @@ def prove_job(
 def _records(
     job: Job, design: Design, cases: tuple[Case, ...], asked: ProofOptions, kept: AnswersFolder | None, stage: Stage
 ) -> dict[int, Record]:
-    """What is said of every case, by its number."""
     records = {} if kept is None else kept.records
     if kept is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
         raise CmmUqError("holds an answer that none of these processes gave", where=str(kept.folder / RECORDS),
@@ -136,7 +135,6 @@ def _records(
 
 @contextlib.contextmanager
 def _saying(kept: AnswersFolder | None, records: dict[int, Record], count: int) -> Iterator[None]:
-    """What a signal says of the cases."""
     if kept is None:
         yield
         return

@@ -58,7 +58,6 @@ def model_on(job: Job, points: Points) -> MeasurementModel:
 
 
 def begin(setting: CaseSetting) -> Callable[[int, Case], Record]:
-    """What answers a case."""
     job = replace(job_of(setting.files, recorded=False), points=setting.points, planned=False)
     design = Design(model_on(job, setting.points), setting.values, setting.noise, setting.cte_per_k, setting.dates)
     return lambda number, case: diagnosed_case(job, design, case, setting)
@@ -119,7 +118,6 @@ def _named(d: Diagnosis) -> dict[str, Quantity]:
 
 
 def _intervals(quantities: Mapping[str, Quantity]) -> dict[str, list[float | None]]:
-    """Value, lower and upper end of each."""
     return {name: [_rounded(each) for each in (one.value, *one.interval95)] for name, one in quantities.items()}
 
 
@@ -128,7 +126,6 @@ def _rounded(value: float) -> float | None:
 
 
 def main() -> None:
-    """Answer until nobody asks."""
     serve(begin)
 
 

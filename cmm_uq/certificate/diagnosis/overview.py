@@ -40,7 +40,6 @@ _TOLD = 0.05  # probability from which another explanation is told beside what i
 
 
 def overview_of(found: Diagnosed) -> Overview:
-    """The overview of a recording's diagnosis."""
     d = found.diagnosis
     rows = (
         (say("Found"), _found(found)), (say("Where"), _where(d)), (say("How sure"), _sure(found)),
@@ -207,7 +206,6 @@ VERDICTS_IN_SHORT: Mapping[str, Text] = {
 
 
 def verdict_of(found: Diagnosed) -> Text:
-    """The verdict in a sentence."""
     told = VERDICTS if found.simulated is None else AGAINST
     return told[found.diagnosis.verdict]
 
@@ -228,7 +226,6 @@ def summary_lines(found: Diagnosed) -> list[Text]:
 
 
 def ambiguous(group: Sequence[Text]) -> Text:
-    """That a recording cannot tell some effects apart."""
     return say("This recording cannot tell apart: {effects}.", effects=commas(group))
 
 
@@ -280,7 +277,6 @@ def held_out(gain: Improvement) -> Text:
 
 
 def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ...]:
-    """What the noise is like."""
     noise = diagnosis.noise
     low, high = noise.coordinate.interval95
     texts = [

@@ -49,7 +49,6 @@ from cmm_uq.maths.uncertainty.rounding import alike, figure
 
 
 def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
-    """results.json of a diagnosis."""
     posterior = found.diagnosis.posterior
     return {
         **head(found.job),
@@ -65,7 +64,6 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
 
 
 def diagnosis_document(found: Diagnosed) -> Document:
-    """The page of a diagnosis."""
     facts, d = found.job.facts, found.diagnosis
     return working_page(
         facts,
@@ -316,7 +314,6 @@ def _rivals(found: Diagnosed) -> Table:
 
 
 def diagnosed_outcome(found: Diagnosed) -> Outcome:
-    """What there is to write of a diagnosis."""
     short = summary_of(found.job.facts, found.diagnosis.verdict, summary_lines(found), found.findings)
     with lettered_in(found.job.facts.job.language):
         document = diagnosis_document(found)

@@ -151,7 +151,6 @@ def _amplitude(effect: Effect, size: float) -> Text:
 
 
 def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | None:
-    """The same for results.json."""
     if plan is None:
         return None
     return {
@@ -238,7 +237,6 @@ def costs_data(found: Diagnosed) -> dict[str, Any]:
 
 
 def explanation(rival: Rival) -> Text:
-    """What remains as an explanation, in short."""
     words = (*titles(rival.effects), *rival.functions)
     return commas(words) if words else say("nothing missing")
 
@@ -360,7 +358,6 @@ def _why(row: SmallestEffect) -> Text:
 
 
 def _taker(name: str) -> Text:
-    """What takes an error up, in words."""
     if name == PLACES:
         return say("the place of the artefact")
     if name == ARTEFACT:

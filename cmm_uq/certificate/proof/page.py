@@ -66,7 +66,6 @@ def method() -> tuple[Text, ...]:
 
 
 def not_covered() -> tuple[Text, ...]:
-    """What the figures say nothing of."""
     return (
         say(
             "Cases are drawn by the same forward model that the diagnosis fits. What is shown is that the diagnosis "
@@ -98,7 +97,6 @@ def how_to_check() -> tuple[Text, ...]:
 
 
 def proof_document(proof: DiagnosisProof) -> Document:
-    """The page of a proof."""
     facts, judgement = proof.job.facts, proof.judgement
     points = proof.design.model.artefact.points
     return working_page(
@@ -167,7 +165,6 @@ def warnings_of(proof: DiagnosisProof) -> tuple[Text, ...]:
 
 
 def conclusion_of(proof: DiagnosisProof) -> Text:
-    """Whether the method is accepted, in a sentence."""
     standings = [one.standing for one in proof.accepted]
     if MISSED in standings:
         return say("The diagnosis does not keep the acceptance figures on these set-ups.")

@@ -104,7 +104,6 @@ KEYS: Mapping[str, str] = MappingProxyType(
 
 
 def proof_outcome(proof: DiagnosisProof) -> Outcome:
-    """What there is to write."""
     return Outcome(
         proof, lambda: proof_document(proof), proof_results(proof), proof_summary(proof), warnings_of(proof),
         {TRUTH: proof.truth, RECORDS: proof.answers}, in_order=proof.conforming,
@@ -112,7 +111,6 @@ def proof_outcome(proof: DiagnosisProof) -> Outcome:
 
 
 def proof_results(proof: DiagnosisProof) -> dict[str, Any]:
-    """results.json."""
     judgement, found = proof.judgement, proof.judgement.by_strength
     sorts = {
         "found": STATED,
@@ -194,7 +192,6 @@ def _finite(value: float) -> float | None:
 
 
 def proof_summary(proof: DiagnosisProof) -> Summary:
-    """For the end of the command."""
     judgement = proof.judgement
     words: dict[str, tuple[str, Standing]] = {MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad")}
     verdicts = tuple(

@@ -65,7 +65,6 @@ def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
 
 
 def unseen_section(proof: DiagnosisProof) -> Section:
-    """What these set-ups cannot see, and why."""
     found: list[Block] = [Paragraph(text) for text in (*_unseen(proof.reaches), *_faults(proof))]
     return Section(say("What these set-ups cannot see"), (*found, *_unrecorded(proof.reaches)))
 
@@ -171,7 +170,6 @@ def said_plot(each: tuple[Tenth, ...]) -> Plot:
 
 
 def _rates(rates: list[Rate]) -> tuple[Floats, Floats, Floats]:
-    """Rates with the ends of their intervals, %."""
     ends = np.array([rate.interval for rate in rates]).reshape(-1, 2)
     share = np.array([rate.count / rate.of for rate in rates])
     return 100 * share, 100 * ends[:, 0], 100 * ends[:, 1]

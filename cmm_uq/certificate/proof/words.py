@@ -93,12 +93,10 @@ STANDING_WORDS: Mapping[str, Text] = MappingProxyType(
 
 
 def percent(rate: Rate) -> Text:
-    """A rate in percent."""
     return DASH if rate.value is None else number(100 * rate.value, ".1f")
 
 
 def interval(rate: Rate) -> Text:
-    """Its 95 % interval in percent."""
     if not rate.of:
         return DASH
     low, high = (100 * each for each in rate.interval)
@@ -106,12 +104,10 @@ def interval(rate: Rate) -> Text:
 
 
 def counted(rate: Rate) -> Text:
-    """How many of how many."""
     return say("{count} of {of}", count=rate.count, of=rate.of) if rate.of else DASH
 
 
 def in_words(rate: Rate) -> Text:
-    """All of it in a line."""
     if not rate.of:
         return say("none to count")
     return say("{count} of {of}, {percent} % (95 %: {interval} %)", count=rate.count, of=rate.of, percent=percent(rate),
@@ -119,7 +115,6 @@ def in_words(rate: Rate) -> Text:
 
 
 def limits(one: AcceptanceFigure) -> Text:
-    """What is asked of a figure."""
     if one.low == 0:
         return say("at most {high:g} %", high=100 * one.high)
     if one.high == 1:
@@ -178,12 +173,10 @@ class DiagnosisProof:
 
     @cached_property
     def reaches(self) -> tuple[Reach, ...]:
-        """What the set-ups show of every effect."""
         return reaches(self.design)
 
     @cached_property
     def faults(self) -> tuple[FaultReach, ...]:
-        """What they show of the artefact's faults."""
         return tuple(fault_reaches(self.design))
 
     @property

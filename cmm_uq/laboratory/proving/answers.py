@@ -68,7 +68,6 @@ class AnswersFolder:
         return records
 
     def keep(self, record: Record) -> None:
-        """Append an answer."""
         with _told(self.folder):
             _synced(self._file, canonical_json(record))
         self.records[record["number"]] = record
@@ -103,7 +102,6 @@ def _whole_lines(content: bytes) -> tuple[dict[int, Record], int]:
 def answer_tasks(
     program: str, setting: Any, tasks: Mapping[int, Any], workers: int, *, keep: Callable[[Record], None]
 ) -> None:
-    """Have every task answered."""
     with contextlib.closing(answers(WorkerTask(program, setting), tasks.items(), workers)) as found:
         for answer in found:
             if answer.failure is not None:

@@ -87,12 +87,10 @@ class Case:
     stranger: UnknownCause | None = None
 
     def as_data(self) -> dict[str, Any]:
-        """For the sealed file."""
         return {**asdict(self), "noise": micrometres(self.noise)}
 
 
 def _told(forgets_s: float) -> float | str:
-    """As truth.toml has it."""
     return forgets_s if isfinite(forgets_s) else "never"
 
 
@@ -111,7 +109,6 @@ SCHEMA = "cmm-uq/prove-truth/1"
 
 
 def truth_file(cases: Sequence[Case], common: Mapping[str, Any]) -> bytes:
-    """The truth as the bytes of a file."""
     whole = {"schema": SCHEMA, **common, "cases": [case.as_data() for case in cases]}
     return canonical_json(whole)
 
@@ -123,5 +120,4 @@ def canonical_json(data: Any) -> bytes:
 
 
 def sha256_of(content: bytes) -> str:
-    """Of a file's bytes."""
     return hashlib.sha256(content).hexdigest()

@@ -84,7 +84,6 @@ class Design:
         return self.values[: len(self.values) - len(self.model.artefact.sizes)]
 
     def sight(self, noise: Noise) -> Sensitivity:
-        """What shows under one noise."""
         key = repr(noise)
         if key not in self.sights:
             self.sights[key] = Sensitivity.of(self.model, self.values, noise)
@@ -140,7 +139,6 @@ class Design:
         }[kind]  # fmt: skip
 
     def case(self, seed: int, number: int) -> Case:
-        """The case of a number."""
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number, 0)))
         cycle, place = divmod(number, len(CYCLE))
         kind = CYCLE[place]
@@ -241,7 +239,6 @@ class Design:
         return artefact_fault(self.model, self.values, stranger.what, self.cte_per_k, stranger.errors)
 
     def recording(self, case: Case, seed: int, effects: Mapping[str, Effect]) -> Points:
-        """What is recorded of a case."""
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(case.number, 1)))
         given = [(effects[h.effect], *effects[h.effect].from_reported(h.parameters)) for h in case.hidden]
         acting_ = [*self.model.effects, *(effect for effect, _, _ in given)]

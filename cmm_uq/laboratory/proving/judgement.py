@@ -65,7 +65,6 @@ class JudgedCase:
 def judge(
     case: Case, record: Mapping[str, Any], named: Mapping[str, float], of_artefact: Callable[[str], bool]
 ) -> JudgedCase:
-    """Judge what was said of a case."""
     if REFUSED in record:
         return JudgedCase(case, REFUSED)
     hidden = {h.effect: h for h in case.hidden}
@@ -146,12 +145,10 @@ class Judgement:
 
     @property
     def answered(self) -> list[JudgedCase]:
-        """Cases in which the diagnosis gave an answer."""
         return self.of_kind(*KINDS)
 
     @cached_property
     def refused(self) -> Rate:
-        """Cases without an answer."""
         return Rate(len(self.cases) - len(self.answered), len(self.cases))
 
     @cached_property
@@ -161,7 +158,6 @@ class Judgement:
 
     @cached_property
     def found(self) -> Rate:
-        """Hidden effects that are found."""
         return Rate.pooled((len(one.found), len(one.case.hidden)) for one in self.of_kind(ONE, TWO))
 
     @cached_property
@@ -176,7 +172,6 @@ class Judgement:
 
     @cached_property
     def right(self) -> Rate:
-        """Cases with the right verdict."""
         return _rate(self.answered, lambda one: one.right)
 
     @cached_property
@@ -225,7 +220,6 @@ class Judgement:
 
     @cached_property
     def by_strength(self) -> DetectionCurve | None:
-        """How finding grows with strength, of all hidden effects."""
         each = [(h.strength, h.effect in one.found) for one in self.of_kind(ONE, TWO) for h in one.case.hidden]
         return detection_curve([s for s, _ in each], [f for _, f in each])
 
@@ -248,7 +242,6 @@ class Judgement:
         return own.false_alarms, own.found, own.coverage
 
     def verdicts(self, kind: str) -> Mapping[str, int]:
-        """How often each verdict was given of cases of a kind."""
         return Counter(one.verdict for one in self.cases if one.case.kind == kind)
 
 
@@ -295,7 +288,6 @@ class AcceptanceFigure:
 
 
 def acceptance_figures(judgement: Judgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
-    """Every figure that is asked for."""
     low, high = (each / 100 for each in facts.coverage_pct)
     found = [
         AcceptanceFigure(

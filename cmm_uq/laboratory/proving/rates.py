@@ -36,13 +36,11 @@ class Rate:
 
     @classmethod
     def pooled(cls, clusters: Iterable[tuple[int, int]]) -> Rate:
-        """Of all clusters together."""
         kept = tuple((k, n) for k, n in clusters if n)
         return cls(sum(k for k, _ in kept), sum(n for _, n in kept), kept)
 
     @property
     def value(self) -> float | None:
-        """The rate; ``None`` of nothing."""
         return self.count / self.of if self.of else None
 
     @cached_property
@@ -69,7 +67,6 @@ class Rate:
 
 
 def clopper_pearson(count: float, of: float, level: float = LEVEL) -> tuple[float, float]:
-    """The exact interval of a binomial rate."""
     tail = 0.5 * (1 - level)
     low = float(special.betaincinv(count, of - count + 1, tail)) if count > 0 else 0.0
     high = float(special.betaincinv(count + 1, of - count, 1 - tail)) if count < of else 1.0

@@ -47,7 +47,6 @@ class Reach:
 
 
 def reaches(design: Design) -> tuple[Reach, ...]:
-    """Of every effect of the catalogue that the job does not name."""
     sight = design.sight(design.noise)
     named = {effect.name for effect in design.model.effects}
     possible, drawn = (
@@ -108,7 +107,6 @@ class FaultReach:
 
 
 def fault_reaches(design: Design) -> Iterator[FaultReach]:
-    """Of every fault that the artefact can have."""
     sight = design.sight(design.noise)
     for what in possible_faults(design.model):
         tried = [

@@ -43,7 +43,6 @@ class Sensitivity:
 
     @classmethod
     def of(cls, model: MeasurementModel, values: Floats, noise: Noise) -> Sensitivity:
-        """Under this noise."""
         components, linear = noise_of(model, values=values), model.linearised(values)
         sizes = _sizes(components, model, noise)
         white, sigma = components.white(sizes), float(sizes.coordinate[0])
@@ -104,7 +103,6 @@ def possible_effects(model: MeasurementModel) -> Iterator[Effect]:
 
 
 def unrecorded(model: MeasurementModel, effect: Effect) -> tuple[str, ...]:
-    """Columns that an effect goes by and that the recording has not."""
     return tuple(column for column in effect.columns if column not in model.artefact.points.columns)
 
 

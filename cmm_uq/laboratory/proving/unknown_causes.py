@@ -125,7 +125,6 @@ def drawn_form(points: Points, what: str, random: np.random.Generator) -> Functi
 
 
 def possible_faults(model: MeasurementModel) -> Iterator[str]:
-    """Faults that this artefact can have."""
     if any(size.certified and size.role == "dimension" for size in model.artefact.sizes):
         yield "length"
     yield "nodes"

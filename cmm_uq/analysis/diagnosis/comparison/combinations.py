@@ -60,7 +60,6 @@ class Combinations:
         return dict(zip(self.found, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
 
     def effects_of(self, key: Key) -> Key:
-        """The known effects of a combination."""
         return frozenset(i for i in key if self.explanations[i].kind == EFFECT)
 
     @cached_property
@@ -74,7 +73,6 @@ class Combinations:
 
     @property
     def most_probable(self) -> Key:
-        """The most probable set of known effects."""
         return max(self.of_effects, key=lambda key: self.of_effects[key])
 
     @property
@@ -99,11 +97,9 @@ class Combinations:
         return beside / self.of_effects[effects]
 
     def of(self, index: int) -> float:
-        """Probability that an explanation is part of the truth."""
         return self.of_any(frozenset((index,)))
 
     def of_any(self, those: Key) -> float:
-        """Probability that at least one of some explanations is part of the truth."""
         return min(1.0, float(sum(p for key, p in self.probability.items() if those & key)))
 
     def instead(self, effects: Key, index: int) -> dict[int, float]:
@@ -214,7 +210,6 @@ class _Search:
             level = self.best_of(level, FOLLOWED)
 
     def best(self) -> Key:
-        """The most probable combination."""
         return max(self.settled, key=lambda key: self.settled[key].log_posterior)
 
     def worth(self, key: Key) -> bool:

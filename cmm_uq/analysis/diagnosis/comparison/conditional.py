@@ -73,13 +73,11 @@ class MemberGroup:
 
     @cached_property
     def _parts(self) -> list[tuple[int, slice]]:
-        """Each explanation with its members."""
         begin = self.first.tolist()
         owners = self.explanation[self.first].tolist()
         return [(i, slice(*ends)) for i, *ends in zip(owners, begin, [*begin[1:], len(self.explanation)], strict=True)]
 
     def only(self, part: slice) -> MemberGroup:
-        """The group of some members."""
         if part == slice(None):
             return self
         return MemberGroup(

@@ -105,7 +105,6 @@ class CandidateComparison:
 
     @cached_property
     def _where(self) -> dict[tuple[int, int], slice]:
-        """Columns of the stack of each explanation's members."""
         return {
             (int(i), int(j)): slice(int(start), int(start) + group.r)
             for group in self._stack[1]
@@ -161,11 +160,9 @@ class CandidateComparison:
         return np.asarray(self._integral(known.squares.copy()) + known.log[:, None], dtype=np.float64)
 
     def precision(self, kind: int) -> Precision:
-        """Of a kind of noise, by its index."""
         return self._noises[kind]
 
     def only(self, kinds: Sequence[int]) -> CandidateComparison:
-        """The same under some of the kinds of noise."""
         found = self.under([self.kinds[k] for k in kinds], self.left)
         index = list(kinds)
         found.__dict__["_noises"] = [self._noises[k] for k in index]

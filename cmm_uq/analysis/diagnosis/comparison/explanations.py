@@ -79,7 +79,6 @@ class Explanation:
 
     @property
     def shaped(self) -> bool:
-        """Whether its versions differ in a nonlinear parameter."""
         return bool(self.members[0].shape)
 
     def could_be(self, effect: Explanation) -> bool:
@@ -206,7 +205,6 @@ def even_scale(effect: Effect, shape: Floats) -> Floats:
 
 
 def from_even_scale(effect: Effect, value: Floats) -> Floats:
-    """What :func:`even_scale` was given."""
     return 1 / value if effect.shape[0].period_along else np.exp(value)
 
 

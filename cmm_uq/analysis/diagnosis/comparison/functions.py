@@ -59,7 +59,6 @@ def unknown_functions(model: MeasurementModel, values: Floats) -> list[Explanati
 
 
 def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
-    """Errors along each axis as functions of each reading."""
     for axis, readings in points.readings.items():
         if np.ptp(readings) < 1.0:
             continue
@@ -76,7 +75,6 @@ def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Ite
 
 
 def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
-    """Errors along each axis as functions of the place in the volume."""
     if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
         return
     factors = list(_smooth_in_space(points.machine_xyz))
@@ -90,7 +88,6 @@ def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterat
 
 
 def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
-    """Scales of each axis as functions of time."""
     time = points.columns.get("time_s")
     if time is None or len(np.unique(time)) < 3:
         return

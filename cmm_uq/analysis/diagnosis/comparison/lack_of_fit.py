@@ -170,7 +170,6 @@ class _Evidence:
 
     @classmethod
     def of(cls, comparison: CandidateComparison, data: Floats, lead: list[Version] | None = None) -> _Evidence:
-        """Of data (m', b), beside a leading effect or the best."""
         nothing, something = comparison.log_evidence(data)
         single = [
             i

@@ -78,7 +78,6 @@ class ModelComparison:
 
     @property
     def explanations(self) -> Sequence[Explanation]:
-        """The candidates."""
         return self.comparison.explanations
 
 
@@ -106,7 +105,6 @@ class SearchResult:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of what was left out."""
         return tuple(self.first.explanations[i].name for i in sorted(self.chosen))
 
 
@@ -337,7 +335,6 @@ def rivals_of(combinations: Combinations, chosen: Key, index: int) -> Key:
 def model_comparison(
     model: MeasurementModel, stated: float | None, seed: int, alpha: float | None = None
 ) -> ModelComparison:
-    """Compare all candidates for what a model leaves."""
     values = model.estimate().about
     singles = known_effects(model, values, tuple(effect.name for effect in model.effects))
     known_as = {term for single in singles if single.effect is not None for term in single.effect.stands_for}
