@@ -13,8 +13,7 @@ from benchmarks.hostile.collisions import collisions, meet
 from benchmarks.hostile.kills import Kill, available, calls, strike
 from benchmarks.hostile.processes import CHEAP, Command, taken_for_a_set
 
-AT_ONCE = 3
-"""Processes side by side: a command here spends its second on imports."""
+AT_ONCE = 3  # processes side by side: a command here spends its second on imports
 
 
 def side_by_side(

@@ -15,8 +15,7 @@ from benchmarks.hostile.seeds import seeds
 from benchmarks.hostile.toml_text import dumps
 from benchmarks.hostile.values import Raw
 
-DEAR = ("report", "diagnose", "plan")
-"""Commands that compute for seconds: they are part of the whole study."""
+DEAR = ("report", "diagnose", "plan")  # commands that compute for seconds: they are part of the whole study
 
 
 @pytest.mark.parametrize("seed", [1, 2])

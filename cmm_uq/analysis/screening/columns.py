@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +48,7 @@ _TEMPERATURE = Bounds(
     ((say("kelvin"), 1.0, -273.15), (Verbatim("°F"), 5 / 9, -160 / 9), (say("thousandths of °C"), 1e-3, 0.0)),
 )  # fmt: skip
 
-BOUNDS: Mapping[str, Bounds] = MappingProxyType(
-    {
+BOUNDS: Mapping[str, Bounds] = {
         "radius_mm": Bounds(1e-9, np.inf, say("a radius is positive")),
         "fit_rms_um": Bounds(0.0, np.inf, say("an rms is not negative")),
         "n_points": Bounds(1.0, np.inf, say("a fit needs points")),
@@ -64,8 +62,7 @@ BOUNDS: Mapping[str, Bounds] = MappingProxyType(
         ),
         "speed_mm_s": Bounds(0.0, np.inf, say("a speed is not negative")),
         **dict.fromkeys(TEMPERATURES, _TEMPERATURE),
-    }
-)  # fmt: skip
+    }  # fmt: skip
 """What each column may hold."""
 
 SENSORS = (*BOUNDS, "time_s")  # columns that are left out where they cannot be trusted

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 from cmm_uq.base.messages import DASH, Text, number, say
@@ -47,49 +46,39 @@ from cmm_uq.laboratory.proving.judgement import (
 from cmm_uq.laboratory.proving.rates import Rate
 from cmm_uq.laboratory.proving.reach import FaultReach, Reach, fault_reaches, reaches
 
-KIND_WORDS: Mapping[str, Text] = MappingProxyType(
-    {
-        NOTHING: say("nothing"),
-        ONE: say("one effect"),
-        TWO: say("two effects"),
-        OUTSIDE: say("a function outside the catalogue"),
-        ARTEFACT: say("a fault of the artefact"),
-    }
-)
-NOISE_WORDS: Mapping[str, Text] = MappingProxyType(
-    {
-        OWN: say("the job's own"),
-        WHITE: say("white"),
-        SET_UP: say("with set-up offsets"),
-        AXIS: say("one axis three times noisier"),
-        GROWING: say("growing with length"),
-        SLOWLY: say("with slow noise in time"),
-        WALKING: say("walking at random in time"),
-        TAILS: say("heavy tails"),
-        RESOLUTION: say("coarse display"),
-    }
-)
-FAULT_WORDS: Mapping[str, Text] = MappingProxyType(
-    {
-        "length": say("a wrong certified length"),
-        "nodes": say("errors of its own points, common to all set-ups"),
-        "warm": say("another temperature than stated, the same throughout"),
-        "warming": say("warming from one set-up to the next"),
-    }
-)
-INTERVAL_WORDS: Mapping[str, Text] = MappingProxyType(
-    {
-        STATED: say("of effects that were found"),
-        NAMED: say("of what the job names, nothing hidden"),
-        NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
-        NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
-        NAMED_MISSED: say("of what the job names, something hidden not found"),
-    }
-)
-ANSWER_WORDS: Mapping[str, Text] = MappingProxyType({**VERDICT_WORDS, REFUSED: say("no answer")})
-STANDING_WORDS: Mapping[str, Text] = MappingProxyType(
-    {MET: say("shown"), OPEN: say("too few cases to decide"), MISSED: say("missed")}
-)
+KIND_WORDS: Mapping[str, Text] = {
+    NOTHING: say("nothing"),
+    ONE: say("one effect"),
+    TWO: say("two effects"),
+    OUTSIDE: say("a function outside the catalogue"),
+    ARTEFACT: say("a fault of the artefact"),
+}
+NOISE_WORDS: Mapping[str, Text] = {
+    OWN: say("the job's own"),
+    WHITE: say("white"),
+    SET_UP: say("with set-up offsets"),
+    AXIS: say("one axis three times noisier"),
+    GROWING: say("growing with length"),
+    SLOWLY: say("with slow noise in time"),
+    WALKING: say("walking at random in time"),
+    TAILS: say("heavy tails"),
+    RESOLUTION: say("coarse display"),
+}
+FAULT_WORDS: Mapping[str, Text] = {
+    "length": say("a wrong certified length"),
+    "nodes": say("errors of its own points, common to all set-ups"),
+    "warm": say("another temperature than stated, the same throughout"),
+    "warming": say("warming from one set-up to the next"),
+}
+INTERVAL_WORDS: Mapping[str, Text] = {
+    STATED: say("of effects that were found"),
+    NAMED: say("of what the job names, nothing hidden"),
+    NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
+    NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
+    NAMED_MISSED: say("of what the job names, something hidden not found"),
+}
+ANSWER_WORDS: Mapping[str, Text] = {**VERDICT_WORDS, REFUSED: say("no answer")}
+STANDING_WORDS: Mapping[str, Text] = {MET: say("shown"), OPEN: say("too few cases to decide"), MISSED: say("missed")}
 
 
 def percent(rate: Rate) -> Text:

@@ -27,7 +27,7 @@ SECOND = np.pi / 648000
 
 def recorded(
     attitudes: Sequence[Sequence[float]], holes_um: Floats | None = None, yaw: float = 0.0, side: int = 3
-) -> Points:  # fmt: skip
+) -> Points:
     """A plate of nine holes, twice in each attitude, 1 µm of noise: holes off their places, and a carriage X that yaws.
 
     The yaw, in ″/m, is written out: e_x = −y·ε, ε = yaw·x; readings count from zero, where X begins.

@@ -37,9 +37,7 @@ def recording(gap_um: float = 12.0) -> Points:
 
 
 def diagnosed(points: Points) -> Diagnosis:
-    return diagnose(
-        MeasurementModel(Ballbar(bar_facts(), points), effects(NAMED)), stated_um=1.5, alpha=0.01, seed=0
-    )  # fmt: skip
+    return diagnose(MeasurementModel(Ballbar(bar_facts(), points), effects(NAMED)), stated_um=1.5, alpha=0.01, seed=0)
 
 
 @cache

@@ -49,10 +49,9 @@ def test_no_other_three_of_twelve_placings_are_much_better(criterion: str) -> No
     known = set_up_information(chosen, candidates(chosen))
     score = score_of(criterion, known, [0, 1, 2])
     start = known.prior
-    every = np.array([
-        float(score((start + known.each[list(some)].sum(axis=0))[None])[0])
-        for some in combinations(range(12), 3)
-    ])  # fmt: skip
+    every = np.array(
+        [float(score((start + known.each[list(some)].sum(axis=0))[None])[0]) for some in combinations(range(12), 3)]
+    )
     found = choose(known, start, score, 3)
     assert found.after == pytest.approx(float(score((start + known.each[list(found.indices)].sum(axis=0))[None])[0]))
     assert np.mean(every < found.after - 1e-9) < 0.02

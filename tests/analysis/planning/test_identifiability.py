@@ -38,8 +38,7 @@ def test_the_scale_of_one_bar_measured_n_times_by_hand() -> None:
     assert parameter.status == "determined"
 
 
-EXACT = BALLBAR.model_copy(update={"u_um": 1e-6})
-"""A bar whose length is as good as known."""
+EXACT = BALLBAR.model_copy(update={"u_um": 1e-6})  # A bar whose length is as good as known
 
 
 @pytest.mark.parametrize(
@@ -179,9 +178,9 @@ def test_expected_uncertainties_are_those_of_drawn_recordings(kind: str) -> None
     random = np.random.default_rng(4)
     squares = np.zeros(len(named))
     for _ in range(40):
-        sizes = np.array([
-            s.nominal + (s.sd * random.standard_normal() if np.isfinite(s.sd) else 0.0) for s in acting.artefact.sizes
-        ])  # fmt: skip
+        sizes = np.array(
+            [s.nominal + (s.sd * random.standard_normal() if np.isfinite(s.sd) else 0.0) for s in acting.artefact.sizes]
+        )
         xyz = acting.simulate(np.zeros(len(named)), sizes, Noise(chosen.sigma), random)
         value = chosen.model(points.at(xyz)).estimate().least_squares.value
         squares += (value[: len(named)] / expected) ** 2

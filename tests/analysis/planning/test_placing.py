@@ -76,9 +76,7 @@ def test_placings_are_numbered_and_timed_in_the_order_of_measurement() -> None:
     points = join(placings, seconds_per_point=10, minutes_per_placing=5, columns={"temp_x_c": 21.0}, first=4)
     assert np.unique(points.measurement).tolist() == [4, 5, 6]
     # five minutes of setting up, then four points ten seconds apart, three times over
-    assert points.columns["time_s"].tolist() == [
-        300, 310, 320, 330, 640, 650, 660, 670, 980, 990, 1000, 1010,
-    ]  # fmt: skip
+    assert points.columns["time_s"].tolist() == [300, 310, 320, 330, 640, 650, 660, 670, 980, 990, 1000, 1010]
     assert set(points.columns["temp_x_c"].tolist()) == {21.0}
     assert [len(placing.points) for placing in split(points)] == [4, 4, 4]
     later = append(points, placings[:1])

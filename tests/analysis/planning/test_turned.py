@@ -39,7 +39,6 @@ class OwnSquareness(Effect):
     coefficients = (Parameter("angle_arcsec", unit("″"), 500.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         own = np.column_stack([points.columns["reference_x_mm"], points.columns["reference_y_mm"]])
         found = np.zeros((len(points), 3, 1))
         for number in np.unique(points.measurement):

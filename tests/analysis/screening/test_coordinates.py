@@ -316,9 +316,7 @@ def test_several_damages_at_once_are_each_named(ballbar_points: Points) -> None:
     xyz[[20, 41]] = xyz[[41, 20]]
     xyz[60, 0] += 53.0
     found = screened(ballbar_points.at(xyz), bar_facts(), needed=set(), set_aside=[], where="bar.csv")
-    assert {f.kind: f.measurements for f in found.findings} == {
-        "unit": (2,), "swapped": (11, 21), "outlier": (31,),
-    }  # fmt: skip
+    assert {f.kind: f.measurements for f in found.findings} == {"unit": (2,), "swapped": (11, 21), "outlier": (31,)}
 
 
 def test_the_other_end_of_a_damaged_bar_goes_with_it() -> None:

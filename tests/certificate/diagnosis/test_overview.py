@@ -25,8 +25,7 @@ from tests.artefacts.simulated import diagnosed
 from tests.certificate.saying import leaves
 from tests.conftest import ROOT
 
-IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")
-"""Words that no technician says."""
+IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")  # words that no technician says
 
 
 @cache
