@@ -18,9 +18,8 @@ import numpy as np
 
 from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.observations import thin_out
-from cmm_uq.analysis.parts.conditional import given_recording
-from cmm_uq.analysis.parts.machine import MachineState
-from cmm_uq.analysis.parts.machine_stated import machine_stated
+from cmm_uq.analysis.parts.machine.conditional import given_recording
+from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.files import Stage, silent
