@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import PriorKnowledge, decide
-from cmm_uq.jobs.conformity import FalseAccept, GuardBand, PosteriorProbability, Rule, UnconditionalRisk
+from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, PosteriorProbability, Rule, UnconditionalRisk
 
 DRAWS = 100_000
 LIMIT, U = 10.0, 1.0

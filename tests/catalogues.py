@@ -15,8 +15,7 @@ from typing import get_args
 
 import polib
 
-from cmm_uq.base.languages.catalogue import file_of
-from cmm_uq.base.languages.language import ENGLISH, Code
+from cmm_uq.base.languages.translation import ENGLISH, Code, file_of
 from tests.conftest import ROOT
 
 PACKAGE = ROOT / "cmm_uq"

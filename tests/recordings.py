@@ -14,7 +14,7 @@ from cmm_uq.analysis.screening.screening import ScreenedRecording
 from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]])
 """Of the DEA Iota 1102, mm."""

@@ -16,22 +16,21 @@ from cmm_uq.app.cli.commands import app
 from cmm_uq.app.commands.jobs.new import known
 from cmm_uq.app.commands.jobs.schemas import SCHEMAS, as_text, schema_named
 from cmm_uq.artefacts import kind_named
-from cmm_uq.base.files.sentences import unit_of
+from cmm_uq.base.files.table import unit_of
 from cmm_uq.certificate.part.results import PART_RESULTS
 from cmm_uq.certificate.proof.results import KEYS as PROOF
 from cmm_uq.certificate.proof.results import RATE
 from cmm_uq.certificate.results.keys import QUANTITY, RESULTS
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.columns import COLUMNS
+from cmm_uq.jobs.importing.recording import REQUIRED
 from cmm_uq.jobs.part import dmis as drawing_dmis
 from cmm_uq.jobs.part import qif as drawing_qif
 from cmm_uq.jobs.part.characteristic import ASKS, LIMITS, Asks
 from cmm_uq.jobs.part.dmis import PROGRAM as DMIS
 from cmm_uq.jobs.part.feature import FEWEST, PATTERNS
 from cmm_uq.jobs.part.qif import PROGRAM as QIF
-from cmm_uq.jobs.recording import REQUIRED
-from cmm_uq.jobs.schema import keys_of
-from cmm_uq.jobs.toml_text import without_place, written
+from cmm_uq.jobs.schema import keys_of, without_place, written
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.machine.physics.catalogue import EVERY

@@ -47,9 +47,9 @@ from cmm_uq.certificate.sections import first_page
 from cmm_uq.certificate.sections.first_page import subject_of
 from cmm_uq.certificate.verify.consistent import check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.jobs.dcc import written
-from cmm_uq.jobs.reported import Reported
+from cmm_uq.jobs.reports import ReportResults as Reported
+from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.due.fleet import FleetValue
 from cmm_uq.laboratory.records import open_records

@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.folder import begin
 from cmm_uq.laboratory.live.instruments.source import Reading
 from cmm_uq.laboratory.live.journal import Moment, lines_in

@@ -13,7 +13,7 @@ import numpy as np
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.bryan.observe import Bryan
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
 

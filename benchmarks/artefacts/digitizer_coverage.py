@@ -20,7 +20,7 @@ from cmm_uq.artefacts.digitizer.observe import Digitizer
 from cmm_uq.artefacts.digitizer.plan import THREE, scan
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.digitizer import euler_313

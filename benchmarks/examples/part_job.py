@@ -21,8 +21,8 @@ from cmm_uq.analysis.parts.virtual import AtPose
 from cmm_uq.app.commands.parts.machine import machine_found
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.part.job import TABLES, read_part
+from cmm_uq.jobs.tables.origin import SIMULATED
 
 ROOT = Path(__file__).parents[2]
 FOLDER, MACHINE = ROOT / "examples" / "part-plate-simulated", ROOT / "examples" / "step-gauge-simulated"

@@ -40,8 +40,8 @@ from cmm_uq.analysis.parts.setup import forms_of, plan_of, surroundings_of
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.part.job import PartJob, part_of
+from cmm_uq.jobs.tables.origin import SIMULATED
 from cmm_uq.machine.physics.catalogue import effects
 
 ROOT = Path(__file__).parents[2]

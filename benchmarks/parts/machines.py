@@ -34,7 +34,7 @@ from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
-from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects

@@ -19,7 +19,7 @@ from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Machine
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
 

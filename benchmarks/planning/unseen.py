@@ -21,7 +21,7 @@ from cmm_uq.analysis.diagnosis.smallest import POWER, smallest_effects
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.noise import PlannedNoise
 from cmm_uq.analysis.planning.set_up import join
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, setting
 

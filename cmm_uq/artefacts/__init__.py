@@ -15,8 +15,8 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import KINDS, Plugin, named, offered
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Kind
 

@@ -4,6 +4,8 @@ A :class:`Message` is a ``str``, its English text, and keeps the pattern and the
 sentence is a :class:`Number`, a :class:`Day`, a unit (:mod:`cmm_uq.base.units`) or :class:`Verbatim`: a name, a serial
 number, words of the user. All are :class:`Text`, which is what the blocks of a document are made of. Patterns are
 literals where they stand, so that a program can list them; texts are joined by the functions here, never by ``str.join``.
+
+What objects show of themselves in a notebook.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 import datetime as dt
 import string
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from html import escape
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -122,7 +125,7 @@ def _plain(value: float) -> float:
     return value if item is None else item()
 
 
-class Filled(string.Formatter):
+class PatternFormatter(string.Formatter):
     """``str.format`` with names only, and capitals."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
@@ -134,7 +137,7 @@ class Filled(string.Formatter):
         return format(value, format_spec)
 
 
-_ENGLISH = Filled()
+_ENGLISH = PatternFormatter()
 
 
 def fields_of(pattern: str) -> frozenset[str]:
@@ -259,3 +262,10 @@ def without_keys(text: Text) -> Text:
 def foreign(text: str) -> Text:
     """Words of another package: a message where it says one, else as they stand."""
     return text if isinstance(text, Text) else Verbatim(text)
+
+
+def html_table(caption: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table for a notebook; every text is escaped. Empty without rows."""
+    body = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
+    return f"<table><caption>{escape(caption)}</caption><tr>{head}</tr>{body}</table>" if body else ""

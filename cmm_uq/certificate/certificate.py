@@ -41,11 +41,10 @@ from cmm_uq.certificate.sections.results import (
 )
 from cmm_uq.certificate.sections.traceability import claimed, traceability
 from cmm_uq.certificate.sections.warnings import warnings
-from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFacts, JobFile
-from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.logo import logo_of
-from cmm_uq.jobs.origin import MEASURED, SIMULATED
+from cmm_uq.jobs.tables.identification import Identification, Laboratory
+from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
 from cmm_uq.maths.uncertainty.rounding import nominal
 
 TEMPERATURES: Mapping[str, Text] = {

@@ -21,11 +21,10 @@ from cmm_uq.base.messages import Key, Text, Verbatim, at_key, day, foreign, say,
 from cmm_uq.certificate.origin import CERTIFICATE
 from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
-from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.jobs.laboratory import Laboratory
-from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.jobs.tables.identification import Identification, Laboratory
+from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced
+from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE
 
 Status = Literal["stated", "missing", "not applicable", "laboratory"]

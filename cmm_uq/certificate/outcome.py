@@ -14,7 +14,7 @@ from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import Origin
+from cmm_uq.jobs.tables.origin import Origin
 from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.maths.inference.draws import Draws
 

@@ -17,8 +17,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, names, plural, say, sentences
-from cmm_uq.jobs.circumstances import TestUncertainty
-from cmm_uq.jobs.origin import MEASURED, SIMULATED
+from cmm_uq.jobs.tables.circumstances import TestUncertainty
+from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
 
 SCHEMA = "cmm-uq/acquired/1"
 ARTEFACT, TIME = "temp_artefact_c", "time_s"
@@ -60,7 +60,7 @@ class JoinedColumn(_Said):
     missing: list[tuple[int, int, int]] = []
 
 
-class Undone(_Said):
+class Withdrawal(_Said):
     """A point that was taken back."""
 
     measurement: int
@@ -69,7 +69,7 @@ class Undone(_Said):
     reason: str
 
 
-class SessionOf(_Said):
+class AcquisitionSession(_Said):
     """One run of the program, and its journal."""
 
     number: int
@@ -78,20 +78,20 @@ class SessionOf(_Said):
     sha256: str
 
 
-class Acquired(_Said):
+class AcquisitionRecord(_Said):
     """All of ``NAME.acquired.json``."""
 
     schema_: str = Field(SCHEMA, alias="schema")
     program: str
     simulated: bool
     recording_sha256: list[str]
-    sessions: list[SessionOf]
+    sessions: list[AcquisitionSession]
     instruments: list[Instrument]
     typed: int
     files: dict[str, str] = {}
     columns: dict[str, JoinedColumn] = {}
     gaps: list[Silence] = []
-    undone: list[Undone] = []
+    undone: list[Withdrawal] = []
     clock_jumps_s: list[float] = []
     damaged: list[str] = []
     left_out: int = 0
@@ -107,7 +107,7 @@ class Provenance:
     changed : whether the recording was changed after it was taken.
     """
 
-    said: Acquired
+    said: AcquisitionRecord
     changed: bool
 
     @property
@@ -213,7 +213,7 @@ def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> 
     """
     fix = "Take it away, or have cmm-uq acquire write it anew"
     try:
-        said = Acquired.model_validate_json(content)
+        said = AcquisitionRecord.model_validate_json(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"])
@@ -229,7 +229,7 @@ def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> 
 
 def as_file(said: Mapping[str, Any]) -> bytes:
     """The bytes of such a file."""
-    return (Acquired.model_validate(said).model_dump_json(indent=2, by_alias=True) + "\n").encode()
+    return (AcquisitionRecord.model_validate(said).model_dump_json(indent=2, by_alias=True) + "\n").encode()
 
 
 def _instrument(one: Instrument) -> Text:

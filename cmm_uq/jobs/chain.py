@@ -16,19 +16,11 @@ from typing import Literal
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, commas, day, names, say, semicolons, sentences
 from cmm_uq.jobs.acquired import ARTEFACT
-from cmm_uq.jobs.as_found import KEY
-from cmm_uq.jobs.column_words import in_words
+from cmm_uq.jobs.columns import in_words
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.jobs.traceability import (
-    ACCREDITED,
-    CONSENSUS,
-    IN_HOUSE,
-    MATERIAL,
-    NATIONAL,
-    OTHER,
-    Traceability,
-)
+from cmm_uq.jobs.reports import AS_FOUND
+from cmm_uq.jobs.tables.artefact import ACCREDITED, CONSENSUS, IN_HOUSE, MATERIAL, NATIONAL, OTHER, Traceability
+from cmm_uq.jobs.tables.origin import MEASURED
 
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
 """What a statement of traceability says; the last where nothing that is certified enters."""
@@ -322,7 +314,7 @@ def dates_out_of_order(of: Job) -> tuple[Text, ...]:
             job.issued, None if job.replaces is None else job.replaces.date,
             say("issued before the certificate that it replaces"), "[job.replaces] date",
         ),
-        (job.date, found, say("the machine was found as it was after it was left"), KEY),
+        (job.date, found, say("the machine was found as it was after it was left"), AS_FOUND),
         (
             job.recalibration_agreed, job.date, say("the next calibration is agreed for a day before this one"),
             "[job] recalibration_agreed",

@@ -14,35 +14,23 @@ from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field
 
 from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED
-from cmm_uq.base.files.table import (
-    Limit,
-    Names,
-    Number,
-    Table,
-    at_least,
-)
-from cmm_uq.base.notebook import html_table
+from cmm_uq.base.files.table import Limit, Names, Number, Table, at_least
+from cmm_uq.base.messages import html_table
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.acquire import AcquireFacts
 from cmm_uq.jobs.acquired import Provenance
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.as_found import AsFound
-from cmm_uq.jobs.circumstances import Circumstances, ProbeFacts, RatedConditions, TestUncertainty
-from cmm_uq.jobs.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
-from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.recognised import Recognised
-from cmm_uq.jobs.laboratory import Laboratory
-from cmm_uq.jobs.machine import MachineFacts
-from cmm_uq.jobs.origin import MEASURED, DerivedFrom, Origin
-from cmm_uq.jobs.plan import PlanFacts
-from cmm_uq.jobs.prediction import Prediction
-from cmm_uq.jobs.prove import ProveFacts
-from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
-from cmm_uq.jobs.simulation import SimulationFacts
-from cmm_uq.jobs.standard_clauses import ClausesForm
-from cmm_uq.jobs.traceability import ThermometerFacts
+from cmm_uq.jobs.importing.sheet import Recognition
+from cmm_uq.jobs.recording.prediction import Prediction, SimulationFacts
+from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts
+from cmm_uq.jobs.reports import AsFound
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, ThermometerFacts
+from cmm_uq.jobs.tables.circumstances import Circumstances, ClausesForm, ProbeFacts, RatedConditions, TestUncertainty
+from cmm_uq.jobs.tables.conformity import ConformityFacts, needed, probe_unfit, standards_in, uncertainty_missing
+from cmm_uq.jobs.tables.identification import Identification, Laboratory
+from cmm_uq.jobs.tables.machine import MachineFacts
+from cmm_uq.jobs.tables.origin import MEASURED, DerivedFrom, Origin
+from cmm_uq.jobs.tables.plan import AcquireFacts, PlanFacts, ProveFacts
 
 Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]
 """A permissible size of an effect in its own unit."""
@@ -287,7 +275,7 @@ class Job:
     short_gauge: ShortGauge | None = None
     prediction: Prediction | None = None
     beside: tuple[Path, ...] = ()
-    imported: tuple[Recognised, ...] = ()
+    imported: tuple[Recognition, ...] = ()
     acquired: Provenance | None = None
     certified: Mapping[str, Any] = field(default_factory=dict)
     clauses: Mapping[str, ClausesForm] = field(default_factory=dict)

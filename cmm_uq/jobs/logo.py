@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal, NoReturn, Protocol
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LOGO_BYTES, LOGO_ELEMENTS, LOGO_PIXELS
-from cmm_uq.jobs.importing.xml_files import local, root_of
-from cmm_uq.jobs.laboratory import Laboratory
+from cmm_uq.jobs.importing.encodings import local, root_of
+from cmm_uq.jobs.tables.identification import Laboratory
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -17,33 +17,36 @@ from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import AXES, Machine, Points
 from cmm_uq.jobs.acquired import Provenance, provenance_name, provenance_of
-from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
-from cmm_uq.jobs.as_found import as_found_of
-from cmm_uq.jobs.conformity import Standards, clause_files, forms_of, needed, uncertainty_missing
-from cmm_uq.jobs.digitizer_calibration import calibration_file
-from cmm_uq.jobs.earlier import against_earlier
-from cmm_uq.jobs.earlier_noise import noise_file
-from cmm_uq.jobs.file_names import check_distinct
+from cmm_uq.jobs.derived_job import files_of, prediction_of
 from cmm_uq.jobs.importing.dcc import ROOT as DCC
+from cmm_uq.jobs.importing.encodings import begins_with
 from cmm_uq.jobs.importing.format import HEAD
-from cmm_uq.jobs.importing.recognised import Recognised
-from cmm_uq.jobs.importing.xml_files import begins_with
+from cmm_uq.jobs.importing.imported import read_recording_file
+from cmm_uq.jobs.importing.sheet import Recognition
 from cmm_uq.jobs.job import Job, JobFile, Tables, job_file_of
-from cmm_uq.jobs.logged_temperatures import KEY, log_of, with_logged
 from cmm_uq.jobs.logo import checked_logo
-from cmm_uq.jobs.machine import MachineFacts
-from cmm_uq.jobs.origin import altered, check_examples, check_mark, is_planned
-from cmm_uq.jobs.predicted import files_of, prediction_of
-from cmm_uq.jobs.recording_file import read_recording_file
-from cmm_uq.jobs.reference_file import EXPANDED, OF_POINTS, reference_file, with_references, with_uncertainties
-from cmm_uq.jobs.replaced import FILE as REPLACED
-from cmm_uq.jobs.results_named import results_named
-from cmm_uq.jobs.short_gauge import KEY as SHORT_GAUGE
-from cmm_uq.jobs.short_gauge import ShortGauge, short_gauge_of
-from cmm_uq.jobs.source import InFolder, InMemory, Source
+from cmm_uq.jobs.recording.digitizer import calibration_file
+from cmm_uq.jobs.recording.references import (
+    EXPANDED,
+    OF_POINTS,
+    against_earlier,
+    reference_file,
+    with_references,
+    with_uncertainties,
+)
+from cmm_uq.jobs.recording.short_gauge import KEY as SHORT_GAUGE
+from cmm_uq.jobs.recording.short_gauge import ShortGauge, short_gauge_of
+from cmm_uq.jobs.recording.temperature_log import KEY, log_of, with_logged
+from cmm_uq.jobs.reports import as_found_of, results_named
+from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
+from cmm_uq.jobs.tables.conformity import Standards, clause_files, forms_of, needed, uncertainty_missing
+from cmm_uq.jobs.tables.identification import REPLACED
+from cmm_uq.jobs.tables.machine import MachineFacts
+from cmm_uq.jobs.tables.origin import altered, check_examples, check_mark, is_planned
 
 if TYPE_CHECKING:
-    from cmm_uq.jobs.certified import Read
+    from cmm_uq.jobs.recording.certified import CertifiedValues as Read
 
 PART = "part"
 """The table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`."""
@@ -79,7 +82,7 @@ def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
-    return _beside_replaced(_read(InFolder(path), nameable, recorded=recorded), InFolder(path))
+    return _beside_replaced(_read(FilesInFolder(path), nameable, recorded=recorded), FilesInFolder(path))
 
 
 def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = True) -> Job:
@@ -94,10 +97,10 @@ def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = T
     ------
     CmmUqError : a file is missing, or says something unknown or contradictory.
     """
-    return _beside_replaced(_read(InMemory(files), nameable, recorded=recorded), InMemory(files))
+    return _beside_replaced(_read(FilesInMemory(files), nameable, recorded=recorded), FilesInMemory(files))
 
 
-def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
+def _read(source: JobFiles, nameable: Nameable, *, recorded: bool) -> Job:
     path, folder = source.toml, source.toml.parent
     content, facts, says = _facts(source, nameable)
     inputs = {"job.toml": content}
@@ -128,7 +131,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
         _refuse_what_needs_a_recording(facts, path)
         check_examples(content, facts.job.origin, str(path))
         return Job(folder, facts, _no_points(machine), inputs | _contents(source, maps, MAP_BYTES))
-    noise = noise_file(facts.plan)
+    noise = results_named(facts.plan.noise_from)
     if noise is not None:
         inputs |= _contents(source, [noise], TABLE_BYTES, written=True)
     if not recorded and not source.has(facts.recording.file):
@@ -165,7 +168,7 @@ def _read(source: Source, nameable: Nameable, *, recorded: bool) -> Job:
                acquired=acquired, certified={} if says is None else says.table, clauses=clauses)  # fmt: skip
 
 
-def _pictures(source: Source, names: Sequence[str]) -> dict[str, bytes]:
+def _pictures(source: JobFiles, names: Sequence[str]) -> dict[str, bytes]:
     """Logos, checked."""
     found = _contents(source, names, LOGO_BYTES)
     for name, content in found.items():
@@ -174,9 +177,9 @@ def _pictures(source: Source, names: Sequence[str]) -> dict[str, bytes]:
 
 
 def _certified_points(
-    facts: JobFile, points: Points, inputs: Mapping[str, bytes], source: Source, says: Read | None,
-    told: Sequence[Recognised | None],
-) -> tuple[JobFile, Points, Recognised | None]:  # fmt: skip
+    facts: JobFile, points: Points, inputs: Mapping[str, bytes], source: JobFiles, says: Read | None,
+    told: Sequence[Recognition | None],
+) -> tuple[JobFile, Points, Recognition | None]:  # fmt: skip
     """A recording with certified values and their uncertainties, the job with covariances, how their file was read."""
     folder, recognised, artefact = source.toml.parent, None, facts.artefact
     where = str(folder / facts.recording.file)
@@ -216,7 +219,7 @@ def _refuse_unstated(facts: JobFile, points: Points, standards: Standards, path:
             raise CmmUqError(problem, where=f"{path}: [[conformity]]", fix=fix)
 
 
-def _beside_replaced(job: Job, source: Source) -> Job:
+def _beside_replaced(job: Job, source: JobFiles) -> Job:
     """The job with what the records had of the certificate that it replaces, where that lies beside it: its last input."""
     replaces = job.facts.job.replaces
     if replaces is None or replaces.results is not None or not source.has(REPLACED):
@@ -224,7 +227,7 @@ def _beside_replaced(job: Job, source: Source) -> Job:
     return replace(job, inputs={**job.inputs, **_contents(source, [REPLACED], TABLE_BYTES, written=True)})
 
 
-def _acquired(facts: JobFile, source: Source, inputs: dict[str, bytes]) -> Provenance | None:
+def _acquired(facts: JobFile, source: JobFiles, inputs: dict[str, bytes]) -> Provenance | None:
     """How the recording was taken live, where a file beside it says so, which is an input then."""
     name = provenance_name(facts.recording.file)
     if not source.has(name):
@@ -264,7 +267,7 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
-    source = InFolder(path)
+    source = FilesInFolder(path)
     content, facts, _ = _facts(source, nameable)
     maps, logs, calibrations = _of_the_machine(facts.machine)
     check_distinct([*maps, *logs, *calibrations], str(path))
@@ -273,7 +276,7 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
-def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile, Read | None]:
+def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Read | None]:
     """job.toml: its bytes, what it says with the digital certificate of its artefact, and what that says alone."""
     content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
     says: list[Read] = []
@@ -295,7 +298,7 @@ def _facts(source: Source, nameable: Nameable) -> tuple[bytes, JobFile, Read | N
     return content, facts, says[0] if says else None
 
 
-def _certified(data: dict[str, Any], source: Source, nameable: Nameable) -> Read | None:
+def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Read | None:
     """What the digital certificate of the artefact says, where the job names one."""
     artefact = data.get("artefact")
     if not isinstance(artefact, dict) or not isinstance(artefact.get("certificate"), dict):
@@ -306,7 +309,7 @@ def _certified(data: dict[str, Any], source: Source, nameable: Nameable) -> Read
         return None
     content = source.content(name, TABLE_BYTES, f"Put it beside job.toml, or mend its name in {source.toml}")
     if begins_with(content[:HEAD], DCC):
-        from cmm_uq.jobs.certified import certified  # the model of a certificate is made for who has one
+        from cmm_uq.jobs.recording.certified import certified  # the model of a certificate is made for who has one
 
         return certified(content, str(source.toml.parent / name), artefact, table)
     if table.with_references:
@@ -353,7 +356,7 @@ def sha256(inputs: Mapping[str, bytes]) -> dict[str, str]:
     return {name: hashlib.sha256(content).hexdigest() for name, content in inputs.items()}
 
 
-def _contents(source: Source, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:
+def _contents(source: JobFiles, names: Sequence[str], limit: Limit, *, written: bool = False) -> dict[str, bytes]:
     fix, found, wrong = f"Put it beside job.toml, or mend its name in {source.toml}", dict[str, bytes](), Gathered()
     for name in names:
         with wrong.going_on():

@@ -1,20 +1,130 @@
-"""Where the files of a job are read from: a folder, or memory, for a job that lies in no folder yet."""
+"""Files of a job: their names, the same on every system and never one that a command writes, and where they are read from."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Protocol
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import Limit
-from cmm_uq.jobs.file_names import check_name, inside
+from cmm_uq.base.files.limits import FILE_NAME, Limit
+
+_WRITTEN = re.compile(
+    r"job\.toml|results\.json|manifest\.json|truth\.toml|compensation\.json|(certificate|diagnosis|plan).*\.(html|pdf)"
+    r"|posterior.*\.npz|budget\..*|\.unfinished-.*",
+    re.IGNORECASE,
+)
+"""Names that commands write, or attach to a certificate, beside the recording of a job."""
+
+DERIVED = ("truth.toml", "compensation.json")
+"""Names that belong beside a derived recording."""
+
+RESULTS = "results.json"
+"""Name of what another job's report wrote; a job may keep it in a folder of its own."""
+
+_REPORTED = re.compile(r"results\.json|posterior.*\.npz|certificate.*\.pdf", re.IGNORECASE)
+"""Names of what another job's report wrote and this one may go by."""
+
+_DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
+"""Windows takes these for devices, with any ending."""
+
+_FORBIDDEN = frozenset('<>:"|?*')
+"""On Windows."""
 
 
-class Source(Protocol):
+def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Path:
+    """Path of a file that a job names.
+
+    Parameters
+    ----------
+    folder : of the job.
+    name : of the file, relative to the folder, parts separated by /.
+    where : file and key, for messages.
+    written : whether a command wrote it, with the recording that it derived.
+
+    Raises
+    ------
+    CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
+    """
+    check_name(name, where, written=written)
+    try:
+        path = (folder / name).resolve()
+        within = path.is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "its links lead back to themselves"
+        raise CmmUqError(f"file {name!r} cannot be read: {reason}", where=where,
+                         fix="Copy the file itself into the folder") from None  # fmt: skip
+    if not within:
+        raise CmmUqError(f"file {name!r} is not inside the job folder", where=where,
+                         fix="Copy the file into the folder and name it there: a job must be complete by itself")  # fmt: skip
+    return path
+
+
+def check_name(name: str, where: str, *, written: bool = False) -> None:
+    """Refuse a name that no file of a job can have; see :func:`inside`.
+
+    Raises
+    ------
+    CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
+    """
+    if problem := _name_problem(name, written):
+        raise CmmUqError(problem[0], where=where, fix=problem[1])
+
+
+def check_distinct(names: Iterable[str], where: str) -> None:
+    """Refuse two names that some systems take for one.
+
+    Raises
+    ------
+    CmmUqError : names differ only by upper and lower case, or by how an accent is written.
+    """
+    seen: dict[str, str] = {}
+    for name in names:
+        other = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), name)
+        if other != name:
+            raise CmmUqError(f"the files {other!r} and {name!r} are one on Windows and macOS", where=where,
+                             fix="Rename one of them")  # fmt: skip
+
+
+def _taken_along(parts: Sequence[str]) -> bool:
+    """Whether a file that a command wrote belongs to a job: with its recording, or as the results of another in a folder."""
+    return parts[-1] in DERIVED or (len(parts) > 1 and _REPORTED.fullmatch(parts[-1]) is not None)
+
+
+def device_name(name: str) -> bool:
+    """Whether Windows takes the name for a device."""
+    return _DEVICE.fullmatch(name) is not None
+
+
+def _name_problem(name: str, written: bool) -> tuple[str, str] | None:
+    rename = "Rename the file"
+    if PurePosixPath(name).is_absolute() or PureWindowsPath(name).drive or name.startswith("\\"):
+        return f"file {name!r} is an absolute name", "Name it relative to job.toml, and keep it beside it"
+    outside = "Copy the file into the folder and name it there: a job must be complete by itself"
+    if not name or name.startswith("../"):
+        return f"file {name!r} is not inside the job folder", outside
+    if "\\" in name:
+        return f"file {name!r} has a backslash in it", "Separate folders by /"
+    if len(name) > FILE_NAME.most:
+        return f"file {name!r} has a name of {len(name)} characters: {FILE_NAME.most} are the most", rename
+    if any(unicodedata.category(c)[0] == "C" or c in _FORBIDDEN for c in name):
+        return f"file {name!r} has a character in it that not every system takes in a name", rename
+    parts = name.split("/")
+    if any(part in ("", ".", "..") for part in parts):
+        return f"file {name!r} is no plain name", "Name it relative to job.toml, without . and .."
+    if any(device_name(part) or part != part.rstrip(". ") or part != part.lstrip() for part in parts):
+        return f"file {name!r} is a name that Windows does not take", rename
+    if _WRITTEN.fullmatch(parts[-1]) and not (written and _taken_along(parts)):
+        return f"file {name!r} has a name that cmm-uq writes itself", rename
+    return None
+
+
+class JobFiles(Protocol):
     """Files by name, as job.toml names them."""
 
     @property
@@ -46,45 +156,45 @@ class Source(Protocol):
 
 
 @dataclass(frozen=True)
-class InFolder:
+class FilesInFolder:
     """Files beside a job.toml."""
 
     toml: Path
 
     def has(self, name: str, *, written: bool = False) -> bool:
-        """See :meth:`Source.has`."""
+        """See :meth:`JobFiles.has`."""
         return os.path.lexists(inside(self.toml.parent, name, str(self.toml), written=written))
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
-        """See :meth:`Source.job_file`."""
+        """See :meth:`JobFiles.job_file`."""
         return content_of(self.toml, limit, fix)
 
     def content(self, name: str, limit: Limit, fix: str, *, written: bool = False) -> bytes:
-        """See :meth:`Source.content`."""
+        """See :meth:`JobFiles.content`."""
         return content_of(inside(self.toml.parent, name, str(self.toml), written=written), limit, fix)
 
 
 @dataclass(frozen=True)
-class InMemory:
+class FilesInMemory:
     """Files by name."""
 
     files: Mapping[str, bytes]
 
     @property
     def toml(self) -> Path:
-        """See :attr:`Source.toml`."""
+        """See :attr:`JobFiles.toml`."""
         return Path("job.toml")
 
     def has(self, name: str, *, written: bool = False) -> bool:
-        """See :meth:`Source.has`."""
+        """See :meth:`JobFiles.has`."""
         return name in self.files
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
-        """See :meth:`Source.job_file`."""
+        """See :meth:`JobFiles.job_file`."""
         return self._content(self.toml.name, limit, fix)
 
     def content(self, name: str, limit: Limit, fix: str, *, written: bool = False) -> bytes:
-        """See :meth:`Source.content`."""
+        """See :meth:`JobFiles.content`."""
         check_name(name, str(self.toml), written=written)
         return self._content(name, limit, fix)
 

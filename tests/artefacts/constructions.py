@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.least_squares import LeastSquares

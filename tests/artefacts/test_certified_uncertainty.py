@@ -13,7 +13,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines.observe import GaugeBlocks, StepGauge
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.physics.catalogue import effects as effects_of
 from cmm_uq.maths.inference.doubt import Doubt, gain

@@ -24,8 +24,8 @@ from cmm_uq.artefacts import BUILT_IN, kind_named, names
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.outcome import OwnAnalysis, Page
-from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.dcc import read as read_dcc
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Kind
 from tests.conftest import ROOT

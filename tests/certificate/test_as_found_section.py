@@ -10,7 +10,7 @@ import pytest
 from cmm_uq.app.commands.analysis import Result, outcome_of
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.jobs.as_found import AsFound
+from cmm_uq.jobs.reports import AsFound
 from tests.artefacts.reading import tables
 from tests.artefacts.simulated import analysed
 from tests.jobs.test_as_found import FOUND

@@ -18,7 +18,7 @@ from cmm_uq.certificate.origin import marked
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.jobs.job import Job, JobFacts
-from cmm_uq.jobs.replaced import Replaced
+from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE
 from tests.certificate.test_completeness import CHAIN, WHOLE, changed, measured
 from tests.conftest import ROOT

@@ -15,8 +15,8 @@ from cmm_uq.certificate.certificate import conditions
 from cmm_uq.certificate.clauses import formal_warnings
 from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.short_gauge import ShortGaugeFacts
-from cmm_uq.jobs.traceability import Traceability
+from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.tables.artefact import Traceability
 from tests.conftest import ROOT
 
 CERTIFIED = {

@@ -11,7 +11,7 @@ from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.certificate.document import DecisionBlock, Plot, Table
 from cmm_uq.certificate.sections.conformity import conformity_section, decision_block, formula
-from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError, Prior
+from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError, Prior
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from tests.analysis.conformity.recorded import STATED, gauge
 

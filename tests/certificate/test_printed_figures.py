@@ -13,7 +13,7 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import DecisionBlock, Facts, Table
 from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.wording import expanded, figure_row, with_uncertainty
-from cmm_uq.jobs.conformity import ConformityFacts, MaximumPermissibleError
+from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.machine.model.kind import BARS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.rounding import nominal

@@ -14,7 +14,7 @@ from defusedxml.ElementTree import fromstring
 from cmm_uq.app.commands.jobs.exchange import write_qif
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.certificate.results.qif_file import SPACE, qif
-from cmm_uq.jobs.reported import Reported
+from cmm_uq.jobs.reports import ReportResults as Reported
 from tests.conftest import ROOT
 
 SCHEMAS = ROOT.parent / "shared" / "schemas" / "qif-3.0"

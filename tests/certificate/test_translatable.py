@@ -12,17 +12,17 @@ from cmm_uq.analysis.conformity.plans import READY
 from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Message, Number, Text, Verbatim, say
 from cmm_uq.base.units import Unit, unit
 from cmm_uq.certificate.document import Column, Document, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.origin import NAME, marked
 from cmm_uq.certificate.pages.budget import budget_document
 from cmm_uq.jobs.job import JobFacts
-from cmm_uq.jobs.laboratory import Laboratory
-from cmm_uq.jobs.machine import MachineFacts
-from cmm_uq.jobs.replaced import Replaced
-from cmm_uq.jobs.traceability import Traceability
+from cmm_uq.jobs.tables.artefact import Traceability
+from cmm_uq.jobs.tables.identification import Laboratory
+from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced
+from cmm_uq.jobs.tables.machine import MachineFacts
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
 from cmm_uq.maths.uncertainty.model_file import ModelFile, read_model_file

@@ -12,8 +12,8 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.as_found import AsFound
 from cmm_uq.jobs.derived_job import derived_toml
+from cmm_uq.jobs.reports import AsFound
 
 FOUND: dict[str, Any] = {
     "schema": "cmm-uq/results/1",

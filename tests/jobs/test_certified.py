@@ -17,8 +17,8 @@ from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.dcc import Certificate, written
-from cmm_uq.jobs.dcc.results import Statement
-from cmm_uq.jobs.dcc.texts import rich
+from cmm_uq.jobs.dcc.administrative import rich
+from cmm_uq.jobs.dcc.certificate import StatementMetadata
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import Artefact
 from tests.conftest import ROOT
@@ -248,12 +248,15 @@ def test_an_item_of_several_is_not_named_for_the_job() -> None:
 CODED = BALL_BAR.with_changes(
     administrative=BALL_BAR.administrative.with_changes(
         laboratory=BALL_BAR.administrative.laboratory.with_changes(code="D-K-15000-01-00"),
-        statements=(*BALL_BAR.administrative.statements, Statement(convention="ILAC MRA", declaration=rich("covered"))),
+        statements=(
+            *BALL_BAR.administrative.statements,
+            StatementMetadata(convention="ILAC MRA", declaration=rich("covered")),
+        ),
     )
 )
 UNTRACED = BALL_BAR.with_changes(
     administrative=BALL_BAR.administrative.with_changes(statements=(
-        Statement(ref_type=("basic_metrologicallyTraceableToSI",), traceable=False, declaration=rich("not traceable")),
+        StatementMetadata(ref_type=("basic_metrologicallyTraceableToSI",), traceable=False, declaration=rich("not traceable")),
     ))
 )  # fmt: skip
 

@@ -18,10 +18,10 @@ from cmm_uq.certificate.clauses import clauses, clauses_data, draft
 from cmm_uq.certificate.digital_certificate.administration import formal_statements, speaking
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.certificate.sections.traceability import claimed, traceability_section
-from cmm_uq.jobs.acquired import Acquired, Provenance
+from cmm_uq.jobs.acquired import AcquisitionRecord, Provenance
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.short_gauge import ShortGauge, ShortGaugeFacts
-from cmm_uq.jobs.traceability import ThermometerFacts, Traceability
+from cmm_uq.jobs.recording.short_gauge import ShortGauge, ShortGaugeFacts
+from cmm_uq.jobs.tables.artefact import ThermometerFacts, Traceability
 from tests.certificate.test_completeness import changed, measured
 
 DAY = dt.date(2026, 3, 2)
@@ -198,7 +198,7 @@ def test_temperatures_that_an_effect_goes_by_need_theirs_and_others_do_not() -> 
 
 @pytest.mark.parametrize(("serial", "claim"), [("T 7", "traceable"), ("T 8", "not shown"), ("", "not shown")])
 def test_a_live_recording_names_the_thermometer_that_it_was_taken_with(serial: str, claim: str) -> None:
-    said = Acquired.model_validate({
+    said = AcquisitionRecord.model_validate({
         "schema": "cmm-uq/acquired/1", "program": "cmm-uq", "simulated": False, "recording_sha256": [], "sessions": [],
         "typed": 0, "instruments": [{"name": "bath", "serial": "T 7", "columns": {"temperature": "temp_artefact_c"}}],
     })  # fmt: skip

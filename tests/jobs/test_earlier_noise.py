@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.earlier_noise import noise_found
+from cmm_uq.jobs.reports import noise_found
 from tests.app.commands.test_planning import JOB, SIX
 
 RESULTS: dict[str, Any] = {

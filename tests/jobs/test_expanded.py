@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.jobs.expanded import Growing, factor_of, growing_of
+from cmm_uq.jobs.tables.length_formula import Growing, factor_of, growing_of
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.file_names import check_distinct, inside
+from cmm_uq.jobs.source import check_distinct, inside
 from tests.jobs.test_reading import edit, refused
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.laboratory import Capability, LengthCapability
+from cmm_uq.jobs.tables.identification import Capability, LengthCapability
 
 WHOLE = Capability(length=LengthCapability(a_um=0.4, k=500.0), scale_ppm=1.5, angle_arcsec=0.3)
 

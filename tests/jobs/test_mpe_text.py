@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.jobs.conformity import ConformityFacts
-from cmm_uq.jobs.mpe_text import mpe_of
+from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.length_formula import mpe_of
 
 
 @pytest.mark.parametrize(

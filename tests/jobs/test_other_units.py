@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from cmm_uq.base.files.other_units import conversion
+from cmm_uq.base.files.numbers import conversion
 
 KEYS = (
     "length_mm",

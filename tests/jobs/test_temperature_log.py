@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.temperature_log import parse_temperature_log
+from cmm_uq.jobs.recording.temperature_log import parse_temperature_log
 
 LOG = b"""time_s,x1_c,x2_c,x3_c,y1_c,y2_c,z1_c,table_c
 0,20.0,20.3,20.6,21,22,19,18

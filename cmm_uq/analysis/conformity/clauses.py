@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from cmm_uq.base.messages import Text, Verbatim, commas, day, say
-from cmm_uq.jobs.standard_clauses import ClausesForm, HeldClause
+from cmm_uq.jobs.tables.circumstances import ClausesForm, HeldClause
 
 REPORTED = "as commonly reported"
 CHOSEN = "this project"

@@ -26,7 +26,7 @@ from scipy import special
 
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.conformity import (
+from cmm_uq.jobs.tables.conformity import (
     FalseAccept,
     GuardBand,
     PosteriorProbability,

@@ -21,8 +21,8 @@ from cmm_uq.analysis.conformity.uncertainty_lines import LENGTH_LINES, WARM, awa
 from cmm_uq.base.messages import NOTHING, Text, at_key, plural, say, semicolons
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.circumstances import LINE_KEYS, TestUncertainty
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.circumstances import LINE_KEYS, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.rounding import nominal
 

@@ -29,7 +29,7 @@ from cmm_uq.analysis.conformity.decision import (
 from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.conformity import Rule
+from cmm_uq.jobs.tables.conformity import Rule
 
 RARE = 50
 """Draws beyond a limit, from which on their share is taken for the probability."""

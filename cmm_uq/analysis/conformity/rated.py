@@ -7,7 +7,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say, semicolons
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.circumstances import Circumstances, RatedConditions
+from cmm_uq.jobs.tables.circumstances import Circumstances, RatedConditions
 
 SECONDS_PER_HOUR = 3600.0
 

@@ -16,7 +16,7 @@ from scipy import special
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.circumstances import Circumstances
+from cmm_uq.jobs.tables.circumstances import Circumstances
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 

@@ -15,7 +15,7 @@ from cmm_uq.analysis.conformity.length_conditions import tip_offsets
 from cmm_uq.analysis.conformity.plans import ALIGNED, OFFSET_TOLERANCE_MM, Condition
 from cmm_uq.base.messages import NOTHING, Text, say
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.jobs.short_gauge import ShortGauge
+from cmm_uq.jobs.recording.short_gauge import ShortGauge
 from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
 from cmm_uq.maths.uncertainty.rounding import nominal, significant
 

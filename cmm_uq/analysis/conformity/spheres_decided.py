@@ -16,7 +16,7 @@ from cmm_uq.analysis.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, at_key, say
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Forms
 from cmm_uq.maths.uncertainty.rounding import nominal
 

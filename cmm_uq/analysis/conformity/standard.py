@@ -40,10 +40,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, at_key, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
-from cmm_uq.jobs.conformity import ConformityFacts, needed
-from cmm_uq.jobs.short_gauge import ShortGauge
+from cmm_uq.jobs.recording.short_gauge import ShortGauge
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
+from cmm_uq.jobs.tables.conformity import ConformityFacts, needed
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget, Line
 from cmm_uq.maths.uncertainty.quantity import Quantity

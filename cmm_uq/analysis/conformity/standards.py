@@ -60,8 +60,8 @@ from cmm_uq.analysis.conformity.uncertainty_lines import FORM_LINES, LENGTH_LINE
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import STANDARDS, Plugin, named, offered
-from cmm_uq.jobs.circumstances import Circumstances
-from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.tables.circumstances import Circumstances
+from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.plans import Condition
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.circumstances import LINE_KEYS, Circumstances, Declared, TestUncertainty
+from cmm_uq.jobs.tables.circumstances import LINE_KEYS, Circumstances, Declared, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.budget import Budget
 

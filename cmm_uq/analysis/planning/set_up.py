@@ -17,8 +17,8 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Message, Text, Verbatim, in_a_row, say, signed
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 VECTORS: Mapping[str, str] = {"approach": "approach_{}", "normal": "n{}"}
 """Columns of vectors that turn with the artefact."""

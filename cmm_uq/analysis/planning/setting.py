@@ -12,10 +12,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.earlier_noise import noise_file, noise_found
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.reports import noise_found, results_named
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Kind, Observe
@@ -143,7 +143,7 @@ class Setting:
 def _noise(job: Job) -> PlannedNoise:
     """What an earlier recording showed, and else what the job states."""
     plan, stated = job.facts.plan, job.facts.recording.u_coordinate_um
-    name = noise_file(plan)
+    name = results_named(plan.noise_from)
     if name is None:
         each = (stated or ASSUMED_NOISE_UM) * MICROMETRE
         return PlannedNoise((each, each, each), _micrometres(plan.placing_um), _micrometres(plan.growth_um))

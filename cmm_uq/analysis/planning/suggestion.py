@@ -27,8 +27,8 @@ from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.planning.volume import Volume, turned_set_ups
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.kind import Observe, Observed
 from cmm_uq.machine.model.measurement import ARTEFACT

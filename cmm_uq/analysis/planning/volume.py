@@ -17,7 +17,7 @@ from cmm_uq.analysis.planning.set_up import Pattern, SetUp
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Machine
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 _ALONG = np.cos(np.radians(3.0))  # cosine from which on a direction is one that a fixture allows
 _ROUNDING = 1e-6

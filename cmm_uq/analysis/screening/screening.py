@@ -24,7 +24,7 @@ from cmm_uq.analysis.screening.shape import Screening
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, comma_or, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.maths.inference.linear_model import LinearModel
 

@@ -15,7 +15,7 @@ from cmm_uq.app.commands.jobs.new import new_job, new_plan
 from cmm_uq.app.commands.reading import compared_with, in_language, job_of, read_job
 from cmm_uq.app.commands.report import diagnosis_outcome, report_outcome
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.jobs.job import Job
 
 if TYPE_CHECKING:

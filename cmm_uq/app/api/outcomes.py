@@ -15,7 +15,7 @@ from cmm_uq.app.commands.plans.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
 from cmm_uq.app.commands.report import DIAGNOSE, REPORT
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.notebook import html_table
+from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.part.figures import part_summary

@@ -36,7 +36,7 @@ from cmm_uq.app.cli.options import (
 from cmm_uq.app.cli.summary import conclude, screen_layout, show_summary
 from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, put_json, show
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import ENGLISH
+from cmm_uq.base.languages.translation import ENGLISH
 
 if TYPE_CHECKING:
     from cmm_uq.base.messages import Text

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cmm_uq.app.commands.parts.new import Answers
     from cmm_uq.certificate.wording import Summary
     from cmm_uq.jobs.importing.keys import ImportKeys
-    from cmm_uq.jobs.importing.recognised import Recognised
+    from cmm_uq.jobs.importing.sheet import Recognition as Recognised
     from cmm_uq.jobs.job import Job
 
 Columns = Annotated[

@@ -14,7 +14,7 @@ import typer
 
 from cmm_uq.app.cli.terminal import on_terminal, say
 from cmm_uq.base.errors import CmmUqError, printable
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.signing import Signing

@@ -29,7 +29,7 @@ from cmm_uq.app.cli.terminal import (
 )
 from cmm_uq.base.errors import printable
 from cmm_uq.base.output import MANIFEST
-from cmm_uq.jobs.origin import COMPENSATED, SIMULATED
+from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Standing

@@ -15,9 +15,9 @@ from cmm_uq.base.messages import Text, in_a_row, plural, say, signed
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.result import SimulatedTwin as Simulated
-from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.simulation import KEY, SimulationFacts
+from cmm_uq.jobs.recording.prediction import KEY, SimulationFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Observe

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import ENGLISH, Code
+from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.maths.uncertainty.evaluation import Evaluation

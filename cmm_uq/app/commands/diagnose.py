@@ -28,7 +28,7 @@ from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.outcome import Found, Outcome, Recipe
 from cmm_uq.certificate.result import Diagnosed
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.simulation import KEY
+from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
 

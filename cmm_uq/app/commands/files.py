@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.output import Ledger, Owner, staged
 from cmm_uq.certificate.outcome import Found, Outcome
 from cmm_uq.certificate.plots.style import fonts_of

@@ -19,7 +19,7 @@ from cmm_uq.base.points import AXES
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.outcome import OwnAnalysis, Recipe
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.display import NANOMETRE, display_step

@@ -19,7 +19,7 @@ from cmm_uq.app.commands.prove_case import CaseSetting, model_on
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.output import interruption
 from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
@@ -28,7 +28,7 @@ from cmm_uq.certificate.outcome import Outcome, OwnAnalysis
 from cmm_uq.certificate.proof.words import DiagnosisProof
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
-from cmm_uq.jobs.simulation import KEY
+from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, answer_tasks
 from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file
 from cmm_uq.laboratory.proving.design import Design

@@ -15,13 +15,14 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.files.toml_file import as_toml
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package
-from cmm_uq.jobs import predicted, reading
-from cmm_uq.jobs.conformity import Standards
+from cmm_uq.jobs import derived_job as predicted
+from cmm_uq.jobs import reading
+from cmm_uq.jobs.derived_job import against
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.predicted import against
 from cmm_uq.jobs.reading import Nameable
+from cmm_uq.jobs.tables.conformity import Standards
 
 if TYPE_CHECKING:
     import pandas as pd

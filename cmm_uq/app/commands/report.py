@@ -10,7 +10,7 @@ from cmm_uq.app.commands import analysis, diagnose
 from cmm_uq.app.commands.certificates.reissue import reissued, with_replaced
 from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.reading import compared_with, in_language, read_job
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.origin import DIGITAL

@@ -214,7 +214,7 @@ def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
     job = in_language(job_of(inputs), language_of(data))
     beside = [name for name in inputs if name not in job.inputs]
     if len(beside) == 1 and (data.get("diagnosis") or {}).get("simulation"):
-        from cmm_uq.jobs.predicted import against
+        from cmm_uq.jobs.derived_job import against
 
         return against(job, inputs[beside[0]], beside[0])
     return job

@@ -23,8 +23,8 @@ from cmm_uq.analysis.planning.candidates import (
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.analysis.planning.volume import Volume
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 _DIAGONALS = (
     (1, 1, 0), (1, -1, 0), (0, 1, -1), (0, 1, 1), (1, 0, -1), (1, 0, 1),

@@ -7,8 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from cmm_uq.base.files.table import Triple, Uncertainty
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.certified_value import DIAMETER, CertifiedValue
+from cmm_uq.jobs.tables.artefact import DIAMETER, ArtefactFacts, CertifiedValue
 
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
 """Of x, y, z."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.model.placings import Placings
 from cmm_uq.machine.model.radial import Radial

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.certified_value import CertifiedValue
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue
 
 
 class ErrorMapFacts(ArtefactFacts):

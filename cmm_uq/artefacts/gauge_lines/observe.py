@@ -21,7 +21,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import unit
-from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Size
 from cmm_uq.machine.model.certified_places import CertifiedPlaces
 from cmm_uq.machine.model.own_faults import by_certificate, faults

@@ -13,8 +13,8 @@ from cmm_uq.analysis.planning.candidates import MIDDLE, check_allowed
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 PITCH = 20.0
 """mm, usual distance of the faces of a step gauge."""

@@ -7,8 +7,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from cmm_uq.base.files.table import Length, Uncertainty
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.certified_value import CertifiedValue
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, CertifiedValue
 
 
 class PlaneFacts(ArtefactFacts):

@@ -12,8 +12,8 @@ from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.artefacts.plane.facts import PlaneFacts
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 
 def surface(facts: ArtefactFacts, plan: PlanFacts, size: Floats) -> Pattern:

@@ -7,7 +7,7 @@ import numpy as np
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, flat_misfit, no_references, spread
 from cmm_uq.artefacts.plane.observe import DIRECTION_POINT, LEAST_POINTS
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
 
 
 class PlateFacts(ReferencedFacts):

@@ -17,7 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import unit
-from cmm_uq.jobs.earlier import NOISE_RATIO
+from cmm_uq.jobs.recording.references import NOISE_RATIO
 from cmm_uq.machine.model.artefact import Indications, Size
 from cmm_uq.machine.model.certified_places import CertifiedPlaces
 from cmm_uq.machine.model.own_faults import by_certificate, faults, since_earlier
@@ -45,7 +45,7 @@ class Plate(Rigid):
     facts : what the job says of the plate; ``length_mm`` is that of the farthest ball from the first by its number where it
         is not stated.
     points : the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
-        An earlier recording in place of references (:mod:`cmm_uq.jobs.earlier`) adds its own noise.
+        An earlier recording in place of references (:mod:`cmm_uq.jobs.recording.references`) adds its own noise.
 
     Raises
     ------

@@ -15,8 +15,8 @@ from cmm_uq.analysis.planning.candidates import (
 from cmm_uq.analysis.planning.set_up import PRINCIPAL_PLANES, Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 
 def plate(facts: ArtefactFacts, plan: PlanFacts, size: float) -> Pattern:

@@ -7,7 +7,7 @@ import numpy as np
 from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, body_misfit, rows_by, spread
 from cmm_uq.artefacts.plate.observe import REFERENCES
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:

@@ -8,9 +8,8 @@ from pydantic import Field, model_validator
 
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import Length, Number, Position, Table, Uncertainty
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.certified_value import LENGTH_WORDS, CertifiedValue
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.tables.artefact import LENGTH_WORDS, ArtefactFacts, CertifiedValue
 
 
 class KnownLength(Table):

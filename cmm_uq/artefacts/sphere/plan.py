@@ -8,8 +8,8 @@ from cmm_uq.analysis.planning.candidates import MIDDLE, PatternFor, RelocatedCan
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
 from cmm_uq.analysis.planning.setting import Planning, Setting
 from cmm_uq.base.messages import say
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 
 RINGS = ((0.0, 1, 0.0), (22.5, 4, 0.0), (45.0, 8, 22.5), (67.5, 4, 0.0), (90.0, 8, 22.5))
 """Points over a hemisphere: degrees from the pole, how many, degrees turned. The usual twenty-five of ISO 10360-5."""

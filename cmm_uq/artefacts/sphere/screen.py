@@ -15,7 +15,7 @@ from cmm_uq.analysis.screening.shape import (
     spread,  # fmt: skip
 )
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
 _NORMAL = 0.4
 """Part of the radius by which a recorded normal may miss the point: normals may be nominal, 20° off."""

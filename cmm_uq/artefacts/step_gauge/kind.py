@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.kind import LENGTHS, Kind
 
 KIND = Kind(

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from cmm_uq.base.files.table import Triple, Uncertainty
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.certified_value import DIAMETER_WORDS, LENGTH_WORDS, CertifiedValue
+from cmm_uq.jobs.tables.artefact import DIAMETER_WORDS, LENGTH_WORDS, ArtefactFacts, CertifiedValue
 
 
 class TriangleFacts(ArtefactFacts):

@@ -1,14 +1,125 @@
-"""Cells of a CSV file with the line that each stands in, for tables that belong to a machine (error map, temperature log)."""
+"""Tables of CSV files, within their limits: the cells of each row with its line, and tables of known columns."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import csv
+import io
+import unicodedata
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.cells import cells_of, column_problem
-from cmm_uq.base.files.limits import ROWS, Limit
+from cmm_uq.base.files.content import text_of
+from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit
 from cmm_uq.base.files.numbers import number_problem
+
+FORMULA = tuple("=+-@＝＋－＠")
+"""What makes a spreadsheet compute a cell instead of showing it."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The rows of a CSV file, the first of which names the columns.
+
+    Parameters
+    ----------
+    header : first row that is neither empty nor a comment; empty where there is none.
+    header_line : its line in the file.
+    rows : the others.
+    lines : their lines.
+    """
+
+    header: list[str]
+    header_line: int
+    rows: list[list[str]]
+    lines: list[int]
+
+
+def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, delimiter: str = ",") -> Cells:
+    """Cells of a CSV file, without the blanks around them; rows may still differ in length.
+
+    Empty rows, and those whose first cell begins with #, are passed over.
+
+    Parameters
+    ----------
+    content : of the file, UTF-8.
+    where : its name, for messages.
+    fix : how to save it, for messages.
+    most_rows : limit on its rows.
+    delimiter : between cells.
+
+    Raises
+    ------
+    CmmUqError : it is no text, or goes beyond the limits of a table.
+    """
+    reader = csv.reader(lines_within(text_of(content, where, fix), where), delimiter=delimiter, skipinitialspace=True)
+    found: list[list[str]] = []
+    lines: list[int] = []
+    count = 0
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if not any(cells) or cells[0].startswith("#"):
+                continue
+            count += len(cells)
+            _check_row(cells, count, len(found), most_rows, where, reader.line_num)
+            found.append(cells)
+            lines.append(reader.line_num)
+    except csv.Error as error:
+        raise CmmUqError(f"is no CSV: {error}", where=f"{where} line {reader.line_num}",
+                         fix="Close every quotation mark on its own line, or leave them out") from None  # fmt: skip
+    if not found:
+        return Cells([], 0, [], [])
+    return Cells(found[0], lines[0], found[1:], lines[1:])
+
+
+def column_problem(name: str) -> str | None:
+    """Why a column cannot bear this name, or ``None``; names are written into new files as they are."""
+    if name.startswith(FORMULA):
+        return f"the column {name!r} begins as a formula does"
+    if any(unicodedata.category(c)[0] == "C" for c in name):
+        return f"the column {name!r} has a control character in its name"
+    if len(name) > COLUMN_NAME.most:
+        return f"the column {name[:20]!r} … has a name of {len(name)} characters: {COLUMN_NAME.most} are the most"
+    return None
+
+
+def _check_row(cells: list[str], count: int, rows: int, most_rows: Limit, file: str, line: int) -> None:
+    if (
+        len(cells) <= COLUMNS.most
+        and rows <= most_rows.most
+        and count <= CELLS.most
+        and max(map(len, cells)) <= CELL.most
+    ):
+        return
+    where = f"{file} line {line}"
+    if len(cells) > COLUMNS.most:
+        raise CmmUqError(f"has {len(cells)} cells, {COLUMNS.most} are the most", where=where,
+                         fix="Keep the columns that the job needs")  # fmt: skip
+    if rows > most_rows.most or count > CELLS.most:
+        raise CmmUqError(
+            f"the table goes on after {rows - 1} rows and {count - len(cells)} cells: more are not read",
+            where=where, fix=f"{most_rows.most} rows and {CELLS.most} cells are the most: split or thin out the table",
+        )  # fmt: skip
+    raise CmmUqError(f"a cell has {max(map(len, cells))} characters, {CELL.most} are the most", where=where,
+                     fix="Shorten it; if it swallowed other rows, a quotation mark is not closed")  # fmt: skip
+
+
+def lines_within(text: str, where: str) -> Iterator[str]:
+    """Lines of a table, none longer and no more of them than are read.
+
+    Raises
+    ------
+    CmmUqError : one is, or there are.
+    """
+    for number, line in enumerate(io.StringIO(text, newline=""), 1):
+        if len(line) > LINE.most or number > LINES.most:
+            raise CmmUqError(
+                f"the line has {len(line)} characters, {LINE.most} are the most" if number <= LINES.most
+                else f"has more than {LINES.most} lines",
+                where=f"{where} line {number}", fix="Check that it is a table with one row a line",
+            )  # fmt: skip
+        yield line
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ written last. What a kill left is completed or rolled back by the next command i
 from __future__ import annotations
 
 from cmm_uq.base.output.manifest import MANIFEST, Manifest, Owner, read_manifest, sha256_of
-from cmm_uq.base.output.staging import InDoubtError, Ledger, Staged, finish_interrupted, is_pending, staged
+from cmm_uq.base.output.staging import InDoubtError, Ledger, Stage, finish_interrupted, is_pending, staged
 
 __all__ = [
-    "MANIFEST", "InDoubtError", "Ledger", "Manifest", "Owner", "Staged", "finish_interrupted", "is_pending", "read_manifest",
+    "MANIFEST", "InDoubtError", "Ledger", "Manifest", "Owner", "Stage", "finish_interrupted", "is_pending", "read_manifest",
     "sha256_of", "staged",
 ]  # fmt: skip

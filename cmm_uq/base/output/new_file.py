@@ -1,4 +1,4 @@
-"""One new file, whole or not at all, and over nothing."""
+"""One new file, whole or not at all, and over nothing; what the system refuses to write, in words."""
 
 from __future__ import annotations
 
@@ -12,6 +12,27 @@ from pathlib import Path
 from cmm_uq.base.errors import OutputError
 from cmm_uq.base.output import interruption
 from cmm_uq.base.output.placing import free_name
+
+
+@contextlib.contextmanager
+def writing_to(path: Path, fix: str) -> Iterator[None]:
+    """While something is written there.
+
+    Parameters
+    ----------
+    path : of a file or folder.
+    fix : what is to be done about a refusal.
+
+    Raises
+    ------
+    OutputError : the disk is full, or the place cannot be written to.
+    """
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        what = error.strerror or error if isinstance(error, OSError) else error
+        raise OutputError(f"cannot be written: {what}", where=str(path), fix=fix) from error
+
 
 _TAKEN, _FOLDER = "Name another file; nothing is overwritten", "Name a folder that exists"
 _MENDED = "Free the disk, mend the permissions, or name another file"

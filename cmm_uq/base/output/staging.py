@@ -1,4 +1,6 @@
-"""A set of files on its way: staged beside its place, then put there.
+"""Locks that the system releases when their process ends, however it ends.
+
+A set of files on its way: staged beside its place, then put there.
 
 ``.unfinished-X`` is staged by the process that holds the lock ``.unfinished-X.lock``. Renamed to ``.placing`` it has the
 output folder for itself; from the moment its ``journal.json`` stands there, the set will be put in place, if need be by the
@@ -22,11 +24,57 @@ from typing import Protocol
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output import interruption
-from cmm_uq.base.output.locking import locked
 from cmm_uq.base.output.manifest import MANIFEST, Manifest, Owner, plain_name
-from cmm_uq.base.output.placing import JOURNAL, NEW, Journal, place, rolled_back
-from cmm_uq.base.output.refusing import writing_to
-from cmm_uq.base.output.replacing import journal_for
+from cmm_uq.base.output.new_file import writing_to
+from cmm_uq.base.output.placing import JOURNAL, NEW, Journal, journal_for, place, rolled_back
+
+
+def locked(path: Path, *, create: bool) -> int | None:
+    """Take the lock of a file without waiting.
+
+    Parameters
+    ----------
+    path : of the lock file.
+    create : make it, and fail where it is there already; otherwise it must be there.
+
+    Returns
+    -------
+    descriptor that holds the lock until it is closed; ``None`` where another process holds it, or the file is gone.
+    """
+    try:
+        descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if create else 0), 0o600)
+    except (FileNotFoundError, FileExistsError):
+        if create:
+            raise
+        return None
+    if _lock(descriptor) and _still(path, descriptor):
+        return descriptor
+    os.close(descriptor)
+    return None
+
+
+def _lock(descriptor: int) -> bool:
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined,unused-ignore]
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
+
+
+def _still(path: Path, descriptor: int) -> bool:
+    """Whether the path names the file that was locked: another process may have removed it in between."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(descriptor))
+    except OSError:
+        return False
+
 
 STAGE, LOCK, PLACING = ".unfinished-", ".lock", ".placing"
 _STAGED = re.compile(rf"{re.escape(STAGE)}([0-9a-f]{{12}})(?:{re.escape(LOCK)})?")
@@ -60,7 +108,7 @@ class Ledger(Protocol):
 
 
 @dataclass(eq=False)
-class Staged:
+class Stage:
     """Where a command writes before its files are put in place; see :func:`staged`."""
 
     folder: Path
@@ -196,7 +244,7 @@ class Staged:
 @contextlib.contextmanager
 def staged(
     folder: Path, owner: Owner, *, inputs: Iterable[Path] = (), force: bool = False, expected: Iterable[str] = ()
-) -> Iterator[Staged]:
+) -> Iterator[Stage]:
     """Room for a set of files beside its place, gone afterwards; fails at once where it could not be put in place.
 
     Parameters
@@ -215,7 +263,7 @@ def staged(
     given = tuple(inputs)
     with writing_to(folder, _MENDED):
         made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-    place = Staged(folder, owner, given, force, "", made)
+    place = Stage(folder, owner, given, force, "", made)
     with interruption.staged(place):
         try:
             with writing_to(folder, _MENDED):
@@ -276,7 +324,7 @@ def synced(folder: Path) -> None:
             os.close(descriptor)
 
 
-def _open(place: Staged) -> None:
+def _open(place: Stage) -> None:
     """Lock before the folder: a stage whose lock nobody holds is nobody's."""
     while place.descriptor < 0:
         place.token = secrets.token_hex(6)

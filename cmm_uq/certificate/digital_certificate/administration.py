@@ -13,34 +13,36 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.base.languages.language import ENGLISH, Code
-from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.languages.translation import ENGLISH, Code
+from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Day, Number, Text, Verbatim, say
 from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
 from cmm_uq.certificate.origin import BANNERS
 from cmm_uq.certificate.results.reissue import Reissue as Comparison
 from cmm_uq.certificate.sections.traceability import claimed
+from cmm_uq.jobs.dcc.administrative import CalibrationLaboratory as Laboratory
 from cmm_uq.jobs.dcc.administrative import (
     Contact,
     CoreData,
-    Identification,
     Item,
     Items,
-    Laboratory,
     Location,
     PerformanceLocation,
     Person,
     PrimitiveQuantity,
     RefTypeDefinition,
-    Replaced,
+    Rich,
     Somebody,
+    Words,
 )
+from cmm_uq.jobs.dcc.administrative import IdentificationNumber as Identification
+from cmm_uq.jobs.dcc.administrative import LanguageText as Said
+from cmm_uq.jobs.dcc.administrative import ReplacedReport as Replaced
+from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
 from cmm_uq.jobs.dcc.quantities import RealList
-from cmm_uq.jobs.dcc.results import Statement
-from cmm_uq.jobs.dcc.texts import Rich, Said, Words
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.tables.origin import MEASURED
 
 SayIn = Callable[[Text], Mapping[str, str]]
 """A text by language, ISO 639-1."""

@@ -13,7 +13,7 @@ from typing import Any
 
 from scipy import special
 
-from cmm_uq.base.languages.language import ENGLISH
+from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.certificate.clauses import certifies
 from cmm_uq.certificate.digital_certificate.administration import (
@@ -44,10 +44,14 @@ from cmm_uq.certificate.digital_certificate.quantities import (
 )
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.dcc.certificate import Administrative, Certificate
-from cmm_uq.jobs.dcc.quantities import Column, Covariance, Ellipsoid, ExpandedList, RealList
-from cmm_uq.jobs.dcc.results import Data, Measurement, Quantity, Result
-from cmm_uq.jobs.dcc.texts import Attached
+from cmm_uq.jobs.dcc.administrative import Attached
+from cmm_uq.jobs.dcc.certificate import Administrative, Certificate, Data, Measurement
+from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
+from cmm_uq.jobs.dcc.certificate import DccResult as Result
+from cmm_uq.jobs.dcc.quantities import CovarianceColumn as Column
+from cmm_uq.jobs.dcc.quantities import CovarianceElement as Covariance
+from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion as Ellipsoid
+from cmm_uq.jobs.dcc.quantities import ExpandedList, RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import Verdicts
 

@@ -18,9 +18,12 @@ from cmm_uq.certificate.digital_certificate.administration import SayIn, english
 from cmm_uq.certificate.digital_certificate.figures import Figures, Part
 from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, dsi_of, ratio
 from cmm_uq.certificate.wording import stated_row, stated_value
+from cmm_uq.jobs.dcc.administrative import Rich
+from cmm_uq.jobs.dcc.certificate import Data, QuantityList
+from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
+from cmm_uq.jobs.dcc.certificate import DccResult as Result
+from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
 from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Real, RealList
-from cmm_uq.jobs.dcc.results import Data, Quantity, QuantityList, Result, Statement
-from cmm_uq.jobs.dcc.texts import Rich
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 
 IN_THE_SCHEMA: Mapping[str, str] = MappingProxyType({

@@ -42,8 +42,10 @@ from cmm_uq.certificate.digital_certificate.quantities import (
 )
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.jobs.dcc.administrative import Characters
+from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
+from cmm_uq.jobs.dcc.certificate import QuantityList
+from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
-from cmm_uq.jobs.dcc.results import Quantity, QuantityList, Statement
 
 Path = tuple[str, ...]
 Part = Quantity | QuantityList

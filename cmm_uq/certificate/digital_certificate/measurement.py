@@ -19,14 +19,17 @@ from cmm_uq.certificate.digital_certificate.administration import (
 )
 from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
-from cmm_uq.jobs.artefact import CertificateFile
 from cmm_uq.jobs.chain import holds_on, right
-from cmm_uq.jobs.dcc.administrative import Hash, Identification, PrimitiveQuantity, Software, Somebody
+from cmm_uq.jobs.dcc.administrative import Hash, PrimitiveQuantity, Software, Somebody
+from cmm_uq.jobs.dcc.administrative import IdentificationNumber as Identification
+from cmm_uq.jobs.dcc.certificate import Data, Equipment, Equipments, Method
+from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
+from cmm_uq.jobs.dcc.certificate import InfluenceCondition as Condition
+from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
 from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Real
-from cmm_uq.jobs.dcc.results import Condition, Data, Equipment, Equipments, Method, Quantity, Statement
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
-from cmm_uq.jobs.traceability import Traceability
+from cmm_uq.jobs.tables.artefact import CertificateFile, Traceability
 
 NO_HASH = "none"
 """Procedure and value of the hash of a certificate that is not at hand as a file."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq import __version__
-from cmm_uq.base.files.cells import FORMULA
+from cmm_uq.base.files.csv_table import FORMULA
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, commas, day, number, plural, say, signed
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate.document import Overview, Standing

@@ -52,7 +52,7 @@ from cmm_uq.certificate.part.results_section import conformity_section, correlat
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.wording import probability
 from cmm_uq.jobs.logo import logo_of
-from cmm_uq.jobs.origin import MEASURED
+from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import gravest, standing_of
 
 

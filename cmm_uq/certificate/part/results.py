@@ -16,7 +16,7 @@ from cmm_uq import __version__
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.base.languages.language import ENGLISH
+from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.base.languages.saying import Said
+from cmm_uq.base.languages.translation import Translation as Said
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.certificate.plots.style import SMALL, lettered, measuring_fonts

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import code_of
+from cmm_uq.base.languages.translation import code_of
 from cmm_uq.certificate.document import Document, view_words
 from cmm_uq.certificate.plots import style as plot_style
 from cmm_uq.certificate.render.fitting import fitted, picture_share, tightness

@@ -19,8 +19,8 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import Code, code_of
-from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.languages.translation import Code, code_of
+from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Text, Verbatim, commas, say, sentences
 from cmm_uq.certificate.document import Document, view_words
 from cmm_uq.certificate.document import attachment_title as described

@@ -12,7 +12,7 @@ from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Decided, State
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
-from cmm_uq.base.languages.language import ENGLISH
+from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.certificate.diagnosis.sections import costs_data, next_data, unseen_data

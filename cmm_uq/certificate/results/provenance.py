@@ -28,9 +28,8 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 from urllib.parse import quote
 
-from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.laboratory import Laboratory
+from cmm_uq.jobs.tables.identification import Identification, Laboratory
 
 PACKAGES = ("emcee", "jinja2", "matplotlib", "numpy", "pandas", "pydantic", "scipy", "typst")
 """Those that a figure, or a page that shows it, rests on."""

@@ -17,7 +17,7 @@ from decimal import Decimal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from cmm_uq.base.units import UNITS, Unit, printed_unit
-from cmm_uq.jobs.reported import Reported
+from cmm_uq.jobs.reports import ReportResults as Reported
 from cmm_uq.jobs.verdicts import Verdicts
 
 SPACE = "http://qifstandards.org/xsd/qif3"

@@ -12,7 +12,7 @@ from cmm_uq.certificate.document import Block, Column, Plot, Section, Table
 from cmm_uq.certificate.document import DecisionBlock as Decision
 from cmm_uq.certificate.plots.conformity import trumpet
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
-from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.maths.uncertainty.budget import Budget, Line
 from cmm_uq.maths.uncertainty.rounding import figure, limit_in_full, nominal, significant
 

@@ -13,8 +13,8 @@ from cmm_uq.certificate.plots.conformity import tolerance_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.first_page import subject_of, tolerances_of
 from cmm_uq.certificate.wording import OUTCOME_WORDS, expanded, title_of
-from cmm_uq.jobs.as_found import Figure
 from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.reports import EstimateWithInterval as Figure
 from cmm_uq.jobs.verdicts import Verdict
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from cmm_uq.maths.uncertainty.rounding import rounded

@@ -9,14 +9,13 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.wording import NO_FACTOR, expanded
-from cmm_uq.jobs.artefact import ArtefactFacts, ReferencedFacts
 from cmm_uq.jobs.chain import Chain, chain_of
-from cmm_uq.jobs.expanded import Growing, factor_of
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED
-from cmm_uq.jobs.reference_file import OF_POINTS
-from cmm_uq.jobs.short_gauge import ShortGaugeFacts
-from cmm_uq.jobs.traceability import Traceability
+from cmm_uq.jobs.recording.references import OF_POINTS
+from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts, Traceability
+from cmm_uq.jobs.tables.length_formula import Growing, factor_of
+from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -12,7 +12,7 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.effect_words import effect_of
 from cmm_uq.certificate.plots.vectors import Shade, profile_plot, residual_field_plot
-from cmm_uq.jobs.column_words import in_words, labelled, unit_of
+from cmm_uq.jobs.columns import in_words, labelled, unit_of
 from cmm_uq.maths.uncertainty.rounding import significant
 
 _READINGS = frozenset(f"{a}_mm" for a in AXES)

@@ -15,7 +15,7 @@ from cmm_uq.analysis.conformity.standards import BUILT_IN
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import NOTHING, Verbatim
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.jobs.conformity import (
+from cmm_uq.jobs.tables.conformity import (
     ConformityFacts,
     FalseAccept,
     GuardBand,

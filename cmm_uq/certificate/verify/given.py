@@ -11,7 +11,7 @@ from typing import Any, get_args
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import GIVEN, PDF_BYTES
-from cmm_uq.base.languages.language import ENGLISH, Code
+from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name
 from cmm_uq.certificate.verify.found import Inquiry

@@ -19,7 +19,7 @@ from cmm_uq.analysis.conformity.limits import Limits, accepted_by, outcome_of
 from cmm_uq.certificate.verify.decided_again import rule_of
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.part_figures import Wrong, is_zone
-from cmm_uq.jobs.conformity import Rule
+from cmm_uq.jobs.tables.conformity import Rule
 from cmm_uq.jobs.verdicts import gravest
 
 DRAWN = 0.03

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any
 
-from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Text
 from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, Printed, Scale
 from cmm_uq.certificate.part.page import verdict_words

@@ -1,14 +1,131 @@
-"""Administrative data of a DCC: software, identifications, the item, the laboratory, the customer."""
+"""Texts and administrative data of a DCC: software, identifications, the item, the laboratory, the customer."""
 
 from __future__ import annotations
 
 import datetime as dt
+from collections.abc import Mapping
 from typing import Annotated, ClassVar
 
-from cmm_uq.jobs.dcc.fields import Child, Choice, Content, Many, Part
+from cmm_uq.jobs.dcc.fields import (
+    BOOLEAN,
+    BYTES,
+    COUNTRY,
+    DATE,
+    LANGUAGE,
+    NAME,
+    NAMES,
+    NOT_EMPTY,
+    STRING,
+    STRINGS,
+    Attribute,
+    Child,
+    Choice,
+    Content,
+    Many,
+    one_of,
+)
+from cmm_uq.jobs.dcc.fields import Element as Part
+from cmm_uq.jobs.dcc.fields import ForeignElements as Foreign
 from cmm_uq.jobs.dcc.quantities import Complex, Constant, Hybrid, Real, RealList
-from cmm_uq.jobs.dcc.simple import BOOLEAN, COUNTRY, DATE, LANGUAGE, NOT_EMPTY, STRINGS, one_of
-from cmm_uq.jobs.dcc.texts import Attached, Id, RefId, RefType, Rich, Words
+from cmm_uq.jobs.dcc.tree import Node
+
+Id = Annotated[str | None, Attribute("id", NAME)]
+RefId = Annotated[tuple[str, ...], Attribute("refId", NAMES)]
+RefType = Annotated[tuple[str, ...], Attribute("refType", STRINGS)]
+
+
+class LanguageText(Part, kw_only=False):
+    """A text in a language (``stringWithLangType``)."""
+
+    text: Annotated[str, Content(STRING)]
+    language: Annotated[str | None, Attribute("lang", LANGUAGE)] = None
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class Words(Part, kw_only=False):
+    """The same text in its languages (``textType``)."""
+
+    contents: Annotated[tuple[LanguageText, ...], Many("content")]
+    id: Id = None
+
+    def __str__(self) -> str:
+        return text_of(self.contents)
+
+
+class Latex(Part, kw_only=False):
+    """A formula (``formulaType``), as LaTeX or MathML."""
+
+    latex: Annotated[str | None, Child("latex", STRING)] = None
+    mathml: Annotated[Markup | None, Child("mathml")] = None
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class Markup(Part, kw_only=False):
+    """XML of another namespace (``xmlType``)."""
+
+    nodes: Annotated[tuple[Node, ...], Foreign()] = ()
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class Attached(Part):
+    """A file (``byteDataType``)."""
+
+    name: Annotated[Words | None, Child("name")] = None
+    description: Annotated[Rich | None, Child("description")] = None
+    file_name: Annotated[str, Child("fileName", NOT_EMPTY)]
+    mime_type: Annotated[str, Child("mimeType", NOT_EMPTY)]
+    data: Annotated[bytes, Child("dataBase64", BYTES)]
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class Rich(Part, kw_only=False):
+    """A text with what belongs to it (``richContentType``)."""
+
+    name: Annotated[Words | None, Child("name")] = None
+    contents: Annotated[
+        tuple[LanguageText | Attached | Latex, ...], Choice(("content", "file", "formula"), many=True)
+    ] = ()
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+    def __str__(self) -> str:
+        return text_of(tuple(part for part in self.contents if isinstance(part, LanguageText)))
+
+
+def text_of(contents: tuple[LanguageText, ...], language: str = "en") -> str:
+    """A text in a language, else without one, else the first; several of one language are paragraphs."""
+    for wanted in (language, None, contents[0].language if contents else None):
+        found = [part.text for part in contents if part.language == wanted]
+        if found:
+            return "\n".join(found)
+    return ""
+
+
+def words(texts: str | Mapping[str, str]) -> Words:
+    """A text, or a text by language."""
+    return Words(_said(texts))
+
+
+def rich(*texts: str | Mapping[str, str], files: tuple[Attached, ...] = (), formulas: tuple[str, ...] = ()) -> Rich:
+    """Paragraphs, each a text or a text by language, with files and formulas (LaTeX)."""
+    paragraphs = tuple(part for text in texts for part in _said(text))
+    return Rich(contents=(*paragraphs, *files, *(Latex(latex) for latex in formulas)))
+
+
+def _said(texts: str | Mapping[str, str]) -> tuple[LanguageText, ...]:
+    if isinstance(texts, str):
+        return (LanguageText(texts),)
+    return tuple(LanguageText(text, language) for language, text in texts.items())
+
 
 SOFTWARE_TYPES = ("application", "bios", "driver", "editor", "firmware", "library", "os", "other")
 ISSUERS = ("manufacturer", "calibrationLaboratory", "customer", "owner", "other")
@@ -43,7 +160,7 @@ class RefTypeDefinition(Part):
     ref_type: RefType = ()
 
 
-class Identification(Part):
+class IdentificationNumber(Part):
     """A serial number, an inventory number, ... with who issued it."""
 
     issuer: Annotated[str, Child("issuer", one_of(*ISSUERS))]
@@ -53,7 +170,7 @@ class Identification(Part):
     ref_type: RefType = ()
 
 
-Identifications = Annotated[tuple[Identification, ...], Many("identification", within="identifications")]
+Identifications = Annotated[tuple[IdentificationNumber, ...], Many("identification", within="identifications")]
 
 
 class Coordinates(Part):
@@ -188,7 +305,7 @@ class PerformanceLocation(Part):
     ref_type: RefType = ()
 
 
-class Replaced(Part):
+class ReplacedReport(Part):
     """A certificate that this one amends or substitutes."""
 
     change: Annotated[str, Child("typeOfChange", one_of(*CHANGES))]
@@ -210,11 +327,11 @@ class CoreData(Part):
     end: Annotated[dt.date, Child("endPerformanceDate", DATE)]
     location: Annotated[PerformanceLocation, Child("performanceLocation")]
     issued: Annotated[dt.date | None, Child("issueDate", DATE)] = None
-    replaced: Annotated[Replaced | None, Child("reportAmendedSubstituted")] = None
+    replaced: Annotated[ReplacedReport | None, Child("reportAmendedSubstituted")] = None
     previous: Annotated[Hash | None, Child("previousReport")] = None
 
 
-class Laboratory(Part):
+class CalibrationLaboratory(Part):
     """The calibration laboratory."""
 
     code: Annotated[str | None, Child("calibrationLaboratoryCode", NOT_EMPTY)] = None

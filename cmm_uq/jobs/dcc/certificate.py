@@ -1,15 +1,236 @@
-"""A digital calibration certificate (DCC), whole."""
+"""A digital calibration certificate (DCC), whole: results with methods, equipment and conditions, and administrative data."""
 
 from __future__ import annotations
 
+import datetime as dt
 from typing import Annotated, ClassVar
 
-from cmm_uq.jobs.dcc.administrative import Contact, CoreData, Items, Laboratory, Person, RefTypeDefinition, Software
-from cmm_uq.jobs.dcc.fields import Attribute, Child, Foreign, Many, Part
-from cmm_uq.jobs.dcc.results import Measurement, Statement
-from cmm_uq.jobs.dcc.simple import Simple
-from cmm_uq.jobs.dcc.texts import Attached
+from cmm_uq.jobs.dcc.administrative import (
+    Attached,
+    Characters,
+    Contact,
+    CoreData,
+    EquipmentClass,
+    Hash,
+    Id,
+    Identifications,
+    Items,
+    Latex,
+    Location,
+    Markup,
+    Person,
+    PrimitiveQuantity,
+    RefId,
+    RefType,
+    RefTypeDefinition,
+    Rich,
+    Software,
+    Somebody,
+    Words,
+)
+from cmm_uq.jobs.dcc.administrative import CalibrationLaboratory as Laboratory
+from cmm_uq.jobs.dcc.fields import (
+    BOOLEAN,
+    BOOLEANS,
+    COUNTRY,
+    DATE,
+    DATE_TIME,
+    DATE_TIMES,
+    NOT_EMPTY,
+    STRING,
+    Attribute,
+    Child,
+    Choice,
+    Many,
+    Simple,
+    listed,
+    one_of,
+)
+from cmm_uq.jobs.dcc.fields import Element as Part
+from cmm_uq.jobs.dcc.fields import ForeignElements as Foreign
+from cmm_uq.jobs.dcc.quantities import Complex, Constant, Hybrid, Lists, Real, RealList
 from cmm_uq.jobs.dcc.tree import Node
+
+CONFORMITIES = ("pass", "fail", "conditionalPass", "conditionalFail", "noPass", "noFail")
+STATES = ("beforeAdjustment", "afterAdjustment", "beforeRepair", "afterRepair")
+
+Strings = tuple[str, ...]
+
+
+class Method(Part):
+    """A method that was used (``usedMethodType``)."""
+
+    name: Annotated[Words, Child("name")]
+    description: Annotated[Rich | None, Child("description")] = None
+    norms: Annotated[Strings, Many("norm", NOT_EMPTY)] = ()
+    references: Annotated[Strings, Many("reference", NOT_EMPTY)] = ()
+    id: Id = None
+    ref_type: RefType = ()
+
+
+Methods = Annotated[tuple[Method, ...], Many("usedMethod", within="usedMethods")]
+UsedSoftware = Annotated[tuple[Software, ...], Many("software", within="usedSoftware")]
+
+
+class Equipment(Part):
+    """A piece of equipment (``measuringEquipmentType``); its certificate is how the result is traceable."""
+
+    name: Annotated[Words, Child("name")]
+    equipment_class: Annotated[tuple[EquipmentClass, ...], Many("equipmentClass")] = ()
+    description: Annotated[Rich | None, Child("description")] = None
+    certificate: Annotated[Hash | None, Child("certificate")] = None
+    manufacturer: Annotated[Somebody | None, Child("manufacturer")] = None
+    model: Annotated[str | None, Child("model", NOT_EMPTY)] = None
+    identifications: Identifications = ()
+    quantities: Annotated[
+        tuple[PrimitiveQuantity, ...], Many("measuringEquipmentQuantity", within="measuringEquipmentQuantities")
+    ] = ()
+    id: Id = None
+    ref_type: RefType = ()
+
+
+class Equipments(Part):
+    """The equipment, and what it has in common."""
+
+    name: Annotated[Words | None, Child("name")] = None
+    equipment_class: Annotated[tuple[EquipmentClass, ...], Many("equipmentClass")] = ()
+    description: Annotated[Rich | None, Child("description")] = None
+    owner: Annotated[Contact | None, Child("owner")] = None
+    identifications: Identifications = ()
+    equipment: Annotated[tuple[Equipment, ...], Many("measuringEquipment")]
+
+
+class Data(Part):
+    """What a result or a condition says, in its order (``dataType``)."""
+
+    parts: Annotated[
+        tuple[Rich | Latex | Attached | Markup | DccQuantity | QuantityList, ...],
+        Choice(("text", "formula", "byteData", "xml", "quantity", "list"), many=True),
+    ]
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class InfluenceCondition(Part):
+    """Something that influences (``conditionType``)."""
+
+    name: Annotated[Words, Child("name")]
+    description: Annotated[Rich | None, Child("description")] = None
+    status: Annotated[str | None, Child("status", one_of(*STATES))] = None
+    certificate: Annotated[Hash | None, Child("certificate")] = None
+    data: Annotated[Data, Child("data")]
+    id: Id = None
+    ref_type: RefType = ()
+
+
+Conditions = Annotated[tuple[InfluenceCondition, ...], Many("influenceCondition", within="influenceConditions")]
+
+
+class StatementMetadata(Part):
+    """A statement, or metadata of a measurement (``statementMetaDataType``)."""
+
+    name: Annotated[Words | None, Child("name")] = None
+    description: Annotated[Rich | None, Child("description")] = None
+    countries: Annotated[Strings, Many("countryCodeISO3166_1", COUNTRY)] = ()
+    convention: Annotated[str | None, Child("convention", NOT_EMPTY)] = None
+    traceable: Annotated[bool | None, Child("traceable", BOOLEAN)] = None
+    norms: Annotated[Strings, Many("norm", NOT_EMPTY)] = ()
+    references: Annotated[Strings, Many("reference", NOT_EMPTY)] = ()
+    declaration: Annotated[Rich | None, Child("declaration")] = None
+    valid: Annotated[bool | None, Child("valid", BOOLEAN)] = None
+    valid_list: Annotated[tuple[bool, ...], Child("validXMLList", BOOLEANS)] = ()
+    date: Annotated[dt.date | None, Child("date", DATE)] = None
+    period: Annotated[str | None, Child("period", STRING)] = None
+    authority: Annotated[Contact | None, Child("respAuthority")] = None
+    conformity: Annotated[str | None, Child("conformity", one_of(*CONFORMITIES))] = None
+    conformity_list: Annotated[
+        Strings, Child("conformityXMLList", listed(one_of(*CONFORMITIES), "states of conformity"))
+    ] = ()
+    data: Annotated[Data | None, Child("data")] = None
+    non_si_definition: Annotated[str | None, Child("nonSIDefinition", NOT_EMPTY)] = None
+    non_si_unit: Annotated[str | None, Child("nonSIUnit", NOT_EMPTY)] = None
+    location: Annotated[Location | None, Child("location")] = None
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+Statements = Annotated[tuple[StatementMetadata, ...], Many("metaData", within="measurementMetaData")]
+
+
+class RelativeUncertainty(Part):
+    """Relative uncertainty of a quantity."""
+
+    stated: Annotated[RealList | Real, Choice(("relativeUncertaintyXmlList", "relativeUncertaintySingle"))]
+
+
+class DccQuantity(Part):
+    """A quantity (``quantityType``)."""
+
+    name: Annotated[Words | None, Child("name")] = None
+    description: Annotated[Rich | None, Child("description")] = None
+    value: Annotated[
+        Rich | Characters | Real | Lists | Hybrid | Complex | Constant | RealList,
+        Choice((
+            "noQuantity", "charsXMLList", "si:real", "si:list", "si:hybrid", "si:complex", "si:constant", "si:realListXMLList",
+        )),
+    ]  # fmt: skip
+    relative_uncertainty: Annotated[RelativeUncertainty | None, Child("relativeUncertainty")] = None
+    methods: Methods = ()
+    software: UsedSoftware = ()
+    equipment: Annotated[Equipments | None, Child("measuringEquipments")] = None
+    conditions: Conditions = ()
+    metadata: Statements = ()
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class QuantityList(Part):
+    """Quantities that belong together, a table (``listType``)."""
+
+    name: Annotated[Words | None, Child("name")] = None
+    description: Annotated[Rich | None, Child("description")] = None
+    time: Annotated[dt.datetime | None, Child("dateTime", DATE_TIME)] = None
+    times: Annotated[tuple[dt.datetime, ...], Child("dateTimeXMLList", DATE_TIMES)] = ()
+    parts: Annotated[tuple[QuantityList | DccQuantity, ...], Choice(("list", "quantity"), many=True)]
+    methods: Methods = ()
+    software: UsedSoftware = ()
+    equipment: Annotated[Equipments | None, Child("measuringEquipments")] = None
+    conditions: Conditions = ()
+    metadata: Statements = ()
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class DccResult(Part):
+    """A result."""
+
+    name: Annotated[Words, Child("name")]
+    description: Annotated[Rich | None, Child("description")] = None
+    data: Annotated[Data, Child("data")]
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
+
+class Measurement(Part):
+    """A measurement with its results (``measurementResultType``)."""
+
+    name: Annotated[Words, Child("name")]
+    description: Annotated[Rich | None, Child("description")] = None
+    methods: Methods = ()
+    software: UsedSoftware = ()
+    equipment: Annotated[Equipments | None, Child("measuringEquipments")] = None
+    conditions: Conditions = ()
+    results: Annotated[tuple[DccResult, ...], Many("result", within="results")]
+    metadata: Statements = ()
+    id: Id = None
+    ref_id: RefId = ()
+    ref_type: RefType = ()
+
 
 VERSION = "3.2.1"
 """Of the schema that is written."""
@@ -33,7 +254,7 @@ class Administrative(Part):
     laboratory: Annotated[Laboratory, Child("calibrationLaboratory")]
     persons: Annotated[tuple[Person, ...], Many("respPerson", within="respPersons")]
     customer: Annotated[Contact, Child("customer")]
-    statements: Annotated[tuple[Statement, ...], Many("statement", within="statements")] = ()
+    statements: Annotated[tuple[StatementMetadata, ...], Many("statement", within="statements")] = ()
 
 
 class Comment(Part):

@@ -1,4 +1,10 @@
-"""How the fields of a class stand in XML: as an attribute, an element, several, one of a choice, or the text itself.
+"""How a class of the DCC stands in XML: its fields as attributes, elements, choices or text, and the simple types of these.
+
+Simple types of the schemas: what the text of an element or an attribute may be, and what it is in Python.
+
+Numbers are :class:`~decimal.Decimal`, so that a certificate keeps the digits it was printed with.
+
+How the fields of a class stand in XML: as an attribute, an element, several, one of a choice, or the text itself.
 
 A class of the model is a :class:`Part` whose fields, in the order of the schema, are annotated so. A field without a default
 has to be there. Parts are made without :mod:`dataclasses`, which would take longer to make seventy classes than it takes to
@@ -7,12 +13,125 @@ write a certificate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import datetime as dt
+import math
+import re
+from base64 import b64decode, b64encode
+from binascii import Error as Base64Error
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
 from types import MappingProxyType, NoneType
 from typing import Any, ClassVar, NoReturn, Self, dataclass_transform, get_args, get_type_hints
 
-from cmm_uq.jobs.dcc.simple import Simple
+from cmm_uq.base.files.limits import NUMERAL
+
+
+@dataclass(frozen=True, eq=False)
+class Simple:
+    """A simple type.
+
+    Parameters
+    ----------
+    what : it is, after "is not": "a date".
+    read : value of a text; raises ``ValueError`` where it is none.
+    write : text of a value; what ``read`` refuses is not written.
+    """
+
+    what: str
+    read: Callable[[str], Any]
+    write: Callable[[Any], str] = str
+
+
+def _matching(what: str, pattern: str) -> Simple:
+    """A text of a pattern."""
+    wanted = re.compile(pattern)
+
+    def read(text: str) -> str:
+        if wanted.fullmatch(text) is None:
+            raise ValueError(text)
+        return text
+
+    return Simple(what, read)
+
+
+def one_of(*words: str) -> Simple:
+    """One of some words."""
+    return _matching(f"one of {', '.join(words)}", "|".join(words))
+
+
+def listed(simple: Simple, plural: str) -> Simple:
+    """A list of them, with spaces between."""
+    return Simple(
+        f"a list of {plural}",
+        lambda text: tuple(simple.read(part) for part in text.split()),
+        lambda values: " ".join(simple.write(value) for value in values),
+    )
+
+
+def _number(what: str, pattern: str, write: Callable[[Decimal], str] = str) -> Simple:
+    wanted = re.compile(pattern)
+
+    def read(text: str) -> Decimal:
+        text = text.strip()
+        if len(text) > NUMERAL.most or wanted.fullmatch(text) is None:
+            raise ValueError(text)
+        try:
+            value = Decimal(text)
+        except InvalidOperation:
+            raise ValueError(text) from None
+        if not math.isfinite(float(value)):
+            raise ValueError(text)
+        return value
+
+    return Simple(what, read, write)
+
+
+def _plain(value: Decimal) -> str:
+    return format(value, "f")
+
+
+def _not_empty(text: str) -> str:
+    if not text or text != text.strip():
+        raise ValueError(text)
+    return text
+
+
+def _boolean(text: str) -> bool:
+    return {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+
+
+def _bytes(text: str) -> bytes:
+    try:
+        return b64decode("".join(text.split()), validate=True)
+    except Base64Error as error:
+        raise ValueError(text) from error
+
+
+_UNSIGNED = r"((\d*\.\d+)|(\d+\.\d*)|(\d+\.?))([Ee][-+]?\d+)?"
+
+STRING = Simple("a text", str)
+NOT_EMPTY = Simple("a text without spaces at its ends", _not_empty)
+BOOLEAN = Simple("true or false", _boolean, lambda value: "true" if value else "false")
+DATE = Simple("a date", lambda text: dt.date.fromisoformat(text.strip()[:10]), dt.date.isoformat)
+DATE_TIME = Simple("a date with time", lambda text: dt.datetime.fromisoformat(text.strip()), dt.datetime.isoformat)
+BYTES = Simple("base64", _bytes, lambda data: b64encode(data).decode())
+COUNTRY = _matching("a country of ISO 3166-1, two capital letters", "[A-Z]{2}")
+LANGUAGE = _matching("a language of ISO 639-1, two small letters", "[a-z]{2}")
+NAME = _matching("a name that XML takes as an id", r"[^\W\d][\w.\-]*")
+DECIMAL = _number("a number", rf"[-+]?{_UNSIGNED}")
+UNCERTAINTY = _number("a number, 0 or more", rf"\+?{_UNSIGNED}")
+FACTOR = _number("a coverage factor, 1 or more", r"\+?(([1-9]\d*\.\d*)|([1-9]\d*))", _plain)
+PROBABILITY = _number("a probability", r"\+?((0(\.\d*)?)|(1(\.0*)?))", _plain)
+
+NAMES = listed(NAME, "ids")
+STRINGS = listed(NOT_EMPTY, "words")
+BOOLEANS = listed(BOOLEAN, "true and false")
+DATE_TIMES = listed(DATE_TIME, "dates with times")
+DECIMALS = listed(DECIMAL, "numbers")
+UNCERTAINTIES = listed(UNCERTAINTY, "numbers, 0 or more")
+FACTORS = listed(FACTOR, "coverage factors, 1 or more")
+PROBABILITIES = listed(PROBABILITY, "probabilities")
 
 
 class _Missing:
@@ -20,7 +139,7 @@ class _Missing:
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
-class Part:
+class Element:
     """A part of a certificate: a frozen record, equal to another of its class with the same fields.
 
     Parameters
@@ -103,11 +222,11 @@ class Content:
 
 
 @dataclass(frozen=True)
-class Foreign:
+class ForeignElements:
     """Elements of other namespaces, as they stand."""
 
 
-Place = Attribute | Child | Many | Choice | Content | Foreign
+Place = Attribute | Child | Many | Choice | Content | ForeignElements
 
 
 @dataclass(frozen=True)
@@ -124,13 +243,13 @@ class Field:
 
     name: str
     place: Place
-    tags: Mapping[str, type[Part] | None]
+    tags: Mapping[str, type[Element] | None]
     required: bool
 
     @property
     def repeated(self) -> bool:
         """Whether it holds several."""
-        return isinstance(self.place, Many | Foreign) or (isinstance(self.place, Choice) and self.place.many)
+        return isinstance(self.place, Many | ForeignElements) or (isinstance(self.place, Choice) and self.place.many)
 
     @property
     def outer(self) -> tuple[str, ...]:
@@ -145,7 +264,7 @@ def prefixed(tag: str, space: str) -> str:
     return tag if ":" in tag else f"{space}:{tag}"
 
 
-def fields_of(cls: type[Part]) -> tuple[Field, ...]:
+def fields_of(cls: type[Element]) -> tuple[Field, ...]:
     """How a class stands in XML."""
     if cls not in _FIELDS:
         hints = get_type_hints(cls, include_extras=True)
@@ -155,14 +274,14 @@ def fields_of(cls: type[Part]) -> tuple[Field, ...]:
     return _FIELDS[cls]
 
 
-_FIELDS: dict[type[Part], tuple[Field, ...]] = {}
+_FIELDS: dict[type[Element], tuple[Field, ...]] = {}
 """What was asked for before."""
 
 
 def _field(name: str, hint: Any, space: str, required: bool) -> Field:
     annotated, place = hint.__origin__, hint.__metadata__[0]
     if isinstance(place, Choice):
-        tags: dict[str, type[Part] | None] = dict(
+        tags: dict[str, type[Element] | None] = dict(
             zip((prefixed(tag, space) for tag in place.tags), _classes(annotated), strict=True)
         )
     elif isinstance(place, Child | Many):
@@ -172,7 +291,7 @@ def _field(name: str, hint: Any, space: str, required: bool) -> Field:
     return Field(name, place, tags, required)
 
 
-def _classes(annotated: Any) -> list[type[Part]]:
+def _classes(annotated: Any) -> list[type[Element]]:
     """The classes of an annotation, without None and the tuple around them."""
     parts = get_args(annotated)
     if not parts:
@@ -180,6 +299,6 @@ def _classes(annotated: Any) -> list[type[Part]]:
     return [cls for part in parts if part not in (NoneType, Ellipsis) for cls in _classes(part)]
 
 
-def by_tag(cls: type[Part]) -> Mapping[str, int]:
+def by_tag(cls: type[Element]) -> Mapping[str, int]:
     """Index of the field that an element belongs to."""
     return {tag: i for i, field in enumerate(fields_of(cls)) for tag in field.outer}

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.jobs.dcc.administrative import Characters
-from cmm_uq.jobs.dcc.certificate import Certificate
+from cmm_uq.jobs.dcc.administrative import Characters, Latex, Rich, Words
+from cmm_uq.jobs.dcc.certificate import Certificate, Data, Measurement, QuantityList
+from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
+from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
 from cmm_uq.jobs.dcc.quantities import (
-    Box,
     Complex,
     Complexes,
     Constant,
-    Ellipsoid,
     Expanded,
     ExpandedList,
     ExpandedListMU,
@@ -37,12 +37,12 @@ from cmm_uq.jobs.dcc.quantities import (
     Univariate,
     UnivariateList,
 )
-from cmm_uq.jobs.dcc.results import Data, Measurement, Quantity, QuantityList, Statement
-from cmm_uq.jobs.dcc.texts import Latex, Rich, Words
+from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion as Ellipsoid
+from cmm_uq.jobs.dcc.quantities import RectangularRegion as Box
 
 
 @dataclass(frozen=True)
-class Stated:
+class ValueUncertainty:
     """Uncertainty of one value.
 
     Parameters
@@ -67,11 +67,11 @@ class Stated:
         return self.expanded / self.factor
 
 
-NONE = Stated()
+NONE = ValueUncertainty()
 
 
 @dataclass(frozen=True)
-class Figures:
+class QuantityFigures:
     """A quantity.
 
     Parameters
@@ -93,7 +93,7 @@ class Figures:
     ref_types: tuple[str, ...] = ()
     values: tuple[Decimal, ...] = ()
     units: tuple[str, ...] = ()
-    uncertainties: tuple[Stated, ...] = ()
+    uncertainties: tuple[ValueUncertainty, ...] = ()
     labels: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
     covariance: tuple[tuple[tuple[Decimal, ...], ...], str] | None = None
@@ -105,7 +105,7 @@ class Figures:
         return " / ".join(filter(None, (*self.place, self.name)))
 
 
-def figures(certificate: Certificate) -> tuple[Figures, ...]:
+def figures(certificate: Certificate) -> tuple[QuantityFigures, ...]:
     """Every quantity of the results, in the order of the certificate."""
     return tuple(
         found
@@ -115,22 +115,22 @@ def figures(certificate: Certificate) -> tuple[Figures, ...]:
     )
 
 
-def of_data(data: Data, place: tuple[str, ...]) -> Iterator[Figures]:
+def of_data(data: Data, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
     """Of a result or an influence condition."""
     for part in data.parts:
         if isinstance(part, (Quantity, QuantityList)):
             yield from _of(part, place)
         elif isinstance(part, (Rich, Latex)):
-            yield Figures(place, "", words=(_words(part),))
+            yield QuantityFigures(place, "", words=(_words(part),))
 
 
-def _of(part: Quantity | QuantityList, place: tuple[str, ...]) -> Iterator[Figures]:
+def _of(part: Quantity | QuantityList, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
     name = _name(part.name)
     if isinstance(part, QuantityList):
         for inner in part.parts:
             yield from _of(inner, (*place, name) if name else place)
         return
-    own = Figures(place, name, part.ref_type, id=part.id)
+    own = QuantityFigures(place, name, part.ref_type, id=part.id)
     for given in _numbers(part.value):
         yield replace(own, **given)
 
@@ -192,32 +192,34 @@ def _of_reals(value: Reals) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _stated(given: object) -> Stated:
+def _stated(given: object) -> ValueUncertainty:
     """Of one value."""
     if isinstance(given, Univariate):
         return _stated(given.stated)
     if isinstance(given, (Expanded, ExpandedMU)):
-        return Stated(given.uncertainty, given.factor, given.probability)
+        return ValueUncertainty(given.uncertainty, given.factor, given.probability)
     if isinstance(given, (Interval, IntervalMU)):
-        return Stated(probability=given.probability, standard=given.standard, low=given.low, high=given.high)
+        return ValueUncertainty(probability=given.probability, standard=given.standard, low=given.low, high=given.high)
     if isinstance(given, StandardMU):
-        return Stated(standard=given.standard)
-    return Stated(standard=given) if isinstance(given, Decimal) else NONE
+        return ValueUncertainty(standard=given.standard)
+    return ValueUncertainty(standard=given) if isinstance(given, Decimal) else NONE
 
 
-def _stated_of_list(given: object, count: int) -> tuple[Stated, ...]:
+def _stated_of_list(given: object, count: int) -> tuple[ValueUncertainty, ...]:
     """One a value, where the certificate may have one for all."""
     if isinstance(given, UnivariateList):
         return _stated_of_list(given.stated, count)
     if isinstance(given, (ExpandedList, ExpandedListMU)):
         columns = (given.uncertainties, given.factors, given.probabilities)
-        return tuple(Stated(*row) for row in zip(*(_each(column, count, None) for column in columns), strict=True))
+        return tuple(
+            ValueUncertainty(*row) for row in zip(*(_each(column, count, None) for column in columns), strict=True)
+        )
     if isinstance(given, StandardListMU):
-        return tuple(Stated(standard=one) for one in _each(given.standards, count, None))
+        return tuple(ValueUncertainty(standard=one) for one in _each(given.standards, count, None))
     if isinstance(given, IntervalList):
         lists = (given.probabilities, given.standards, given.lows, given.highs)
         rows = zip(*(_each(column, count, None) for column in lists), strict=True)
-        return tuple(Stated(None, None, *row) for row in rows)
+        return tuple(ValueUncertainty(None, None, *row) for row in rows)
     return (NONE,) * count
 
 

@@ -9,8 +9,7 @@ import datetime as dt
 from decimal import Decimal
 from typing import Annotated, ClassVar
 
-from cmm_uq.jobs.dcc.fields import Child, Choice, Many, Part
-from cmm_uq.jobs.dcc.simple import (
+from cmm_uq.jobs.dcc.fields import (
     DATE_TIME,
     DATE_TIMES,
     DECIMAL,
@@ -23,7 +22,11 @@ from cmm_uq.jobs.dcc.simple import (
     STRINGS,
     UNCERTAINTIES,
     UNCERTAINTY,
+    Child,
+    Choice,
+    Many,
 )
+from cmm_uq.jobs.dcc.fields import Element as Part
 
 Decimals = tuple[Decimal, ...]
 Label = Annotated[str | None, Child("label", STRING)]
@@ -113,33 +116,33 @@ class Constant(_Si):
     distribution: Distribution = None
 
 
-class Covariance(_Si):
+class CovarianceElement(_Si):
     """An element of a covariance matrix."""
 
     value: Annotated[Decimal, Child("value", DECIMAL)]
     unit: Annotated[str, Child("unit", STRING)]
 
 
-class Column(_Si):
+class CovarianceColumn(_Si):
     """A column of a covariance matrix."""
 
-    covariances: Annotated[tuple[Covariance, ...], Many("covariance")]
+    covariances: Annotated[tuple[CovarianceElement, ...], Many("covariance")]
 
 
 class Region(_Si):
     """A region of several values together (``ellipsoidalRegionType``, ``rectangularRegionType``)."""
 
-    columns: Annotated[tuple[Column, ...], Many("column", within="covarianceMatrix")]
+    columns: Annotated[tuple[CovarianceColumn, ...], Many("column", within="covarianceMatrix")]
     factor: Annotated[Decimal, Child("coverageFactor", FACTOR)]
     probability: Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
     distribution: Distribution = None
 
 
-class Ellipsoid(Region):
+class EllipsoidalRegion(Region):
     """An ellipsoid."""
 
 
-class Box(Region):
+class RectangularRegion(Region):
     """A rectangular region."""
 
 
@@ -154,7 +157,9 @@ class Complex(_Si):
     unit: Annotated[str | None, Child("unit", STRING)] = None
     phase_unit: Annotated[str | None, Child("unitPhase", STRING)] = None
     time: Time = None
-    region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
+    region: Annotated[
+        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
+    ] = None
 
 
 class ExpandedList(_Si):
@@ -209,10 +214,12 @@ class RealList(_Si):
         ExpandedList | IntervalList | UnivariateList | None,
         Choice(("expandedUncXMLList", "coverageIntervalXMLList", "measurementUncertaintyUnivariateXMLList")),
     ] = None
-    region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegionXMLList", "rectangularRegionXMLList"))] = None
+    region: Annotated[
+        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegionXMLList", "rectangularRegionXMLList"))
+    ] = None
 
 
-class Spread(_Si):
+class ListUncertainty(_Si):
     """Uncertainty of every value of a list alike (``listUnivariateUncType``)."""
 
     stated: Annotated[Expanded | Interval, Choice(("expandedUnc", "coverageInterval"))]
@@ -234,15 +241,19 @@ class Reals(_Si):
     label: Label = None
     time: Time = None
     unit: Annotated[str | None, Child("listUnit", STRING)] = None
-    uncertainty: Annotated[Spread | None, Child("listUnivariateUnc")] = None
+    uncertainty: Annotated[ListUncertainty | None, Child("listUnivariateUnc")] = None
     values: Annotated[tuple[RealInList, ...], Many("real")]
-    region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
+    region: Annotated[
+        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
+    ] = None
 
 
 class Bivariate(_Si):
     """Region of every value of a list alike (``listBivariateUncType``)."""
 
-    region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
+    region: Annotated[
+        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
+    ] = None
 
 
 class Complexes(_Si):
@@ -254,7 +265,9 @@ class Complexes(_Si):
     phase_unit: Annotated[str | None, Child("listUnitPhase", STRING)] = None
     uncertainty: Annotated[Bivariate | None, Child("listBivariateUnc")] = None
     values: Annotated[tuple[Complex, ...], Many("complex")]
-    region: Annotated[Ellipsoid | Box | None, Choice(("ellipsoidalRegion", "rectangularRegion"))] = None
+    region: Annotated[
+        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
+    ] = None
 
 
 class Lists(_Si):

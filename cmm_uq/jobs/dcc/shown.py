@@ -8,11 +8,13 @@ from decimal import Decimal
 from typing import Any
 
 from cmm_uq.base.units import UNITS
-from cmm_uq.jobs.dcc.administrative import Contact, Hash, Identification, Somebody
-from cmm_uq.jobs.dcc.certificate import Certificate
-from cmm_uq.jobs.dcc.figures import Figures, Stated, figures, of_data, statements
-from cmm_uq.jobs.dcc.results import Measurement, Statement
-from cmm_uq.jobs.dcc.texts import Words
+from cmm_uq.jobs.dcc.administrative import Contact, Hash, Somebody, Words
+from cmm_uq.jobs.dcc.administrative import IdentificationNumber as Identification
+from cmm_uq.jobs.dcc.certificate import Certificate, Measurement
+from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.figures import QuantityFigures as Figures
+from cmm_uq.jobs.dcc.figures import ValueUncertainty as Stated
+from cmm_uq.jobs.dcc.figures import figures, of_data, statements
 
 _SYMBOLS = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
 
@@ -29,7 +31,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Shown:
+class CertificateView:
     """A certificate for a person.
 
     Parameters
@@ -42,9 +44,9 @@ class Shown:
     parts: tuple[tuple[str, Rows, tuple[Grid, ...]], ...]
 
 
-def shown(certificate: Certificate) -> Shown:
+def shown(certificate: Certificate) -> CertificateView:
     """A certificate for a person."""
-    return Shown(_particulars(certificate), tuple(_measured(one) for one in certificate.measurements))
+    return CertificateView(_particulars(certificate), tuple(_measured(one) for one in certificate.measurements))
 
 
 def unit_shown(dsi: str) -> str:

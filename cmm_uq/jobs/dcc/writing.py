@@ -7,10 +7,8 @@ from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.dcc.certificate import Certificate
-from cmm_uq.jobs.dcc.checks import ids_and_references, problems_of
-from cmm_uq.jobs.dcc.fields import Attribute, Choice, Content, Field, Foreign, Many, Part, fields_of
-from cmm_uq.jobs.dcc.reading import ROOT
-from cmm_uq.jobs.dcc.simple import Simple
+from cmm_uq.jobs.dcc.fields import Attribute, Choice, Content, Element, Field, ForeignElements, Many, Simple, fields_of
+from cmm_uq.jobs.dcc.reading import ROOT, ids_and_references, problems_of
 from cmm_uq.jobs.dcc.tree import Node, serialised
 
 
@@ -30,7 +28,7 @@ def written(certificate: Certificate) -> bytes:
     return serialised(root)
 
 
-def _fill(node: Node, value: Part) -> None:
+def _fill(node: Node, value: Element) -> None:
     for problem, fix in problems_of(value):
         raise CmmUqError(problem, where=node.xpath, fix=fix)
     for field in fields_of(type(value)):
@@ -46,7 +44,7 @@ def _place(node: Node, field: Field, found: Any) -> None:
         node.attributes[place.tag] = _text(node, place.simple, found)
     elif isinstance(place, Content):
         node.text = _text(node, place.simple, found)
-    elif isinstance(place, Foreign):
+    elif isinstance(place, ForeignElements):
         node.children += found
     else:
         values: Sequence[Any] = found if field.repeated else (found,)
@@ -59,7 +57,7 @@ def _place(node: Node, field: Field, found: Any) -> None:
 
 def _element(parent: Node, field: Field, value: Any) -> None:
     place = field.place
-    simple = None if isinstance(place, Choice | Attribute | Content | Foreign) else place.simple
+    simple = None if isinstance(place, Choice | Attribute | Content | ForeignElements) else place.simple
     if simple is not None:
         node = _added(parent, next(iter(field.tags)))
         node.text = _text(node, simple, value)

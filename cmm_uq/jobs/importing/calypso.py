@@ -12,10 +12,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import ROWS
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
-from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Fact, Sheet
+from cmm_uq.jobs.importing.sheet import Fact, Row, Sheet, sheets_of
 
 _AXES = {"xvalue": "X", "yvalue": "Y", "zvalue": "Z"}
 _NEEDED = ("idsymbol", "actual", "featureid")

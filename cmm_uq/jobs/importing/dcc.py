@@ -10,13 +10,13 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import ROWS
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import UNITS
+from cmm_uq.jobs.importing.encodings import begins_with
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
-from cmm_uq.jobs.importing.xml_files import begins_with
 
 if TYPE_CHECKING:
-    from cmm_uq.jobs.dcc.figures import Figures
+    from cmm_uq.jobs.dcc.figures import QuantityFigures as Figures
 
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
 

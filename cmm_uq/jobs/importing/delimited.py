@@ -11,16 +11,15 @@ from collections.abc import Iterable, Sequence
 from itertools import islice
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.cells import lines_within
+from cmm_uq.base.files.csv_table import lines_within
 from cmm_uq.base.files.limits import CELL, COLUMNS, LINE, LINES, ROWS
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text
 from cmm_uq.jobs.importing.format import Format
-from cmm_uq.jobs.importing.header import LINES_BEFORE, header_of
+from cmm_uq.jobs.importing.header import LINES_BEFORE, REFERENCES, header_of
 from cmm_uq.jobs.importing.keys import DELIMITERS, ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.vocabulary import understood
-from cmm_uq.jobs.importing.wanted import REFERENCES
 
 COLUMNS_OF_TEXT = "  "
 """Two blanks or more between cells, so that single ones may stand in headings."""

@@ -9,10 +9,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LINE
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
-from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
+from cmm_uq.jobs.importing.sheet import Cell, Fact, Row, Sheet, sheets_of
 
 PLACED = {"SPHERE": 0, "POINT": 3, "CIRCLE": 3, "ARC": 3, "ELLIPS": 0}
 """Features whose first three numbers are their place, and how many of the next are a direction."""

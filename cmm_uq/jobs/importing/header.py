@@ -1,4 +1,7 @@
-"""Where the table of a sheet begins, and which of its columns is which of a recording's."""
+"""Where the table of a sheet begins, and which of its columns is which of a recording's.
+
+Which columns a table must have: of a recording its coordinates, of an artefact's certificate its certified values.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.keys import ImportKeys, Sources
+from cmm_uq.jobs.importing.keys import ImportKeys, Sources, WrittenUnit, unit_named
 from cmm_uq.jobs.importing.numerals import is_number
+from cmm_uq.jobs.importing.recording import COORDINATES
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
-from cmm_uq.jobs.importing.units import WrittenUnit, unit_named
 from cmm_uq.jobs.importing.vocabulary import Heading, is_nominal, understood
-from cmm_uq.jobs.recording import COORDINATES
 
 LINES_BEFORE = 2000
 """Lines of text before a table that are searched for its header."""
@@ -219,3 +221,7 @@ def _missing(headings: Sequence[str], keys: ImportKeys, wanted: Sequence[Sequenc
             return name
     known = {understood(heading).column for heading in headings} | set(keys.columns)
     return next((name for name in wanted[0] if name not in known), wanted[0][0])
+
+
+POINTS = (COORDINATES,)
+REFERENCES = (*POINTS, ("reference_mm",), ("reference_x_mm", "reference_y_mm", "reference_z_mm"))

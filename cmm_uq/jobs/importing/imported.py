@@ -1,24 +1,28 @@
-"""A file of a laboratory as the columns of a recording, with what was recognised on the way."""
+"""A file of a laboratory as the columns of a recording, with what was recognised on the way.
+
+The file of a recording, whatever its format: the project's own is read as it is, any other is imported.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePath
+
+import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.messages import Verbatim, commas, names, say
-from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.importing.columns import columns_of
-from cmm_uq.jobs.importing.header import Header, header_of, no_header
-from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
-from cmm_uq.jobs.importing.recognised import Recognised
-from cmm_uq.jobs.importing.registry import format_of
+from cmm_uq.jobs.importing.format import format_of
+from cmm_uq.jobs.importing.header import POINTS, REFERENCES, Header, header_of, no_header
+from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys, length_named
+from cmm_uq.jobs.importing.recording import REQUIRED, points_of, read_recording
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
-from cmm_uq.jobs.importing.units import length_named
-from cmm_uq.jobs.importing.wanted import POINTS, REFERENCES
+from cmm_uq.jobs.importing.sheet import Recognition as Recognised
 
 _UNIT_LINE = re.compile(
     r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",
@@ -27,7 +31,7 @@ _UNIT_LINE = re.compile(
 
 
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedTable:
     """A file, read.
 
     Parameters
@@ -42,7 +46,7 @@ class Imported:
     recognised: Recognised
 
 
-def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> Imported:
+def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
     """A recording in any format that is known.
 
     Parameters
@@ -73,7 +77,7 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
     return replace(found, columns=columns, recognised=recognised)
 
 
-def imported_references(content: bytes, where: str, keys: FileKeys) -> Imported:
+def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedTable:
     """Certified values in any format that is known: distances or places, by the number of their point.
 
     Raises
@@ -88,7 +92,7 @@ def imported_references(content: bytes, where: str, keys: FileKeys) -> Imported:
 
 def _read(
     content: bytes, where: str, keys: ImportKeys, wanted: Sequence[Sequence[str]], reach_mm: float | None
-) -> Imported:
+) -> ImportedTable:
     if len(content) > TABLE_BYTES.most:
         raise CmmUqError(f"is larger than the {TABLE_BYTES.most} {TABLE_BYTES.unit} that are read of such a file", where=where,
                          fix="Split it")  # fmt: skip
@@ -99,7 +103,7 @@ def _read(
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
     told = Recognised(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
                       columns.sources, len(columns.lines))  # fmt: skip
-    return Imported(columns.values, columns.lines, told)
+    return ImportedTable(columns.values, columns.lines, told)
 
 
 def _chosen(
@@ -135,3 +139,48 @@ def _with_unit(sheet: Sheet, header: Header) -> Sheet:
         if found and (unit := length_named(found[1].strip("[]().,;"))):
             return replace(sheet, unit=unit.name)
     return sheet
+
+
+_HEAD = 16_384
+
+
+def read_recording_file(
+    content: bytes, where: str, machine: Machine, keys: ImportKeys, without: Collection[str] = ()
+) -> tuple[Points, Recognised | None]:  # fmt: skip
+    """Points of a recording, and how it was read where it is in another format than the project's own.
+
+    Parameters
+    ----------
+    content : bytes of the file.
+    where : its path, for messages.
+    machine : that read the points.
+    keys : what the job says beside the name of the file.
+    without : columns that are known to have empty cells, and are left out.
+
+    Raises
+    ------
+    CmmUqError : it is damaged, or of no format that is known.
+    """
+    if not keys.asked and is_own(content):
+        return read_recording(content, where, machine, without), None
+
+    found = imported(content, where, keys, reach_mm=_reach(machine))
+    return points_of(found.columns, found.lines.tolist(), where, machine), found.recognised
+
+
+def is_own(content: bytes) -> bool:
+    """Whether a recording is in the project's own format: empty, or a header that names one of its columns between commas."""
+    return not content.strip() or any(name in REQUIRED for name in header(content))
+
+
+def header(content: bytes) -> list[str]:
+    """Names between commas in the first line that is no comment."""
+    text = content[:_HEAD].decode("utf-8-sig", errors="replace")
+    line = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
+    return [name.strip().strip('"') for name in line.split(",")]
+
+
+def _reach(machine: Machine) -> float | None:
+    """Diagonal of the travel, mm; ``None`` where the job does not say it."""
+    spans = machine.travel_mm[:, 1] - machine.travel_mm[:, 0]
+    return float(np.linalg.norm(spans)) if np.all(np.isfinite(spans)) else None

@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
-from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
+from cmm_uq.jobs.importing.sheet import Cell, Fact, Row, Sheet, sheets_of
 
 _LINE = re.compile(r"(?:^|[\s>\]:])(?P<tag>[E\d]\d{4})\s+(?P<what>[#&%!]|[A-Za-z]\w*\s*\()\s*(?P<rest>.*)$")
 _TERM = re.compile(r"\b(X|Y|Z|IJK)\s*\(([^)]*)\)")

@@ -1,15 +1,118 @@
-"""What a job says beside the name of a file that is to be imported: the keys that settle what the file leaves open."""
+"""What a job says beside the name of a file that is imported, and units as laboratories write them.
+
+Units as laboratories write them, and how they become those of a recording.
+
+Factors are quotients of whole numbers, so that 1.5 inch is the double nearest to 38.1 mm.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS
 from cmm_uq.base.files.table import Column, Table
-from cmm_uq.jobs.importing.units import LENGTHS, length_named
+from cmm_uq.base.points import Floats
+
+
+@dataclass(frozen=True)
+class WrittenUnit:
+    """A unit: ``value · up / down + offset`` in the unit of its sort (mm, °C, s, hPa, %).
+
+    Parameters
+    ----------
+    name : as it is said.
+    sort : of quantity.
+    up, down : whole numbers.
+    offset : added after.
+    """
+
+    name: str
+    sort: str
+    up: int = 1
+    down: int = 1
+    offset: float = 0.0
+
+
+LENGTH, TEMPERATURE, TIME, PRESSURE, SHARE = "length", "temperature", "time", "pressure", "share"
+
+_UNITS = (
+    (WrittenUnit("mm", LENGTH), "mm millimeter millimeters millimetre millimetres millimetri milimetro milimetros"),
+    (WrittenUnit("um", LENGTH, 1, 1000), "µm um μm micrometer micrometre micron microns mikrometer mikron micrometri"),
+    (WrittenUnit("nm", LENGTH, 1, 1_000_000), "nm nanometer nanometre"),
+    (WrittenUnit("cm", LENGTH, 10), "cm centimeter centimetre zentimeter"),
+    (WrittenUnit("m", LENGTH, 1000), "m meter metre metri metros"),
+    (WrittenUnit("inch", LENGTH, 127, 5), "in inch inches zoll pouce pouces pollice pollici pulgada pulgadas \" ″ ''"),
+    (WrittenUnit("mil", LENGTH, 127, 5000), "mil mils thou"),
+    (WrittenUnit("ft", LENGTH, 1524, 5), "ft foot feet"),
+    (WrittenUnit("°C", TEMPERATURE), "°c c degc celsius grad ℃"),
+    (WrittenUnit("K", TEMPERATURE, offset=-273.15), "k kelvin"),
+    (WrittenUnit("°F", TEMPERATURE), "°f f degf fahrenheit ℉"),
+    (WrittenUnit("s", TIME), "s sec sek second seconds sekunde sekunden seconde secondi segundos"),
+    (WrittenUnit("ms", TIME, 1, 1000), "ms millisecond milliseconds"),
+    (WrittenUnit("min", TIME, 60), "min minute minutes minuten minuti minutos"),
+    (WrittenUnit("h", TIME, 3600), "h hour hours std stunde stunden heure heures ore horas"),
+    (WrittenUnit("hPa", PRESSURE), "hpa mbar"),
+    (WrittenUnit("Pa", PRESSURE, 1, 100), "pa"),
+    (WrittenUnit("kPa", PRESSURE, 10), "kpa"),
+    (WrittenUnit("%", SHARE), "% pct percent prozent %rh %rf"),
+)
+UNITS: Mapping[str, WrittenUnit] = {alias: unit for unit, aliases in _UNITS for alias in aliases.split(" ")}
+LENGTHS = tuple(unit.name for unit, _ in _UNITS if unit.sort == LENGTH)
+FAHRENHEIT = UNITS["°f"]
+
+_ENDINGS = (("_mm_s", None), ("_mm", (LENGTH, 1)), ("_um", (LENGTH, 1000)), ("_c", (TEMPERATURE, 1)), ("_s", (TIME, 1)),
+            ("_hpa", (PRESSURE, 1)), ("_pct", (SHARE, 1)))  # fmt: skip
+
+
+def unit_named(text: str) -> WrittenUnit | None:
+    """A unit as written, whatever its case where that says nothing; ``None`` where it is none."""
+    plain = text.strip().strip(".").strip()
+    return UNITS.get(plain.casefold())
+
+
+def length_named(text: str) -> WrittenUnit | None:
+    """A unit of length."""
+    unit = unit_named(text)
+    return unit if unit is not None and unit.sort == LENGTH else None
+
+
+def sort_of(column: str) -> tuple[str, int] | None:
+    """Sort of quantity of a recording's column, and how many of its units one of the sort's is; ``None`` without unit."""
+    return next((found for ending, found in _ENDINGS if column.endswith(ending)), None)
+
+
+def converted(values: Floats, unit: WrittenUnit, column: str) -> Floats:
+    """Values of a column in the unit of its name.
+
+    Parameters
+    ----------
+    values : (n,) as written.
+    unit : of them.
+    column : of the recording.
+    """
+    sort = sort_of(column)
+    up, down = unit.up * (sort[1] if sort else 1), unit.down
+    if up != 1:
+        values = values * up
+    if down != 1:
+        values = values / down
+    return values + unit.offset if unit.offset else values
+
+
+_SUFFIX = re.compile(r"^([+-]?[\d.,' \u00a0\u202f]*\d[.,]?(?:[eE][+-]?\d+)?)\s*([^\d\s.,'+-][^\d]*)$")
+
+
+def apart(cell: str) -> tuple[str, WrittenUnit] | None:
+    """A number and the unit written after it in its cell; ``None`` where there is no unit."""
+    found = _SUFFIX.match(cell)
+    unit = unit_named(found[2]) if found else None
+    return (found[1], unit) if found and unit else None
+
 
 Source = str | Annotated[int, Field(ge=1, le=COLUMNS.most)]
 """A column of the file: its heading, or its number from 1."""

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.jobs.importing.encodings import decoded, head_text, report_lines
-from cmm_uq.jobs.importing.features import Row, sheets_of
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Fact, Sheet
+from cmm_uq.jobs.importing.sheet import Fact, Row, Sheet, sheets_of
 
 _HEADING = re.compile(r"^[ \t]*AX[ \t]+(?=.*\bMEAS\b)", re.MULTILINE)
 _LOCATED = re.compile(r"\s*(?P<what>[A-Z0-9 ]*?)\s*\bOF\s+(?P<sort>[A-Z]+)\s+(?P<of>\S+)", re.IGNORECASE)

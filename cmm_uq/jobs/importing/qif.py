@@ -8,12 +8,10 @@ from xml.etree.ElementTree import Element
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, number, say
-from cmm_uq.jobs.importing.features import Row, sheets_of
+from cmm_uq.jobs.importing.encodings import begins_with, local, root_of
 from cmm_uq.jobs.importing.format import Format
-from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Cell, Fact, Sheet
-from cmm_uq.jobs.importing.units import LENGTH, UNITS, length_named
-from cmm_uq.jobs.importing.xml_files import begins_with, local, root_of
+from cmm_uq.jobs.importing.keys import LENGTH, UNITS, ImportKeys, length_named
+from cmm_uq.jobs.importing.sheet import Cell, Fact, Row, Sheet, sheets_of
 
 _MEASUREMENT = "FeatureMeasurement"
 PLACED = tuple(f"{sort}{_MEASUREMENT}" for sort in ("Sphere", "Point", "Circle"))

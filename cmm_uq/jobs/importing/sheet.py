@@ -1,11 +1,12 @@
-"""What a format makes of a file: rows of cells, with the place of each for messages."""
+"""What a format makes of a file, rows of cells with the place of each, and what was recognised of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from cmm_uq.base.messages import Text
+from cmm_uq.base.messages import Text, Verbatim, commas, say, semicolons
 
 Cell = str | float
 """Text without the blanks around it, empty where there is nothing; or a number, of a format that keeps numbers."""
@@ -74,3 +75,87 @@ def letters(column: int) -> str:
         left, digit = divmod(left - 1, 26)
         name = chr(ord("A") + digit) + name
     return name
+
+
+Row = tuple[str, list[Cell], int]
+"""Sort of feature, its cells, its line."""
+
+
+def sheets_of(
+    rows: Sequence[Row], headings: Sequence[str], *, unit: str | None, decimal: str | None = None,
+    facts: tuple[Fact, ...] = (),
+) -> list[Sheet]:  # fmt: skip
+    """A sheet for each sort of feature.
+
+    Parameters
+    ----------
+    rows : of all features.
+    headings : of their cells.
+    unit, decimal : of their lengths and numbers, where the format says them.
+    facts : recognised.
+    """
+    sheets = []
+    for sort in dict.fromkeys(sort for sort, _, _ in rows):
+        own = [(cells, line) for of, cells, line in rows if of == sort]
+        kept = [i for i in range(len(headings)) if any(cells[i] != "" for cells, _ in own)]
+        table: list[list[Cell]] = [[headings[i] for i in kept], *([cells[i] for i in kept] for cells, _ in own)]
+        lines = [own[0][1], *(line for _, line in own)]
+        name = f"{sort}s" if sort else ""
+        sheets.append(Sheet(name, table, lines, listed=True, unit=unit, decimal=decimal, facts=facts))
+    return sheets
+
+
+@dataclass(frozen=True)
+class Recognition:
+    """How a file was read.
+
+    Parameters
+    ----------
+    file : its name.
+    format : its format's name.
+    title : of the format, as printed.
+    facts : encoding, unit, decimal sign, …
+    columns : heading of the file by column of the recording.
+    points : in the table.
+    """
+
+    file: str
+    format: str
+    title: Text
+    facts: tuple[Fact, ...]
+    columns: Mapping[str, str]
+    points: int
+
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """Headings of columns that are not used, the first of them."""
+        return tuple(
+            name for fact in self.facts if fact.key == "not_used" for name in str.__str__(fact.value).split(", ")
+        )
+
+    @property
+    def rows(self) -> list[tuple[Text, Text]]:
+        """Everything, for a table."""
+        head = [(say("File"), Verbatim(self.file)), (say("Format"), self.title)]
+        columns: list[tuple[Text, Text]] = [
+            (say("Column {name}", name=Verbatim(name)), Verbatim(heading)) for name, heading in self.columns.items()
+        ]
+        count = (say("Rows read"), say("{points}", points=self.points))
+        return [*head, *((fact.label, fact.value) for fact in self.facts), *columns, count]
+
+    @property
+    def sentence(self) -> Text:
+        """The same in one cell of a certificate."""
+        taken = commas([say("{name} from {heading}", name=Verbatim(name), heading=Verbatim(heading))
+                        for name, heading in self.columns.items()])  # fmt: skip
+        facts = semicolons([say("{label:small}: {value}", label=fact.label, value=fact.value) for fact in self.facts])
+        return say("read from {file} ({title}): {columns}; {facts}", file=Verbatim(self.file), title=self.title,
+                   columns=taken, facts=facts)  # fmt: skip
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """For results.json."""
+        return {
+            "file": self.file, "format": self.format, **{fact.key: str.__str__(fact.value) for fact in self.facts},
+            "columns": dict(self.columns), "points": self.points,
+        }  # fmt: skip

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
-from cmm_uq.jobs.importing.units import WrittenUnit, unit_named
-from cmm_uq.jobs.recording import OPTIONAL, REQUIRED
+from cmm_uq.jobs.importing.keys import WrittenUnit, unit_named
+from cmm_uq.jobs.importing.recording import OPTIONAL, REQUIRED
 
 NAME = "name"
 """Of the point or feature, by which it may be numbered; no column of a recording."""

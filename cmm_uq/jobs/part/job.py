@@ -15,19 +15,20 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.limits import JOB_BYTES, JSON_BYTES, LISTED, LOGO_BYTES, TABLE_BYTES
-from cmm_uq.base.files.toml import toml_of
-from cmm_uq.base.files.toml_file import checked
+from cmm_uq.base.files.toml_file import checked, toml_of
 from cmm_uq.base.output import finish_interrupted
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.file_names import RESULTS
 from cmm_uq.jobs.logo import checked_logo
-from cmm_uq.jobs.origin import COMPENSATED, SIMULATED, check_examples, check_mark
 from cmm_uq.jobs.part.checks import check_names, check_plan
 from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.reading import PART
-from cmm_uq.jobs.source import InFolder, InMemory, Source
+from cmm_uq.jobs.source import RESULTS
+from cmm_uq.jobs.source import FilesInFolder as InFolder
+from cmm_uq.jobs.source import FilesInMemory as InMemory
+from cmm_uq.jobs.source import JobFiles as Source
+from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED, check_examples, check_mark
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
 _WHOLE = (".pdf", ".xml")

@@ -45,7 +45,7 @@ LONGEST_MONTHS = 60
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule; see :class:`cmm_uq.jobs.recalibration.Recalibration`.
+    """A rule; see :class:`cmm_uq.jobs.tables.machine.Recalibration`.
 
     ``method``: one of fixed, A3, S2, staircase, control chart, drift; ``every_months``: interval, or the one that a
     method begins with; ``reliability``: wanted at the end of an interval; ``shortest_months, longest_months``: bounds

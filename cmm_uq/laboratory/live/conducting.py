@@ -16,7 +16,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, say
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.acquire import AcquireFacts
+from cmm_uq.jobs.tables.plan import AcquireFacts
 from cmm_uq.laboratory.live.accepting import Accepting
 from cmm_uq.laboratory.live.instruments.source import Event, Reading
 from cmm_uq.laboratory.live.journal import Moment

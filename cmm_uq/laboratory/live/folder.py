@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output.locking import locked
+from cmm_uq.base.output.staging import locked
 from cmm_uq.laboratory.live.journal import Moment, Record, RecordingJournal, opened, refuse_damaged
 from cmm_uq.laboratory.live.story import Story
 

@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.laboratory.live.expectation import LEVEL, RARE, Predicted, predicted, scatter
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES

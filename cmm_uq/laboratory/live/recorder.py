@@ -16,7 +16,7 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.folder import STREAMS, Journals
 from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, Reading, Returned
 from cmm_uq.laboratory.live.joining import NS, Joined, Stream

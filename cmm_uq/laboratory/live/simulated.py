@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cmm_uq.base.points import AXES
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity, Reading
 from cmm_uq.laboratory.live.lead import PlannedPoint
 from cmm_uq.laboratory.live.recorder import COORDINATES

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output.locking import locked
+from cmm_uq.base.output.staging import locked
 from cmm_uq.laboratory.proving.cases import canonical_json
 from cmm_uq.laboratory.schedule.processes import WorkerTask, answers
 

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.base.messages import Text, say
-from cmm_uq.jobs.prove import ProveFacts
+from cmm_uq.jobs.tables.plan import ProveFacts
 from cmm_uq.laboratory.proving.cases import ARTEFACT, KINDS, NOTHING, ONE, OUTSIDE, TWO, Case
 from cmm_uq.laboratory.proving.rates import DetectionCurve, Rate, Tenth, cases_to_decide, detection_curve, tenths
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from sqlalchemy import select
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output.refusing import writing_to
+from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.records.entries import Entry
 from cmm_uq.laboratory.records.opening import open_records

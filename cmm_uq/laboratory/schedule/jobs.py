@@ -22,12 +22,12 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.files.content import content_of, text_of
 from cmm_uq.base.files.limits import JOB_BYTES
-from cmm_uq.base.files.toml import toml_of
+from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.output import finish_interrupted, sha256_of
 from cmm_uq.base.plugins import told_with_package
 from cmm_uq.jobs.acquired import provenance_name
-from cmm_uq.jobs.file_names import RESULTS, device_name
-from cmm_uq.jobs.origin import is_planned
+from cmm_uq.jobs.source import RESULTS, device_name
+from cmm_uq.jobs.tables.origin import is_planned
 from cmm_uq.laboratory.schedule import locks
 from cmm_uq.laboratory.schedule.notices import Notice, decisions, of_results
 from cmm_uq.laboratory.schedule.state import PRIVATE, State

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cmm_uq.base.errors import OutputError
-from cmm_uq.base.output.locking import locked
+from cmm_uq.base.output.staging import locked
 
 _BEGUN = b"begun\n"
 _ATTEMPTS = 20

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.base.output.refusing import writing_to
+from cmm_uq.base.output.new_file import writing_to
 from cmm_uq.base.output.staging import synced
 from cmm_uq.laboratory.schedule.locks import turn
 from cmm_uq.laboratory.schedule.notices import Channel, Notice, OutgoingMessage, UndeliveredError

@@ -22,7 +22,7 @@ from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.output import read_manifest, sha256_of
 from cmm_uq.base.output.new_file import write_new
-from cmm_uq.jobs.file_names import RESULTS
+from cmm_uq.jobs.source import RESULTS
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.facts import RecordedCertificate

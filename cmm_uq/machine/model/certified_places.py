@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.model.recorded import stated_sd
 from cmm_uq.maths.inference.doubt import Cause

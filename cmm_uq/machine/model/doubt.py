@@ -12,7 +12,7 @@ import numpy as np
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.circumstances import Circumstances
+from cmm_uq.jobs.tables.circumstances import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.inference.doubt import Cause
 

@@ -14,8 +14,8 @@ from typing import TypeVar
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.artefact import ArtefactFacts
 from cmm_uq.jobs.beginning import Beginning
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 
 LENGTHS = "calibrated lengths"

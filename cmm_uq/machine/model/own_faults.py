@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.own_body import Body
 from cmm_uq.machine.physics.own_errors import GEOMETRY, PATTERN, Owner, OwnFault, deformations

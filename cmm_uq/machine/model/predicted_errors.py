@@ -18,8 +18,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.jobs.prediction import Prediction
-from cmm_uq.jobs.simulation import KEY
+from cmm_uq.jobs.recording.prediction import KEY, Prediction
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.placings import Placings
 

@@ -13,7 +13,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import unit
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Size
 from cmm_uq.machine.model.placings import Placings
 from cmm_uq.machine.model.recorded import check_length, place, stated_sd

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
 UNIT_MISTAKES = {
     1e-3: "metres", 1e3: "micrometres", 1 / 25.4: "inches", 25.4: "inches converted twice", 0.1: "centimetres",

@@ -10,7 +10,7 @@ from typing import BinaryIO
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.cells import column_problem
+from cmm_uq.base.files.csv_table import column_problem
 from cmm_uq.base.files.limits import COLUMNS, LINE
 from cmm_uq.base.files.numbers import numbers
 from cmm_uq.base.points import Floats

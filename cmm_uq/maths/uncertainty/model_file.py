@@ -19,7 +19,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import content_of, text_of
 from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
-from cmm_uq.base.files.toml import toml_of
+from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.messages import Text, say
 from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution

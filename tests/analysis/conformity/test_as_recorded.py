@@ -16,10 +16,10 @@ from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.circumstances import Circumstances
-from cmm_uq.jobs.conformity import ConformityFacts
 from cmm_uq.jobs.job import RecordingFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.circumstances import Circumstances
+from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.analysis.conformity import recorded

@@ -9,9 +9,9 @@ from cmm_uq.analysis.conformity.shared_causes import Causes
 from cmm_uq.analysis.conformity.standard import RAISED
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.jobs.circumstances import Circumstances, TestUncertainty
-from cmm_uq.jobs.conformity import ConformityFacts
-from cmm_uq.jobs.laboratory import Capability, LengthCapability
+from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
+from cmm_uq.jobs.tables.conformity import ConformityFacts
+from cmm_uq.jobs.tables.identification import Capability, LengthCapability
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -14,7 +14,7 @@ from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.noise import Sizes

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.analysis.conformity.decision import decide, rule_name
-from cmm_uq.jobs.conformity import FalseAccept, GuardBand, Rule
+from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, Rule
 
 RULES: list[Rule] = ["simple", "ISO 14253-1", GuardBand(guard_band=1.0), FalseAccept(max_false_accept=0.02)]
 GUARDED: list[Rule] = [rule for rule in RULES if rule != "simple"]

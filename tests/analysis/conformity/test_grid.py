@@ -14,7 +14,7 @@ from scipy import stats
 from cmm_uq.analysis.conformity.standards import BUILT_IN, statement
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.conformity import ConformityFacts, FalseAccept, GuardBand, Prior, Rule
+from cmm_uq.jobs.tables.conformity import ConformityFacts, FalseAccept, GuardBand, Prior, Rule
 from cmm_uq.machine.model.kind import BARS, FORMS, LENGTHS
 from tests.analysis.conformity.tests_by_hand import TESTS, Hand, by_hand
 

@@ -11,7 +11,7 @@ from scipy import stats
 from cmm_uq.analysis.conformity.decision import PriorKnowledge, decide
 from cmm_uq.analysis.conformity.limits import Limits, judge
 from cmm_uq.base.points import Floats
-from cmm_uq.jobs.conformity import (
+from cmm_uq.jobs.tables.conformity import (
     FalseAccept,
     GuardBand,
     PosteriorProbability,

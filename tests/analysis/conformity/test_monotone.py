@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from cmm_uq.analysis.conformity.decision import Outcome, decide
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.conformity import FalseAccept, GuardBand, Rule, UncertaintyRatio
+from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, Rule, UncertaintyRatio
 from tests.analysis.conformity.by_hand.deciding import decided
 from tests.analysis.conformity.by_hand.tables import Case, Right, job_of
 

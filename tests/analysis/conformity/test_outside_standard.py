@@ -11,7 +11,7 @@ import pytest
 import cmm_uq
 from cmm_uq.analysis.conformity.standards import BUILT_IN, names, standard_named, statement
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.conformity import ConformityFacts
+from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.machine.model.kind import FORMS, LENGTHS
 from tests.analysis.conformity.recorded import STATED, gauge, sphere
 from tests.conftest import ROOT

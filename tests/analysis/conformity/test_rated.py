@@ -7,7 +7,7 @@ import pytest
 
 from cmm_uq.analysis.conformity.rated import rated_conditions
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.circumstances import Circumstances, Declared, ProbeFacts, RatedConditions
+from cmm_uq.jobs.tables.circumstances import Circumstances, Declared, ProbeFacts, RatedConditions
 
 
 def lacking(rated: RatedConditions, probe: ProbeFacts | None = None, **columns: list[float]) -> list[str]:

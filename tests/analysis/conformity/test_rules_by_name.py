@@ -10,7 +10,13 @@ from pydantic import ValidationError
 from scipy import optimize, stats
 
 from cmm_uq.analysis.conformity.decision import PriorKnowledge, decide
-from cmm_uq.jobs.conformity import ConformityFacts, PosteriorProbability, Rule, UncertaintyRatio, UnconditionalRisk
+from cmm_uq.jobs.tables.conformity import (
+    ConformityFacts,
+    PosteriorProbability,
+    Rule,
+    UncertaintyRatio,
+    UnconditionalRisk,
+)
 
 LIMIT, U = 10.0, 1.0
 PRIOR = PriorKnowledge(0.0, 6.0)

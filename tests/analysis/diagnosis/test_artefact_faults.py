@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
-from cmm_uq.jobs.earlier import against_earlier
+from cmm_uq.jobs.recording.references import against_earlier
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import MIDDLE, plate

@@ -10,7 +10,7 @@ from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.earlier import against_earlier
+from cmm_uq.jobs.recording.references import against_earlier
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import indicated, plate

@@ -18,7 +18,7 @@ from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.artefacts import artefact_of, kind_named
 from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting

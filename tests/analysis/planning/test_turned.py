@@ -19,7 +19,7 @@ from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, unit
-from cmm_uq.jobs.plan import FixtureFacts
+from cmm_uq.jobs.tables.plan import FixtureFacts
 from cmm_uq.machine.physics import catalogue
 from cmm_uq.machine.physics.effect import Effect, Parameter
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, setting

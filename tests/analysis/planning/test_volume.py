@@ -10,7 +10,7 @@ from cmm_uq.analysis.planning.volume import Volume
 from cmm_uq.artefacts.ballbar.plan import ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine
-from cmm_uq.jobs.plan import PlanFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from tests.analysis.planning.plans import BALLBAR, MACHINE, TRAVEL
 
 

@@ -14,7 +14,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from tests.recordings import bar_facts, screened, with_columns
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

@@ -19,7 +19,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.sections.traceability import traceability_section
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.importing.recording import read_recording
 from tests.conftest import ROOT
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ
 

@@ -27,9 +27,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import origin_warnings
 from cmm_uq.certificate.results.keys import RESULTS, described
 from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.jobs.importing.recording import REQUIRED
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import SIMULATED
-from cmm_uq.jobs.recording import REQUIRED
+from cmm_uq.jobs.tables.origin import SIMULATED
 from tests.app.commands.test_schemas import dated
 from tests.plugin.packages import OUTSIDE_KINDS, install
 

@@ -10,7 +10,7 @@ from cmm_uq.artefacts.error_maps.copies import copies
 from cmm_uq.artefacts.error_maps.diagnosis import diagnose_maps
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.machine import ErrorMapFile
+from cmm_uq.jobs.tables.machine import ErrorMapFile
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 
 PLACE = np.arange(0, 601, 25.0)

@@ -12,7 +12,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
-from cmm_uq.jobs.earlier import against_earlier
+from cmm_uq.jobs.recording.references import against_earlier
 from tests.artefacts.constructions import estimated, free, indicated, plate
 from tests.conftest import ROOT
 from tests.recordings import with_columns

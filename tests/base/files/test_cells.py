@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.cells import cells_of, column_problem
+from cmm_uq.base.files.csv_table import cells_of, column_problem
 from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit
 
 

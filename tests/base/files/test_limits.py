@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from cmm_uq.base.files import limits, numbers, table
-from cmm_uq.jobs import recording
-from cmm_uq.jobs.machine import SHORTEST_TRAVEL_MM
+from cmm_uq.jobs.importing import recording
+from cmm_uq.jobs.tables.machine import SHORTEST_TRAVEL_MM
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")

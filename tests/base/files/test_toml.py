@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import DEPTH, NUMERAL, TEXT, TOML_KEY, WORD
-from cmm_uq.base.files.toml import toml_of
+from cmm_uq.base.files.toml_file import toml_of
 
 
 @given(st.text("ab=\"'[]{}.,#\\\n 1_", max_size=60))

@@ -12,8 +12,7 @@ from shutil import which
 import polib
 import pytest
 
-from cmm_uq.base.languages.catalogue import catalogue, file_of
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code, catalogue, file_of
 from tests.catalogues import FORMS, PACKAGE, TRANSLATED, forms_of, key_of, merged, patterns, problems, read, sentences
 
 wanted_sentences = cache(sentences)

@@ -12,8 +12,7 @@ from babel.numbers import parse_decimal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.base.languages.language import LANGUAGES, Code, code_of
-from cmm_uq.base.languages.saying import said_in
+from cmm_uq.base.languages.translation import LANGUAGES, Code, code_of, translated
 from cmm_uq.base.messages import day, number, signed
 
 CODES: list[Code] = ["en", "de", "fr", "ja"]
@@ -23,7 +22,7 @@ SPECS = st.sampled_from(["", "g", ".3g", ".1f", ".4f", ".2e", ".10g"])
 @pytest.mark.parametrize("code", CODES)
 @given(st.floats(allow_nan=False, allow_infinity=False), SPECS)
 def test_a_number_reads_back_the_same_in_every_language(code: Code, value: float, spec: str) -> None:
-    english, said = number(value, spec), said_in(number(value, spec), code)
+    english, said = number(value, spec), translated(number(value, spec), code)
     mantissa, *power = said.split("e")
     assert float(parse_decimal(mantissa, locale=code)) == float(english.split("e")[0])
     assert power == english.split("e")[1:]
@@ -31,7 +30,7 @@ def test_a_number_reads_back_the_same_in_every_language(code: Code, value: float
 
 @given(st.floats(-1e6, 1e6))
 def test_the_minus_of_print_and_all_other_signs_stay(value: float) -> None:
-    said = said_in(signed(value, ".3f"), "de")
+    said = translated(signed(value, ".3f"), "de")
     assert said.replace(",", ".") == signed(value, ".3f")
 
 
@@ -47,8 +46,8 @@ def test_only_a_point_between_digits_is_a_decimal_sign(english: str, german: str
 @pytest.mark.parametrize(("code", "pattern"), [("de", "dd.MM.y"), ("fr", "dd/MM/y"), ("ja", "y年M月d日")])
 @given(date=st.dates(dt.date(1900, 1, 1), dt.date(2199, 12, 31)))
 def test_a_date_is_what_babel_makes_of_it(code: Code, pattern: str, date: dt.date) -> None:
-    assert said_in(day(date), code) == format_date(date, pattern, locale=code)
-    assert [int(part) for part in re.findall(r"\d+", said_in(day(date), "ja"))] == [date.year, date.month, date.day]
+    assert translated(day(date), code) == format_date(date, pattern, locale=code)
+    assert [int(part) for part in re.findall(r"\d+", translated(day(date), "ja"))] == [date.year, date.month, date.day]
 
 
 @pytest.mark.parametrize("code", CODES)

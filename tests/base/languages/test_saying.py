@@ -10,10 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.base.languages import catalogue as catalogues
-from cmm_uq.base.languages.catalogue import Catalogue, catalogue
-from cmm_uq.base.languages.language import Code
-from cmm_uq.base.languages.saying import Said, said_in
+from cmm_uq.base.languages import translation as catalogues
+from cmm_uq.base.languages.translation import Catalogue, Code, Translation, catalogue, translated
 from cmm_uq.base.messages import (
     NOTHING,
     Message,
@@ -85,61 +83,61 @@ def lengths(count: int) -> Text:
 @pytest.mark.usefixtures("own")
 def test_a_message_is_said_with_numbers_dates_and_units() -> None:
     text = say("Length {length:.2f} {unit} on {day}", length=-1234.5, unit=unit("µm"), day=day(dt.date(2026, 11, 2)))
-    assert said_in(text, "de") == "Am 02.11.2026: -1234,50 µm Länge"
-    assert said_in(text, "ja") == "Am 2026年11月2日: -1234.50 µm Länge"
-    assert said_in(text, "en") is text
+    assert translated(text, "de") == "Am 02.11.2026: -1234,50 µm Länge"
+    assert translated(text, "ja") == "Am 2026年11月2日: -1234.50 µm Länge"
+    assert translated(text, "en") is text
 
 
 @pytest.mark.usefixtures("own")
 def test_capitals_are_those_of_the_said_word() -> None:
-    assert said_in(say("{what:capital}.", what=say("error")), "de") == "Abweichung."
-    assert said_in(say("{what:capital}.", what=say("error")), "ja") == "abweichung."
-    assert said_in(say("If it is {what:small}.", what=say("Error")), "de") == "Falls: Abweichung."
+    assert translated(say("{what:capital}.", what=say("error")), "de") == "Abweichung."
+    assert translated(say("{what:capital}.", what=say("error")), "ja") == "abweichung."
+    assert translated(say("If it is {what:small}.", what=say("Error")), "de") == "Falls: Abweichung."
 
 
 @pytest.mark.usefixtures("own")
 def test_a_form_that_says_one_in_words_is_for_one_alone() -> None:
     """French has the singular of 0, but "eine Länge" is one length."""
-    assert [said_in(lengths(count), "fr") for count in (0, 1, 2)] == ["0 Längen", "eine Länge", "2 Längen"]
-    assert [said_in(lengths(count), "de") for count in (0, 1, 2)] == ["0 Längen", "eine Länge", "2 Längen"]
+    assert [translated(lengths(count), "fr") for count in (0, 1, 2)] == ["0 Längen", "eine Länge", "2 Längen"]
+    assert [translated(lengths(count), "de") for count in (0, 1, 2)] == ["0 Längen", "eine Länge", "2 Längen"]
 
 
 @pytest.mark.usefixtures("own")
 def test_what_the_catalogue_lacks_or_only_guesses_stays_english_with_its_numbers() -> None:
-    assert said_in(say("{x:.1f} somewhere", x=0.5), "de") == "0,5 somewhere"
-    assert said_in(say("guessed"), "de") == "guessed"
+    assert translated(say("{x:.1f} somewhere", x=0.5), "de") == "0,5 somewhere"
+    assert translated(say("guessed"), "de") == "guessed"
 
 
 @pytest.mark.usefixtures("own")
 def test_figures_with_decimal_commas_are_parted_by_semicolons() -> None:
     figures = commas([number(1.5), number(2), number(-0.25)])
-    assert said_in(figures, "de") == "1,5; 2; -0,25"
-    assert said_in(figures, "fr") == "1,5\u202f; 2\u202f; -0,25"
-    assert said_in(figures, "ja") == "1.5, 2, -0.25"
-    assert said_in(commas([number(1), number(2)]), "de") == "1, 2"
-    assert said_in(commas([say("error"), number(2.5)]), "de") == "abweichung, 2,5"
-    assert said_in(say("[{low}, {high}]", low=number(0.5), high=number(1.5)), "de") == "[0,5; 1,5]"
+    assert translated(figures, "de") == "1,5; 2; -0,25"
+    assert translated(figures, "fr") == "1,5\u202f; 2\u202f; -0,25"
+    assert translated(figures, "ja") == "1.5, 2, -0.25"
+    assert translated(commas([number(1), number(2)]), "de") == "1, 2"
+    assert translated(commas([say("error"), number(2.5)]), "de") == "abweichung, 2,5"
+    assert translated(say("[{low}, {high}]", low=number(0.5), high=number(1.5)), "de") == "[0,5; 1,5]"
 
 
 @pytest.mark.usefixtures("own")
 def test_verbatim_words_units_and_nothing_are_themselves() -> None:
     for text in (Verbatim("1.5 error"), unit("µm"), NOTHING):
-        assert said_in(text, "de") is text
+        assert translated(text, "de") is text
 
 
 @pytest.mark.usefixtures("own")
 def test_what_was_said_keeps_its_source_is_not_said_again_and_survives_pickling() -> None:
-    said = said_in(say("error"), "de")
-    assert isinstance(said, Said)
+    said = translated(say("error"), "de")
+    assert isinstance(said, Translation)
     assert isinstance(said.source, Message)
-    assert said_in(said, "fr") is said
+    assert translated(said, "fr") is said
     assert pickle.loads(pickle.dumps(said)).source == "error"
 
 
 def test_japanese_sentences_follow_each_other_without_a_space() -> None:
-    text = said_in(sentences([say("Warning"), say("Warnings")]), "ja")
+    text = translated(sentences([say("Warning"), say("Warnings")]), "ja")
     assert " " not in text
-    assert said_in(lines([say("Warning"), say("Warnings")]), "ja").count("\n") == 1
+    assert translated(lines([say("Warning"), say("Warnings")]), "ja").count("\n") == 1
 
 
 @pytest.mark.parametrize(("code", "said"), [
@@ -148,12 +146,12 @@ def test_japanese_sentences_follow_each_other_without_a_space() -> None:
 def test_figures_in_a_row_are_parted_by_one_sign_whether_they_have_decimals_or_not(code: Code, said: str) -> None:
     """And not by the comma of words, which in Japanese is another."""
     figures = in_a_row([number(250, "g"), number(0.5, "g"), signed(-40, "g")])
-    assert said_in(figures, code) == said
+    assert translated(figures, code) == said
 
 
 def test_a_probability_that_is_hardly_0_or_1_has_the_decimal_sign_of_the_language() -> None:
-    assert said_in(probability(1e-6), "de") == "<\u00a00,01\u00a0%"
-    assert said_in(probability(1 - 1e-6), "fr") == ">\u00a099,99\u00a0%"
+    assert translated(probability(1e-6), "de") == "<\u00a00,01\u00a0%"
+    assert translated(probability(1 - 1e-6), "fr") == ">\u00a099,99\u00a0%"
 
 
 @pytest.mark.parametrize("code", ["de", "fr", "ja"])
@@ -169,7 +167,7 @@ def test_a_catalogue_is_read_in_a_tenth_of_a_second(code: Code) -> None:
 
 def test_english_reads_no_catalogue() -> None:
     catalogue.cache_clear()
-    assert said_in(say("Warning"), "en") == "Warning"
+    assert translated(say("Warning"), "en") == "Warning"
     assert catalogue.cache_info().currsize == 0
 
 
@@ -178,5 +176,5 @@ def test_a_long_certificate_is_said_in_a_tenth_of_a_second() -> None:
                       for x in range(2000)])  # fmt: skip
     catalogue("de")
     begun = time.process_time()
-    said_in(text, "de")
+    translated(text, "de")
     assert time.process_time() - begun < 0.1

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.output import Owner, finish_interrupted, is_pending, staged, staging
-from cmm_uq.base.output.locking import locked
+from cmm_uq.base.output.staging import locked
 
 
 def test_a_lock_that_is_just_being_made_is_not_taken_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

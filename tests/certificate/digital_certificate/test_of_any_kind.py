@@ -13,11 +13,11 @@ from lxml import etree
 
 from cmm_uq.certificate.digital_certificate.certificate import digital_certificate
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.artefact import CertificateFile
 from cmm_uq.jobs.dcc import Certificate, read, written
 from cmm_uq.jobs.dcc.quantities import Expanded, Real
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
+from cmm_uq.jobs.tables.artefact import CertificateFile
 from tests.artefacts.simulated import results
 from tests.certificate.digital_certificate.test_certificate import MEASURED, job_of
 from tests.jobs.dcc.schemas import by_lxml

@@ -7,30 +7,37 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 from cmm_uq.jobs.dcc import Certificate, written
-from cmm_uq.jobs.dcc.administrative import Person, Somebody
-from cmm_uq.jobs.dcc.quantities import Column, Covariance, Ellipsoid, Expanded, ExpandedList, Real, RealList
-from cmm_uq.jobs.dcc.results import Data, Measurement, Quantity, QuantityList, Result, Statement
-from cmm_uq.jobs.dcc.texts import words
+from cmm_uq.jobs.dcc.administrative import Person, Somebody, words
+from cmm_uq.jobs.dcc.certificate import Data, DccQuantity, DccResult, Measurement, QuantityList, StatementMetadata
+from cmm_uq.jobs.dcc.quantities import (
+    CovarianceColumn,
+    CovarianceElement,
+    EllipsoidalRegion,
+    Expanded,
+    ExpandedList,
+    Real,
+    RealList,
+)
 from tests.conftest import ROOT
 from tests.jobs.dcc.certificates import certificate
 
 K, P, MM = Decimal(2), Decimal("0.95"), r"\milli\metre"
-DUE = Statement(ref_type=("basic_recalibration",), date=dt.date(2028, 3, 2))
+DUE = StatementMetadata(ref_type=("basic_recalibration",), date=dt.date(2028, 3, 2))
 
 
 def value(
     name: str, number: str, U: str | None = None, unit: str = MM, ref_type: str = "basic_measuredValue"
-) -> Quantity:
+) -> DccQuantity:
     """One value with its expanded uncertainty in the same unit."""
     stated = None if U is None else Expanded(uncertainty=Decimal(U), factor=K, probability=P)
-    return Quantity(
+    return DccQuantity(
         name=words(name), ref_type=(ref_type,), value=Real(value=Decimal(number), unit=unit, uncertainty=stated)
     )
 
 
 def listed(
     name: str, numbers: str, Us: str | None = None, unit: str = MM, covariance: Sequence[Sequence[str]] = ()
-) -> Quantity:
+) -> DccQuantity:
     """A list of values, with one uncertainty for all or one a value."""
     stated = None if Us is None else ExpandedList(
         uncertainties=_decimals(Us), factors=(K,), probabilities=(P,)
@@ -39,15 +46,16 @@ def listed(
     if covariance:
         unit_ = unit + r"\tothe{2}"
         columns = tuple(
-            Column(covariances=tuple(Covariance(value=Decimal(one), unit=unit_) for one in row)) for row in covariance
+            CovarianceColumn(covariances=tuple(CovarianceElement(value=Decimal(one), unit=unit_) for one in row))
+            for row in covariance
         )
-        region = Ellipsoid(columns=columns, factor=K, probability=P)
+        region = EllipsoidalRegion(columns=columns, factor=K, probability=P)
     found = RealList(values=_decimals(numbers), units=(unit,), uncertainty=stated, region=region)
-    return Quantity(name=words(name), value=found)
+    return DccQuantity(name=words(name), value=found)
 
 
 def issued(
-    *parts: Quantity, item: str = "Ball bar", result: str = "Certified values", table: bool = False
+    *parts: DccQuantity, item: str = "Ball bar", result: str = "Certified values", table: bool = False
 ) -> Certificate:
     """A certificate of one item with one result, due on a day."""
     held = (QuantityList(parts=parts),) if table else parts
@@ -55,7 +63,7 @@ def issued(
     (old,) = made.administrative.items.items
     items = made.administrative.items.with_changes(items=(old.with_changes(name=words(item)),))
     core = made.administrative.core.with_changes(identifier="D-K-4711", issued=dt.date(2026, 3, 5))
-    found = Result(name=words(result), data=Data(parts=held))
+    found = DccResult(name=words(result), data=Data(parts=held))
     administrative = made.administrative.with_changes(
         items=items, core=core, statements=(DUE,), persons=(Person(person=Somebody(name=words("A. Huber"))),)
     )  # fmt: skip

@@ -7,22 +7,23 @@ from decimal import Decimal
 
 from cmm_uq.jobs.dcc import Certificate
 from cmm_uq.jobs.dcc.administrative import (
+    Attached,
+    CalibrationLaboratory,
     Contact,
     CoreData,
-    Identification,
+    IdentificationNumber,
     Item,
     Items,
-    Laboratory,
     Location,
     PerformanceLocation,
     Person,
     Software,
     Somebody,
+    rich,
+    words,
 )
-from cmm_uq.jobs.dcc.certificate import Administrative
+from cmm_uq.jobs.dcc.certificate import Administrative, Data, DccQuantity, DccResult, Measurement, Method
 from cmm_uq.jobs.dcc.quantities import Expanded, Real
-from cmm_uq.jobs.dcc.results import Data, Measurement, Method, Quantity, Result
-from cmm_uq.jobs.dcc.texts import Attached, rich, words
 
 LENGTH = Real(
     label="L",
@@ -38,8 +39,8 @@ def certificate(value: Real = LENGTH) -> Certificate:
     """Of a ball bar with one length."""
     somebody = Contact(name=words({"en": "Laboratory", "de": "Labor"}), location=Location(city=("Braunschweig",)))
     method = Method(name=words("Comparison"), norms=("ISO 10360-2:2009",))
-    data = Data(parts=(Quantity(name=words("Length"), value=value, ref_type=("basic_measuredValue",)),))
-    result = Result(name=words("Length"), data=data)
+    data = Data(parts=(DccQuantity(name=words("Length"), value=value, ref_type=("basic_measuredValue",)),))
+    result = DccResult(name=words("Length"), data=data)
     return Certificate(
         administrative=Administrative(
             software=(Software(name=words("cmm-uq"), release="1"),),
@@ -56,12 +57,12 @@ def certificate(value: Real = LENGTH) -> Certificate:
                 items=(
                     Item(
                         name=words("Ball bar"),
-                        identifications=(Identification(issuer="manufacturer", value="12"),),
+                        identifications=(IdentificationNumber(issuer="manufacturer", value="12"),),
                         id="bar",
                     ),
                 )
             ),
-            laboratory=Laboratory(contact=somebody),
+            laboratory=CalibrationLaboratory(contact=somebody),
             persons=(Person(person=Somebody(name=words('A < B & "C"'))),),
             customer=somebody,
         ),

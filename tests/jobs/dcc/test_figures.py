@@ -9,7 +9,9 @@ import lxml.etree
 import pytest
 
 from cmm_uq.jobs.dcc import Certificate, read, written
-from cmm_uq.jobs.dcc.figures import Figures, figures, statements
+from cmm_uq.jobs.dcc.administrative import rich, words
+from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata
+from cmm_uq.jobs.dcc.figures import QuantityFigures, figures, statements
 from cmm_uq.jobs.dcc.quantities import (
     Constant,
     Expanded,
@@ -18,20 +20,18 @@ from cmm_uq.jobs.dcc.quantities import (
     Interval,
     IntervalList,
     Lists,
+    ListUncertainty,
     Real,
     RealInList,
     RealList,
     Reals,
-    Spread,
     StandardListMU,
     StandardMU,
     Univariate,
     UnivariateList,
 )
-from cmm_uq.jobs.dcc.results import Quantity, QuantityList, Statement
 from cmm_uq.jobs.dcc.schema import checked_by_schema
 from cmm_uq.jobs.dcc.shown import data, shown, unit_shown
-from cmm_uq.jobs.dcc.texts import rich, words
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, MM, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, value
 
@@ -40,9 +40,9 @@ D = Decimal
 HALF = Expanded(uncertainty=D("0.010"), factor=D(2), probability=D("0.95"))
 
 
-def of(given: object) -> tuple[Figures, ...]:
+def of(given: object) -> tuple[QuantityFigures, ...]:
     """Figures of a quantity that is written and read again."""
-    made = issued(Quantity(name=words("Q"), value=given))  # type: ignore[arg-type]
+    made = issued(DccQuantity(name=words("Q"), value=given))  # type: ignore[arg-type]
     return figures(read(written(made), "certificate.xml"))
 
 
@@ -61,7 +61,7 @@ ONE_VALUE = {
     "the first of two units": Hybrid(values=(
         Real(value=D("1.50"), unit=MM, uncertainty=HALF), Real(value=D("0.0015"), unit=r"\metre"))),
     "a list one by one, with the list's unit and uncertainty": Lists(lists=(Reals(
-        unit=MM, uncertainty=Spread(stated=HALF), values=(RealInList(value=D("1.50")),)),)),
+        unit=MM, uncertainty=ListUncertainty(stated=HALF), values=(RealInList(value=D("1.50")),)),)),
 }  # fmt: skip
 
 
@@ -85,8 +85,8 @@ def test_one_uncertainty_and_one_unit_are_of_every_value_of_a_list() -> None:
 
 
 def test_statements_of_lists_and_quantities_are_found_with_those_of_the_measurement() -> None:
-    said = Statement(conformity="pass", norms=("ISO 10360-2:2009",), declaration=rich("within the limit"))
-    inner = Quantity(name=words("Q"), value=Real(value=D(1), unit=MM), metadata=(said,))
+    said = StatementMetadata(conformity="pass", norms=("ISO 10360-2:2009",), declaration=rich("within the limit"))
+    inner = DccQuantity(name=words("Q"), value=Real(value=D(1), unit=MM), metadata=(said,))
     made = issued(QuantityList(parts=(inner,), metadata=(said,)))  # type: ignore[arg-type]
     (measurement,) = made.measurements
     assert [one.conformity for one in statements(measurement)] == ["pass", "pass"]

@@ -13,7 +13,7 @@ from lxml import etree
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.dcc import checked_by_schema, written
 from cmm_uq.jobs.dcc.certificate import Certificate
-from cmm_uq.jobs.dcc.fields import Attribute, Field, Foreign, Part, fields_of
+from cmm_uq.jobs.dcc.fields import Attribute, Element, Field, ForeignElements, fields_of
 from cmm_uq.jobs.dcc.quantities import Complex
 from cmm_uq.jobs.dcc.schema import _schema
 from cmm_uq.jobs.dcc.tree import NAMESPACES
@@ -61,7 +61,7 @@ def repeated(element: Any) -> bool:
     return any(one.max_occurs != 1 for one in around(element))
 
 
-def compared(element: Any, cls: type[Part], seen: set[type[Part]]) -> int:
+def compared(element: Any, cls: type[Element], seen: set[type[Element]]) -> int:
     """Elements of a type of the schema against the fields of a class, and so on below; how many were compared."""
     if cls in seen:
         return 0
@@ -75,7 +75,7 @@ def compared(element: Any, cls: type[Part], seen: set[type[Part]]) -> int:
     attributes = {field.place.tag for field in fields if isinstance(field.place, Attribute)}
     assert attributes >= {name for name in getattr(element.type, "attributes", ()) if name}, cls
     for field in fields:
-        if isinstance(field.place, Attribute | Foreign):
+        if isinstance(field.place, Attribute | ForeignElements):
             continue
         for outer in field.outer:
             if outer not in LATER:
@@ -83,7 +83,7 @@ def compared(element: Any, cls: type[Part], seen: set[type[Part]]) -> int:
     return found
 
 
-def below(child: Any, field: Field, outer: str, seen: set[type[Part]]) -> int:
+def below(child: Any, field: Field, outer: str, seen: set[type[Element]]) -> int:
     """One field: whether it may be left out or repeated, and the class of its elements."""
     inner = child
     if outer not in field.tags:

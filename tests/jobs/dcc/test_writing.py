@@ -9,18 +9,29 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.dcc import written
-from cmm_uq.jobs.dcc.quantities import Column, Covariance, Ellipsoid, Expanded, ExpandedList, Interval, Real, RealList
+from cmm_uq.jobs.dcc.quantities import (
+    CovarianceColumn,
+    CovarianceElement,
+    EllipsoidalRegion,
+    Expanded,
+    ExpandedList,
+    Interval,
+    Real,
+    RealList,
+)
 from tests.jobs.dcc.certificates import LENGTH, certificate
 
 TWO = (Decimal(1), Decimal(2))
 
 
-def elements(*values: str) -> Column:
-    return Column(covariances=tuple(Covariance(value=Decimal(value), unit=r"\metre") for value in values))
+def elements(*values: str) -> CovarianceColumn:
+    return CovarianceColumn(
+        covariances=tuple(CovarianceElement(value=Decimal(value), unit=r"\metre") for value in values)
+    )
 
 
-def region(*columns: Column) -> Ellipsoid:
-    return Ellipsoid(columns=columns, factor=Decimal("2.45"), probability=Decimal("0.95"))
+def region(*columns: CovarianceColumn) -> EllipsoidalRegion:
+    return EllipsoidalRegion(columns=columns, factor=Decimal("2.45"), probability=Decimal("0.95"))
 
 
 def lists(**given: Any) -> RealList:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.imported import ImportedTable, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from tests.jobs.importing.exports import EXPORTS, NUMBERS, XYZ
 
@@ -20,11 +20,11 @@ LANGUAGES = [(name, language) for name in EXPORTS for language in (
     else ("en", "de"))]  # fmt: skip
 
 
-def read(name: str, content: bytes, **keys: object) -> Imported:
+def read(name: str, content: bytes, **keys: object) -> ImportedTable:
     return imported(content, name, ImportKeys.model_validate({**PAIRS.get(name, {}), **keys}))
 
 
-def coordinates(found: Imported) -> np.ndarray:
+def coordinates(found: ImportedTable) -> np.ndarray:
     return np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"])
 
 

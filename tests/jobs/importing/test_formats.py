@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import BrokenPluginError
-from cmm_uq.jobs.importing.imported import Imported, imported, imported_references
+from cmm_uq.jobs.importing.imported import ImportedTable, imported, imported_references
 from cmm_uq.jobs.importing.keys import ImportKeys
 from tests.conftest import ROOT
 from tests.plugin.packages import OUTSIDE_IMPORTS, install
@@ -21,12 +21,12 @@ BARS = [[100.0213, 250.0044, -120.0018], [500.0225, 250.0101, -120.0007], [300.0
 """As written into the samples by hand."""
 
 
-def read(content: bytes | str, name: str = "export.txt", **keys: object) -> Imported:
+def read(content: bytes | str, name: str = "export.txt", **keys: object) -> ImportedTable:
     data = content.encode() if isinstance(content, str) else content
     return imported(data, name, ImportKeys.model_validate(keys))
 
 
-def xyz(found: Imported) -> list[list[float]]:
+def xyz(found: ImportedTable) -> list[list[float]]:
     return np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"]).tolist()
 
 

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.imported import ImportedTable, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from tests.jobs.importing.exports import HEADINGS
 
@@ -18,12 +18,12 @@ MICROMETRES = st.integers(-2_000_000_000, 2_000_000_000)
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1252")
 
 
-def read(content: str | bytes, **keys: object) -> Imported:
+def read(content: str | bytes, **keys: object) -> ImportedTable:
     data = content.encode() if isinstance(content, str) else content
     return imported(data, "export.csv", ImportKeys.model_validate(keys))
 
 
-def xyz(found: Imported) -> list[list[float]]:
+def xyz(found: ImportedTable) -> list[list[float]]:
     return np.column_stack([found.columns[f"{axis}_mm"] for axis in "xyz"]).tolist()
 
 

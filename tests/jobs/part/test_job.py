@@ -12,7 +12,7 @@ from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.jobs.part.checks import readings
 from cmm_uq.jobs.part.job import TABLES, files_of_the_machine
 from cmm_uq.jobs.part.tables import MachineStateFacts
-from cmm_uq.jobs.source import InMemory
+from cmm_uq.jobs.source import FilesInMemory as InMemory
 from tests.jobs.part.parts import plate, tables
 
 PLANE_A, *_, BORE = TABLES["feature"]

@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.jobs.recalibration import Recalibration
+from cmm_uq.jobs.tables.machine import Recalibration
 from cmm_uq.laboratory.due.methods import METHODS
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, Rule
 from cmm_uq.laboratory.records import open_records

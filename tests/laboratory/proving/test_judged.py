@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.jobs.prove import ProveFacts
+from cmm_uq.jobs.tables.plan import ProveFacts
 from cmm_uq.laboratory.proving.cases import ARTEFACT, NOTHING, ONE, OUTSIDE, TWO, Case, HiddenEffect, UnknownCause
 from cmm_uq.laboratory.proving.judgement import (
     MET,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.temperature_log import parse_temperature_log
+from cmm_uq.jobs.recording.temperature_log import parse_temperature_log
 from cmm_uq.machine.physics.compensation import BLOCK, Compensation
 from cmm_uq.machine.physics.digitizer import Digitizer, euler_313, euler_angles, mount_axes, scan_plane, scan_roll
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, read_error_map

@@ -25,7 +25,7 @@ from cmm_uq.base.units import METRE, MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Section, Table
 from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.result import Result
-from cmm_uq.jobs.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.artefact import Artefact, Size
 from cmm_uq.machine.model.kind import Kind
 from cmm_uq.machine.model.recorded import columns_needed

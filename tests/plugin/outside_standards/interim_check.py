@@ -8,7 +8,7 @@ from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test
 from cmm_uq.analysis.conformity.statement import Decided, Statement
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.jobs.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import LENGTHS
 

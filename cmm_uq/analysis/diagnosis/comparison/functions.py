@@ -10,7 +10,7 @@ from scipy import linalg
 from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_SD, Explanation, Member
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.jobs.column_words import in_words
+from cmm_uq.jobs.columns import in_words
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.physics.effect import Effect, Nonparametric
 

@@ -24,10 +24,10 @@ from cmm_uq.app.commands.laboratory.records import RESULTS, inputs_of
 from cmm_uq.app.commands.reading import in_language, job_of
 from cmm_uq.app.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import ENGLISH, code_of
+from cmm_uq.base.languages.translation import ENGLISH, code_of
 from cmm_uq.certificate.results.plain import as_json
+from cmm_uq.jobs.importing.imported import header, is_own
 from cmm_uq.jobs.job import Recorded
-from cmm_uq.jobs.recording_file import header, is_own
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records import content as contents
 from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, RecordedValue

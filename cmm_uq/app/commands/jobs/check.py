@@ -24,17 +24,17 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError, Gathered
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
-from cmm_uq.base.notebook import html_table
+from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.clauses import Requirement as Clause
 from cmm_uq.certificate.clauses import certifies, clauses, contradictions, missing
-from cmm_uq.jobs.file_names import inside
+from cmm_uq.jobs.importing.recording import read_recording
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED
 from cmm_uq.jobs.part.job import is_part, read_part
 from cmm_uq.jobs.reading import PART
-from cmm_uq.jobs.recording import read_recording
+from cmm_uq.jobs.source import inside
+from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.physics.catalogue import effects
 
 _PLACE = re.compile(

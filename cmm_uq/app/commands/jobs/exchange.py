@@ -17,12 +17,13 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.file_names import RESULTS
-from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.imported import ImportedTable as Imported
+from cmm_uq.jobs.importing.imported import imported
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.recording import WHOLE, points_of
-from cmm_uq.jobs.reported import Reported
-from cmm_uq.jobs.results_named import read_results
+from cmm_uq.jobs.importing.recording import WHOLE, points_of
+from cmm_uq.jobs.reports import ReportResults as Reported
+from cmm_uq.jobs.reports import read_results
+from cmm_uq.jobs.source import RESULTS
 
 _FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
 _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
@@ -140,7 +141,9 @@ def write_qif(report: Path, out: Path | None = None) -> Path:
     OutputError : the file is there already, or cannot be written.
     """
     path = report / RESULTS if report.is_dir() else report
-    found = read_results(Reported, content_of(path, TABLE_BYTES, _FIX), str(path), "results.json of a report", _FIX)
+    found = read_results(
+        Reported, content_of(path, TABLE_BYTES, _FIX), str(path), "is no results.json of a report", _FIX
+    )
     file = out or Path(f"{found.job.id}.qif")
     refuse_taken(file)
     write_new(file, qif(found))

@@ -27,7 +27,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.origin import program
 from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs, recording_name
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import PLANNED, first_line
+from cmm_uq.jobs.tables.origin import PLANNED, first_line
 from cmm_uq.jobs.truth import NoiseFacts, Truth
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.artefact import Artefact

@@ -26,13 +26,13 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.jobs.file_names import inside
-from cmm_uq.jobs.importing.imported import Imported, imported
+from cmm_uq.jobs.importing.imported import ImportedTable as Imported
+from cmm_uq.jobs.importing.imported import imported, is_own
 from cmm_uq.jobs.importing.keys import ImportKeys
+from cmm_uq.jobs.importing.recording import REQUIRED, read_recording
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import MEASURED, SIMULATED
-from cmm_uq.jobs.recording import REQUIRED, read_recording
-from cmm_uq.jobs.recording_file import is_own
+from cmm_uq.jobs.source import inside
+from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
 from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.folder import FOLDER, Journals, begin, read_story, sessions_in
 from cmm_uq.laboratory.live.instruments.instrument import open_source

@@ -13,9 +13,9 @@ from cmm_uq import __version__
 from cmm_uq.app.commands.files import RESULTS, called
 from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import ENGLISH
+from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.output import Manifest, read_manifest, sha256_of
-from cmm_uq.base.output.replacing import journal_for
+from cmm_uq.base.output.placing import journal_for
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.verdicts import Verdicts

@@ -17,7 +17,7 @@ from cmm_uq.app.commands.jobs.schemas import shipped
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import say
 from cmm_uq.base.output.new_file import write_new
-from cmm_uq.jobs.toml_text import commented
+from cmm_uq.jobs.schema import commented
 from cmm_uq.laboratory.records.place import NONE, is_url
 from cmm_uq.laboratory.schedule.channels import channels
 from cmm_uq.laboratory.schedule.notices import Channel, Notice, OutgoingMessage, UndeliveredError

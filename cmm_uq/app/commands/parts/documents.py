@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, silent, unchanged
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.plugins import naming_package
@@ -17,8 +17,8 @@ from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.certificate.results.provenance import Behind, provenance_of
-from cmm_uq.jobs.origin import SIMULATED
 from cmm_uq.jobs.part.job import PartJob, read_part
+from cmm_uq.jobs.tables.origin import SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Document

@@ -34,9 +34,9 @@ from cmm_uq.certificate.clauses import draft
 from cmm_uq.certificate.part.measurement import Checked, Source, Standing
 from cmm_uq.certificate.verify.given import Given, given_of
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.origin import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256 as hashes
+from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.draws import Draws
 

@@ -19,11 +19,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.files.toml_file import as_toml
-from cmm_uq.jobs.file_names import RESULTS
-from cmm_uq.jobs.importing.encodings import head_text
+from cmm_uq.jobs.importing.encodings import begins_with, head_text
 from cmm_uq.jobs.importing.format import HEAD
-from cmm_uq.jobs.importing.xml_files import begins_with
-from cmm_uq.jobs.origin import EXAMPLE, SIMULATED
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.checks import unfit
 from cmm_uq.jobs.part.datums import freedoms, members
@@ -32,7 +29,9 @@ from cmm_uq.jobs.part.drawing import KEY, Drawing, Unknown, probed_of, set_aside
 from cmm_uq.jobs.part.job import POSTERIOR, TABLES, part_of
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.qif import drawing_of_qif
-from cmm_uq.jobs.toml_text import commented, written
+from cmm_uq.jobs.schema import commented, written
+from cmm_uq.jobs.source import RESULTS
+from cmm_uq.jobs.tables.origin import EXAMPLE, SIMULATED
 
 Facts = dict[str, Any]
 

@@ -12,7 +12,7 @@ from cmm_uq.app.commands.plans.page import noise_data, placing_rows, to_measure_
 from cmm_uq.app.commands.plans.planning import Outlook, Plan
 from cmm_uq.app.commands.plans.words import STATUS, absorbed, combination, expected, named, pairs, unit_of
 from cmm_uq.app.commands.reading import in_language, read_job
-from cmm_uq.base.languages.language import Code
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.outcome import Outcome

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.conversation import SECOND, Conversation, Introduction, another
 from cmm_uq.laboratory.live.instruments.ipp.machine import open_machine
 from cmm_uq.laboratory.live.instruments.library import profile_named

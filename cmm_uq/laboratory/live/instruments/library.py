@@ -10,8 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.cells import column_problem
 from cmm_uq.base.files.content import content_of
+from cmm_uq.base.files.csv_table import column_problem
 from cmm_uq.base.files.limits import JOB_BYTES, TEXT
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.laboratory.live.instruments.parsing import check_profile

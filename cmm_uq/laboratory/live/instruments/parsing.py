@@ -11,7 +11,7 @@ from math import isclose, isfinite
 from types import MappingProxyType
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.sentences import unit_of
+from cmm_uq.base.files.table import unit_of
 from cmm_uq.base.messages import Text, Verbatim, number, say, semicolons
 from cmm_uq.base.units import pint_units
 from cmm_uq.laboratory.live.instruments.profile import (

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.source import Gap, Reading
 

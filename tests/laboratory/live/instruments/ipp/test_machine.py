@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.ipp.machine import IppMachine
 from cmm_uq.laboratory.live.instruments.ipp.protocol import BadLineError, HeardLine, response_of

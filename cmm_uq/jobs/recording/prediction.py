@@ -1,0 +1,265 @@
+"""``[simulation]``: what a simulation, by whatever program, predicts for a recording, and the reading of it.
+
+``[simulation]`` of job.toml: what a simulation, by whatever program, predicts for the recording.
+
+It names a file of predicted coordinates or lengths (:mod:`cmm_uq.jobs.recording.prediction`), or error maps of the machine.
+
+Reads what a simulation predicts for a recording, as whatever program wrote it.
+
+A CSV with one row a point: ``measurement, point, repeat, x_mm, y_mm, z_mm``; or, for lengths, one row a measurement with
+``length_mm``. Optional ``u_um``. Cells are separated by commas, semicolons or tabs; where they are not separated by commas, a
+number may have a decimal comma. Exponents may be written with E or D. Further columns are passed over.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.content import text_of
+from cmm_uq.base.files.csv_table import Cells, cells_of
+from cmm_uq.base.files.limits import MAPS
+from cmm_uq.base.files.numbers import numbers
+from cmm_uq.base.files.table import Length, Names, Table, Uncertainty
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.importing.recording import COORDINATES, WHOLE, largest
+from cmm_uq.jobs.tables.machine import ErrorMapFile
+
+KEY = "[simulation]"
+
+UNIT_MM = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "um": 1e-3, "inch": 25.4}
+"""Millimetres in each unit that predicted coordinates and lengths may have."""
+
+_OF_A_FILE = ("length_mm", "unit", "columns")
+"""Keys that say how a file is to be read."""
+
+NOMINAL_C = 20.0
+"""°C of a map that is named without its temperature."""
+
+
+class SimulationFacts(Table):
+    """``[simulation]``."""
+
+    file: str | None = None
+    """File of predicted coordinates or lengths."""
+    map: Annotated[list[ErrorMapFile], Field(max_length=MAPS.most)] = []
+    """In place of a file, error maps: the displacements that they give at the recorded positions are the prediction."""
+    program: str = ""
+    """Program that made the prediction, in your words."""
+    u_um: Uncertainty = 0.0
+    """Standard uncertainty of each predicted coordinate (or length), where the file has no column of it; repeats share it."""
+    u_common_um: Uncertainty = 0.0
+    """Standard uncertainty of the artefact's size that all predictions share."""
+    length_mm: Length | None = None
+    """Length of the artefact, as the simulation took it; otherwise that of [artefact]."""
+    unit: Literal["mm", "m", "cm", "um", "inch"] = "mm"
+    """Unit of predicted coordinates and lengths."""
+    columns: Annotated[dict[str, str], Field(max_length=10)] = {}
+    """Names of the file's columns, where they are others than the recording's."""
+    effects: Names = []
+    """Effects that the simulation contains."""
+    refit: bool = False
+    """Whether these are estimated anew, as corrections to what the simulation contains."""
+
+    @field_validator("map", mode="before")
+    @classmethod
+    def _one_or_several(cls, given: Any) -> Any:
+        if isinstance(given, str):
+            given = {"file": given, "temperature_c": NOMINAL_C}
+        return [given] if isinstance(given, dict) else given
+
+    @model_validator(mode="after")
+    def _one_prediction(self) -> Self:
+        if (self.file is None) == (not self.map):
+            raise ValueError('give either file = "predicted.csv", or map = "error_map.csv"')
+        if self.refit and not self.effects:
+            raise ValueError("refit = true says nothing of what: name the effects that the simulation contains")
+        if self.map and (given := [key for key in _OF_A_FILE if key in self.model_fields_set]):
+            raise ValueError(f"{given[0]} belongs to a file of predictions, not to a map: leave it out")
+        return self
+
+
+LENGTH, UNCERTAINTY = "length_mm", "u_um"
+KNOWN = (*WHOLE, *COORDINATES, LENGTH, UNCERTAINTY)
+
+_OF_A_MAP = ("axis", "position_mm")
+
+_FIX = "Save it as CSV in UTF-8"
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*([eEdD][+-]?\d+)?")
+_FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What a simulation predicts, row by row.
+
+    Parameters
+    ----------
+    where : file, for messages.
+    measurement : (r,).
+    point : (r,); zeros of predicted lengths.
+    repeat : (r,); ``None`` where the prediction has no repeats and holds for all.
+    xyz : (r, 3) mm; (0, 3) of predicted lengths.
+    length : (r,) mm; (0,) of predicted coordinates.
+    u : (r,) standard uncertainty of a coordinate, or of the length, mm.
+    lines : (r,) of the file.
+    """
+
+    where: str
+    measurement: Ints
+    point: Ints
+    repeat: Ints | None
+    xyz: Floats
+    length: Floats
+    u: Floats
+    lines: Ints
+
+    @property
+    def of_lengths(self) -> bool:
+        """Whether lengths are predicted, not coordinates."""
+        return bool(len(self.length))
+
+
+def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Prediction:
+    """The prediction in a file.
+
+    Parameters
+    ----------
+    content : its bytes.
+    where : its name, for messages.
+    facts : how it is to be read.
+
+    Raises
+    ------
+    CmmUqError : a column is missing or named in vain, a cell is no number of a possible size, a point is predicted twice.
+    """
+    cells = _table(content, where)
+    place = _places(cells, where, facts)
+    unit = UNIT_MM[facts.unit]
+    table: dict[str, Floats] = {}
+    for column, i in place.items():
+        table[column] = numbers([row[i] for row in cells.rows], partial(_at, cells, where, i))
+        scaled = table[column] * (unit if column in (*COORDINATES, LENGTH) else 1.0)
+        _check_size(scaled, column, cells, where, i)
+        table[column] = scaled
+    whole = {name: table[name].astype(np.int64) for name in WHOLE if name in table}
+    count, point = len(cells.rows), whole.get("point")
+    lengths = LENGTH in table
+    u = MICROMETRE * table.get(UNCERTAINTY, np.full(count, facts.u_um))
+    found = Prediction(
+        where, whole["measurement"], np.zeros(count, dtype=np.int64) if point is None or lengths else point,
+        whole.get("repeat"), np.column_stack([table[n] for n in COORDINATES]) if not lengths else np.zeros((0, 3)),
+        table[LENGTH] if lengths else np.zeros(0), u, np.array(cells.lines, dtype=np.int64),
+    )  # fmt: skip
+    _check_unique(found)
+    return found
+
+
+def is_error_map(content: bytes, where: str) -> bool:
+    """Whether a file is no prediction but an error map as CSV.
+
+    Raises
+    ------
+    CmmUqError : it is no text.
+    """
+    names = [name.strip() for name in _header(text_of(content, where, _FIX)).split(",")]
+    return set(_OF_A_MAP) <= set(names)
+
+
+def _table(content: bytes, where: str) -> Cells:
+    delimiter = _delimiter(_header(text_of(content, where, _FIX)))
+    cells = cells_of(content, where, _FIX, delimiter=delimiter)
+    if not cells.rows:
+        raise CmmUqError("has no rows", where=where, fix="The first line names the columns, then one row a point")
+    header = cells.header
+    for row, line in zip(cells.rows, cells.lines, strict=True):
+        if len(row) != len(header) and not (len(row) == len(header) + 1 and not row[-1]):
+            raise CmmUqError(f"has {len(row)} cells where the header has {len(header)}", where=f"{where} line {line}",
+                             fix="Complete the row; a decimal comma needs semicolons between cells")  # fmt: skip
+    rows = [[_plain(cell, decimal_comma=delimiter != ",") for cell in row] for row in cells.rows]
+    return Cells(header, cells.header_line, rows, cells.lines)
+
+
+def _header(text: str) -> str:
+    """The line that names the columns."""
+    return next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
+
+
+def _delimiter(header: str) -> str:
+    """What separates the names of the columns."""
+    return ";" if ";" in header else "\t" if "\t" in header else ","
+
+
+def _plain(cell: str, *, decimal_comma: bool) -> str:
+    """A number as it is written here; anything else as it stands."""
+    if decimal_comma and _DECIMAL_COMMA.fullmatch(cell):
+        cell = cell.replace(",", ".")
+    return _FORTRAN.sub(r"\1e\2", cell) if _FORTRAN.fullmatch(cell) else cell
+
+
+def _places(cells: Cells, where: str, facts: SimulationFacts) -> dict[str, int]:
+    """Where in a row the columns stand that are read, by the recording's names."""
+    header, at = cells.header, f"{where} line {cells.header_line}"
+    if unknown := next((name for name in facts.columns if name not in KNOWN), None):
+        raise CmmUqError(f"a prediction has no {unknown!r}", where=f"job.toml {KEY} columns",
+                         fix=suggestion(unknown, KNOWN))  # fmt: skip
+    if set(_OF_A_MAP) <= set(header):
+        raise CmmUqError("is an error map", where=at, fix=f"Name it as map in job.toml {KEY}, not as file")
+    found: dict[str, int] = {}
+    for name in KNOWN:
+        told = facts.columns.get(name, name)
+        if header.count(told) > 1:
+            raise CmmUqError(f"the column {told!r} is there twice", where=at, fix="Keep one")
+        if told in header:
+            found[name] = header.index(told)
+        elif name in facts.columns:
+            raise CmmUqError(f"there is no column {told!r}", where=at,
+                             fix=f"{suggestion(told, header)}, in job.toml {KEY} columns")  # fmt: skip
+    needed = ("measurement", LENGTH) if LENGTH in found else ("measurement", "point", *COORDINATES)
+    if missing := next((name for name in needed if name not in found), None):
+        raise CmmUqError(f"no column {missing!r}", where=at,
+                         fix=f'Say which it is in job.toml {KEY}: columns = {{ {missing} = "…" }}, unit = "mm"')  # fmt: skip
+    if LENGTH in found and "x_mm" in found:
+        raise CmmUqError("predicts coordinates and lengths", where=at, fix="Leave one of them out")
+    return found
+
+
+def _at(cells: Cells, where: str, column: int, row: int) -> str:
+    return f"{where} line {cells.lines[row]}, column {cells.header[column]}"
+
+
+def _check_size(values: Floats, column: str, cells: Cells, where: str, place: int) -> None:
+    if column in WHOLE:
+        bad, why = values != np.round(values), "is not a whole number"
+    elif column == UNCERTAINTY:
+        bad, why = values < 0, "is no standard uncertainty"
+    elif column == LENGTH:
+        bad, why = values <= 0, "is no length"
+    else:
+        bad, why = np.zeros(len(values), dtype=bool), ""
+    beyond = np.abs(values) > largest(column)
+    if np.any(bad | beyond):
+        i = int(np.argmax(bad | beyond))
+        raise CmmUqError(f"{values[i]:g} {'is more than anything that is measured' if beyond[i] else why}",
+                         where=_at(cells, where, place, i), fix="Check the column and its unit")  # fmt: skip
+
+
+def _check_unique(found: Prediction) -> None:
+    repeat: Sequence[int] = [1] * len(found.lines) if found.repeat is None else found.repeat.tolist()
+    seen: dict[tuple[int, int, int], int] = {}
+    for *key, line in zip(found.measurement.tolist(), found.point.tolist(), repeat, found.lines.tolist(), strict=True):
+        one = (key[0], key[1], key[2])
+        if one in seen:
+            point = "" if found.of_lengths else f", point {one[1]}"
+            raise CmmUqError(f"measurement {one[0]}{point} is predicted twice",
+                             where=f"{found.where} lines {seen[one]} and {line}",
+                             fix="Number repeats in a column repeat, as the recording does, or keep one")  # fmt: skip
+        seen[one] = line

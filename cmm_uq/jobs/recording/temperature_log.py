@@ -1,0 +1,277 @@
+"""Temperatures of a machine's scales at any moment, from a log of several thermocouples a scale, joined to a recording.
+
+Temperatures of a machine's scales at any moment, from a log of several thermocouples a scale.
+
+A log is a CSV with ``time_s`` (seconds) or ``time`` (ISO 8601) and a column for each thermocouple. Which of them sit on
+which scale is told, or read off their names: ``x1_c``, ``temp_x_2_c`` … An empty cell is a thermocouple that fell out for a
+moment; the others of its scale stand in for it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.csv_table import CsvTable, csv_table
+from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.jobs.tables.machine import MachineFacts
+
+_SENSOR = re.compile(r"(?:temp_)?([xyz])_?(\d+)_c")
+
+BRIDGED = 2.5
+"""Median intervals of a log that are still interpolated over: one entry may be missing, two in a row are a gap."""
+
+
+@dataclass(frozen=True, eq=False)
+class TemperatureLog:
+    """Mean temperature of each scale over time.
+
+    Parameters
+    ----------
+    times : (m,) s, increasing; where the log gives dates, since the start that was told, or since 1970.
+    scales : (m, 3) mean of the thermocouples on scales x, y, z, °C.
+    spread : (m, 3) largest less smallest of them, K: how far one number describes a scale.
+    source : file.
+    max_gap : longest interval between two entries that is interpolated over, s.
+    dated : whether the log gives dates.
+    """
+
+    times: Floats
+    scales: Floats
+    spread: Floats
+    source: str = ""
+    max_gap: float = np.inf
+    dated: bool = False
+
+    def at(self, times: ArrayLike, place: Callable[[int], str] | None = None) -> Floats:
+        """Temperatures (n, 3) of the scales at times (n,), linear between the entries of the log, °C.
+
+        Parameters
+        ----------
+        place : names where a time comes from, for messages; the log when left out.
+
+        Raises
+        ------
+        CmmUqError : a time lies before or after the log, or in a gap of it.
+        """
+        return self._between(times, self.scales, place)
+
+    def spread_at(self, times: ArrayLike) -> Floats:
+        """Spread (n, 3) of the thermocouples of each scale at times (n,), K."""
+        return self._between(times, self.spread)
+
+    def u_at(self, times: ArrayLike) -> Floats:
+        """Standard uncertainty (n, 3) of :meth:`at` for what a scale did between two entries, K; 0 at an entry.
+
+        Between them the temperature is taken to lie anywhere between theirs (GUM 4.3.7: their difference over √12). What the
+        thermocouples do not see, their own calibration and the temperature between them along the scale, is not in it.
+        """
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        self._check(wanted, None)
+        after = np.searchsorted(self.times, wanted)
+        steps = np.abs(self.scales[after] - self.scales[np.maximum(after - 1, 0)]) / np.sqrt(12)
+        return np.where((self.times[after] == wanted)[:, None], 0.0, steps)
+
+    def _between(self, times: ArrayLike, values: Floats, place: Callable[[int], str] | None = None) -> Floats:
+        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        self._check(wanted, place)
+        return np.column_stack([np.interp(wanted, self.times, column) for column in values.T])
+
+    def _check(self, wanted: Floats, place: Callable[[int], str] | None) -> None:
+        def where(row: int) -> str | None:
+            return place(row) if place is not None else self.source or None
+
+        inside = (wanted >= self.times[0]) & (wanted <= self.times[-1])
+        if not inside.all():
+            row = int(np.flatnonzero(~inside)[0])
+            raise CmmUqError(
+                f"no temperature at {wanted[row]:.10g} s: the log reaches from {self.times[0]:.10g} to "
+                f"{self.times[-1]:.10g} s",
+                where=where(row),
+                fix="Log temperatures from before the first point until after the last, by the same clock",
+            )
+        after = np.searchsorted(self.times, wanted)
+        before = np.where(self.times[after] == wanted, after, after - 1)
+        wide = np.flatnonzero(self.times[after] - self.times[before] > self.max_gap)
+        if len(wide):
+            row = int(wide[0])
+            low, high = self.times[before[row]], self.times[after[row]]
+            raise CmmUqError(
+                f"no temperature at {wanted[row]:.10g} s: the log has a gap from {low:.10g} to {high:.10g} s",
+                where=where(row),
+                fix=f"Gaps of up to {self.max_gap:.10g} s are interpolated over; longer ones where max_gap_s allows it",
+            )
+
+
+def parse_temperature_log(
+    content: bytes,
+    where: str,
+    sensors: Mapping[str, Sequence[str]] | None = None,
+    *,
+    start: datetime | None = None,
+    max_gap: float | None = None,
+) -> TemperatureLog:
+    """Temperature log from the content of a CSV file.
+
+    Parameters
+    ----------
+    content : of the file, UTF-8.
+    where : its name, for messages.
+    sensors : columns of the thermocouples on scales x, y and z; by their names when left out.
+    start : from which seconds count, where the log gives dates; 1970 when left out.
+    max_gap : longest interval that is interpolated over, s; :data:`BRIDGED` median intervals when left out.
+
+    Raises
+    ------
+    CmmUqError : what is wrong, with its line.
+    """
+    table = csv_table(content, where, ())
+    times = _seconds(table, start)
+    early = np.flatnonzero(np.diff(times) <= 0)
+    if len(early):
+        raise CmmUqError(
+            "is not later than the line before", where=table.at(early[0] + 1), fix="Sort by time, each once"
+        )
+    on_scale = [_columns(table, axis, sensors) for axis in AXES]
+    readings = [[_readings(table, row, columns) for columns in on_scale] for row in range(len(times))]
+    scales = np.array([[np.mean(scale) for scale in row] for row in readings])
+    spread = np.array([[np.ptp(scale) for scale in row] for row in readings])
+    if max_gap is None:
+        max_gap = BRIDGED * float(np.median(np.diff(times))) if len(times) > 1 else np.inf
+    return TemperatureLog(times, scales, spread, where, max_gap, dated="time_s" not in table.header)
+
+
+def _columns(table: CsvTable, axis: str, sensors: Mapping[str, Sequence[str]] | None) -> tuple[str, ...]:
+    if sensors is None:
+        matches = [(_SENSOR.fullmatch(name), name) for name in table.header]
+        found = tuple(name for match, name in matches if match and match[1] == axis)
+    else:
+        found = tuple(sensors.get(axis, ()))
+    if not found:
+        raise CmmUqError(
+            f"no thermocouple of scale {axis}",
+            where=table.where,
+            fix=f'Name its columns {axis}1_c, {axis}2_c …, or say which: columns = {{ {axis} = ["…"], … }}',
+        )
+    for name in found:
+        if name not in table.header:
+            raise CmmUqError(f"no column {name!r}", where=table.where, fix=suggestion(name, table.header))
+    return found
+
+
+def _readings(table: CsvTable, row: int, columns: Sequence[str]) -> list[float]:
+    """Temperatures of one scale that are there."""
+    given = [name for name in columns if table.rows[row][table.header.index(name)]]
+    if not given:
+        raise CmmUqError(f"no temperature of {', '.join(columns)}", where=table.at(row), fix="Remove the line")
+    values = [table.number(row, name) for name in given]
+    for name, value in zip(given, values, strict=True):
+        if not -50 < value < 100:
+            raise CmmUqError(
+                f"{name} = {value:g} °C",
+                where=table.at(row),
+                fix="Give °C; leave the cell empty where the thermocouple failed",
+            )
+    return values
+
+
+def _seconds(table: CsvTable, start: datetime | None) -> Floats:
+    """Times (m,) of the rows."""
+    if "time_s" in table.header:
+        if start is not None:
+            raise CmmUqError(
+                "gives time_s, seconds that need no start",
+                where=table.where,
+                fix="Leave out start, or give dates (time)",
+            )
+        return np.array([table.number(row, "time_s") for row in range(len(table.rows))])
+    if "time" not in table.header:
+        raise CmmUqError(
+            "no column time_s or time", where=table.where, fix="Give seconds (time_s) or dates in ISO 8601 (time)"
+        )
+    moments = [_moment(table, row) for row in range(len(table.rows))]
+    first = start or moments[0]
+    for row, moment in enumerate(moments):
+        if (moment.tzinfo is None) != (first.tzinfo is None):
+            has, other = ("no zone", "has one") if moment.tzinfo is None else ("a zone", "has none")
+            raise CmmUqError(
+                f"time = {moment.isoformat()!r} has {has}, and {'start' if start else 'the first line'} {other}",
+                where=table.at(row), fix="Give the zone of all of them, such as +02:00, or of none",
+            )  # fmt: skip
+    # without a zone the clock is taken as it is, so that no change to summer time tears the log
+    begin = start or datetime(1970, 1, 1, tzinfo=UTC if first.tzinfo else None)
+    return np.array([(moment - begin).total_seconds() for moment in moments])
+
+
+def _moment(table: CsvTable, row: int) -> datetime:
+    text = table.rows[row][table.header.index("time")]
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        raise CmmUqError(
+            f"time = {text!r} is no date", where=table.at(row), fix="Write it as 2004-06-01T14:30:00"
+        ) from None
+
+
+COLUMNS = tuple(f"temp_{axis}_c" for axis in AXES)
+"""What a log gives the recording."""
+
+KEY = "[machine] temperature_log"
+
+
+def log_of(machine: MachineFacts, inputs: Mapping[str, bytes], folder: Path) -> TemperatureLog | None:
+    """The log that a job names, ``None`` where it names none.
+
+    Parameters
+    ----------
+    inputs : contents of the job's files by their names.
+    folder : of the job, for messages.
+
+    Raises
+    ------
+    CmmUqError : it is no temperature log, or its clock is not the recording's.
+    """
+    given = machine.temperature_log
+    if given is None:
+        return None
+    sensors = given.columns.model_dump() if given.columns is not None else None
+    where = str(folder / given.file)
+    log = parse_temperature_log(
+        inputs[given.file], where, sensors, start=given.start, max_gap=given.max_gap_s
+    )  # fmt: skip
+    if log.dated and given.start is None:
+        raise CmmUqError("gives dates, and the recording's time_s counts seconds", where=where,
+                         fix=f"Say in {KEY} when time_s was 0: start = 2004-06-01T14:30:00")  # fmt: skip
+    return log
+
+
+def with_logged(points: Points, log: TemperatureLog | None, toml: Path, recording: str) -> Points:
+    """The points of a recording with the temperatures of their scales.
+
+    Parameters
+    ----------
+    toml : the job's, for messages.
+    recording : its recording, for messages.
+
+    Raises
+    ------
+    CmmUqError : the recording has temperatures of the scales itself, or no times, or a time that the log does not know.
+    """
+    if log is None:
+        return points
+    own = next((name for name in COLUMNS if name in points.columns), None)
+    if own is not None:
+        raise CmmUqError(f"the recording has {own}, and the log gives it as well", where=f"{toml}: {KEY}",
+                         fix=f"Leave out the log, or {', '.join(COLUMNS)} in {recording}")  # fmt: skip
+    if "time_s" not in points.columns:
+        raise CmmUqError("the recording has no times to be joined by", where=f"{toml}: {KEY}",
+                         fix=f"Record time_s in {recording}, by the clock of the log")  # fmt: skip
+    found = log.at(points.columns["time_s"], lambda row: f"{recording} line {points.lines[row]}, column time_s")
+    return replace(points, columns={**points.columns, **dict(zip(COLUMNS, found.T, strict=True))})

@@ -1,0 +1,215 @@
+"""results.json of other reports: what a job that names one, or a file of another format, needs of it."""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import hypot
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.table import LARGEST_UM, SMALLEST_UM
+from cmm_uq.jobs.source import RESULTS
+from cmm_uq.jobs.tables.origin import Origin
+from cmm_uq.jobs.verdicts import Verdicts
+
+
+class ResultsPart(BaseModel):
+    """Of a results.json only what is needed; further keys are no business of its reader."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
+
+
+class ResultsFile(ResultsPart):
+    schema_: Annotated[Literal["cmm-uq/results/1"], Field(alias="schema")]
+
+
+Results = TypeVar("Results", bound=ResultsPart)
+
+
+def results_named(name: str | None) -> str | None:
+    """Name of the results.json: itself, or in the folder that is named; ``None`` where the job names none."""
+    if name is None:
+        return None
+    name = name.removesuffix("/")
+    return name if name.endswith(".json") else f"{name}/{RESULTS}"
+
+
+def read_results(part: type[Results], content: bytes, where: str, lack: str, fix: str) -> Results:
+    """What is needed of a results.json; ``lack`` says what it is not where it does not have that."""
+    try:
+        return part.model_validate_json(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        at = ".".join(map(str, first["loc"]))
+        why = f"{at}: {first['msg'][0].lower()}{first['msg'][1:]}" if at else "it is no JSON"
+        raise CmmUqError(f"{lack}: {why}", where=where, fix=fix) from None
+
+
+class EstimateFigure(ResultsPart):
+    value: float
+    u: float
+
+
+class EstimateWithInterval(EstimateFigure):
+    interval95: Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class _Identifiability(ResultsPart):
+    undetermined: list[dict[str, float]] = []
+
+
+AS_FOUND = "[job] as_found"
+_FIX = "Name the results.json that cmm-uq report wrote of the machine as it was found, or the folder it lies in"
+
+
+class ConformityDecision(ResultsPart):
+    standard: str
+    characteristic: str = ""
+    decision: str
+
+
+class _JobAsFound(ResultsPart):
+    id: str
+    origin: Origin
+    date: Annotated[dt.date, Field(strict=False)] | None = None
+    machine: str = ""
+    serial: str = ""
+
+
+class AsFound(ResultsFile):
+    """What a machine showed before it was adjusted: estimates, figures of lengths, and decisions."""
+
+    job: _JobAsFound
+    estimates: dict[str, dict[str, EstimateWithInterval]]
+    accuracy_uncertainty: dict[str, EstimateWithInterval] = {}
+    conformity: list[ConformityDecision] = []
+    tolerances: dict[str, dict[str, float | str]] = {}
+    verdicts: dict[str, Any] | None = None
+    identifiability: _Identifiability = _Identifiability()
+
+    @property
+    def stated(self) -> Verdicts:
+        return Verdicts.of_results(self.model_dump())
+
+    def figure(self, group: str, name: str) -> EstimateWithInterval | None:
+        """An estimate, or of the group ``accuracy`` a figure of the lengths; ``None`` where nothing determined it."""
+        if group == "accuracy":
+            return self.accuracy_uncertainty.get(name)
+        free = any(f"{group}.{name}" in combination for combination in self.identifiability.undetermined)
+        return None if free else self.estimates.get(group, {}).get(name)
+
+
+def as_found_of(
+    name: str | None, inputs: Mapping[str, bytes], folder: Path, origin: Origin, machine: str, serial: str
+) -> AsFound | None:
+    """The results.json ``name`` among the inputs of a job; refused where it is of another machine or origin."""
+    if name is None:
+        return None
+    where = str(folder / name)
+    before = read_results(AsFound, inputs[name], where, "is no results.json of a report", _FIX)
+    for what, then, now in (("machine", before.job.machine, machine), ("serial number", before.job.serial, serial)):
+        if then and now and then != now:
+            raise CmmUqError(f"is of {what} {then!r}, and this job of {now!r}", where=where, fix=_FIX)
+    if before.job.origin != origin:
+        raise CmmUqError(f"is of a {before.job.origin} recording, and this one is {origin}", where=where, fix=_FIX)
+    return before
+
+
+_Size = Annotated[float, Field(ge=0, le=LARGEST_UM)]
+
+
+class _NoiseComponent(ResultsPart):
+    value: _Size
+    u: _Size
+
+    @property
+    def mean_square_root(self) -> float:
+        """Root of the mean square: variances are what observations add, and their posterior mean is value² + u²."""
+        return hypot(self.value, self.u)
+
+
+class _Reading(ResultsPart):
+    value: Annotated[float, Field(ge=SMALLEST_UM, le=LARGEST_UM)]
+
+
+class _Noise(ResultsPart):
+    coordinate_um: _Reading
+    x_um: _Reading | None = None
+    y_um: _Reading | None = None
+    z_um: _Reading | None = None
+    placing_um: _NoiseComponent | None = None
+    growth_um: _NoiseComponent | None = None
+
+
+class _ResultsWithNoise(ResultsFile):
+    noise: _Noise
+
+
+@dataclass(frozen=True)
+class EarlierNoise:
+    """Standard deviation of a reading along each axis, of a set-up offset and of growing noise, µm.
+
+    The last two are ``None`` where the recording could not show them.
+    """
+
+    reading_um: tuple[float, float, float]
+    placing_um: float | None
+    growth_um: float | None
+
+
+def noise_found(content: bytes, where: str) -> EarlierNoise:
+    """``[plan] noise_from``: the noise of an earlier recording by the results.json of its report."""
+    noise = read_results(
+        _ResultsWithNoise, content, where, "says nothing of the noise of a recording",
+        "Name the results.json that cmm-uq report wrote of an earlier recording of such an artefact",
+    ).noise  # fmt: skip
+    x, y, z = (noise.coordinate_um if axis is None else axis for axis in (noise.x_um, noise.y_um, noise.z_um))
+    placing, growth = (None if part is None else part.mean_square_root for part in (noise.placing_um, noise.growth_um))
+    return EarlierNoise((x.value, y.value, z.value), placing, growth)
+
+
+class ErrorOfTest(ResultsPart):
+    measurement: int | None = None
+    repeat: int | None = None
+    length_mm: float | None = None
+    error_um: float
+    u_um: float | None = None
+    limit_um: float
+    outcome: str
+    position: str | None = None
+
+
+class ConformityStatement(ResultsPart):
+    standard: str
+    characteristic: str | None = None
+    decision: str
+    errors: list[ErrorOfTest] = []
+
+
+class _JobReported(ResultsPart):
+    id: str
+    origin: str
+    date: str
+    machine: str
+    inputs_sha256: dict[str, str]
+
+
+class _Software(ResultsPart):
+    version: str
+
+
+class ReportResults(ResultsFile):
+    """What files of other formats take of a report: decisions of standards, and error factors."""
+
+    software: _Software
+    job: _JobReported
+    conformity: list[ConformityStatement] = []
+    estimates: dict[str, dict[str, EstimateFigure]] = {}
+    tolerances: dict[str, dict[str, float | str]] = {}
+    verdicts: dict[str, Any] | None = None
+    identifiability: _Identifiability = _Identifiability()

@@ -1,0 +1,1 @@
+"""What job.toml may say, table by table, each checked by itself."""

@@ -1,0 +1,307 @@
+"""``[artefact]``: what every kind of measurement says of its artefact, and of the certificates that results rest on.
+
+What a job says of a certificate that its results rest on: number, issuer and by what right it calibrates, and dates.
+
+The certificates of the artefact and of the short gauge are tables of theirs; thermometers stand in ``[[thermometer]]``.
+What follows from them is said in :mod:`cmm_uq.jobs.chain`.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from calendar import monthrange
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, PrivateAttr, model_validator
+
+from cmm_uq.base.files.table import AnyFloat, Column, Length, Table
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.jobs.importing.keys import FileKeys
+from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
+
+
+@dataclass(frozen=True)
+class CertifiedValue:
+    """A value of ``[artefact]`` that a digital certificate may state.
+
+    Parameters
+    ----------
+    key : of it; with a dot where it stands in a table of its own, which the job must have.
+    u_key : of its standard uncertainty, µm; empty where it has none.
+    words : parts of the names by which certificates call it, in small letters.
+    count : of values; of several the largest uncertainty is taken, where they have one key.
+    needed : whether a certificate without it is of no use.
+    """
+
+    key: str
+    u_key: str
+    words: Sequence[str]
+    count: int = 1
+    needed: bool = True
+
+    @property
+    def micrometres(self) -> bool:
+        """Whether it is in µm, and not in mm."""
+        return self.key.endswith("_um")
+
+
+LENGTH_WORDS = ("length", "distance", "länge", "abstand", "longueur", "長さ", "距離")
+DIAMETER_WORDS = ("diameter", "durchmesser", "diamètre", "直径")
+FORM_WORDS = (
+    "form dev",
+    "form error",
+    "formabweichung",
+    "roundness",
+    "sphericity",
+    "rundheit",
+    "circularité",
+    "真球度",
+)
+"""In English, German, French and Japanese."""
+
+LENGTH = CertifiedValue("length_mm", "u_um", LENGTH_WORDS)
+DIAMETER = CertifiedValue("length_mm", "u_um", DIAMETER_WORDS)
+
+
+NATIONAL, ACCREDITED, OTHER, IN_HOUSE = "national institute", "accredited", "not accredited", "in-house"
+MATERIAL, CONSENSUS = "reference material", "consensus"
+Issuer = Literal["national institute", "accredited", "not accredited", "in-house", "reference material", "consensus"]
+Arrangement = Literal["CIPM MRA", "ILAC MRA", "AFRAC MRA", "APAC MRA", "ARAC MRA", "EA MLA", "IAAC MLA"]
+CIPM: Arrangement = "CIPM MRA"
+"""The arrangement of national institutes; the others are those of accreditation bodies, of ILAC or recognised by it."""
+
+
+class Traceability(Table):
+    """A certificate of the artefact, the short gauge or a thermometer.
+
+    Attributes
+    ----------
+    machine : measuring machine that the artefact was certified on, by its name or its serial number.
+    """
+
+    number: str = ""
+    """Number of the certificate, for the statement of traceability."""
+    laboratory: str = ""
+    """Who issued the certificate."""
+    machine: str = ""
+    """Measuring machine that the artefact was certified on, by its name or serial number: the machine that it tests
+    is warned of."""
+    date: dt.date | None = None
+    """Date of the certificate."""
+    due: dt.date | None = None
+    """Last day on which the calibration holds, by the laboratory that uses it; `interval_months` may stand for it."""
+    interval_months: Annotated[int, Field(ge=1, le=600)] | None = None
+    """How long the calibration holds from its date, in months, by the laboratory that uses it."""
+    issuer: Issuer | None = None
+    """What the issuer is: `national institute`, `accredited`, `not accredited`, `in-house` (the laboratory itself),
+    `reference material` (its producer) or `consensus`."""
+    accreditation: str = ""
+    """Number of the issuer's accreditation."""
+    accredited_by: str = ""
+    """Body that accredited the issuer."""
+    arrangement: Arrangement | None = None
+    """What covers this calibration: `CIPM MRA` of a national institute; of an accredited laboratory the arrangement that its
+    accreditation body has signed, as `ILAC MRA` or `EA MLA`."""
+    evidence: str = ""
+    """Evidence of the issuer's competence that the laboratory holds, where no arrangement covers the calibration."""
+
+    @model_validator(mode="after")
+    def _one_end(self) -> Self:
+        if self.due is not None and self.interval_months is not None:
+            raise ValueError("due and interval_months both say until when the calibration holds: give one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _arranged(self) -> Self:
+        if self.arrangement is not None and (self.arrangement == CIPM) != (self.issuer == NATIONAL):
+            raise ValueError(
+                f'arrangement = "{self.arrangement}" does not fit issuer = "{self.issuer or ""}": the CIPM MRA covers '
+                "national institutes, the others accredited laboratories"
+            )
+        return self
+
+    @property
+    def until(self) -> dt.date | None:
+        """Last day on which the calibration holds; the last of the month where a month has no such day."""
+        if self.interval_months is None or self.date is None:
+            return self.due
+        years, month = divmod(self.date.month - 1 + self.interval_months, 12)
+        year = min(self.date.year + years, dt.MAXYEAR)
+        return dt.date(year, month + 1, min(self.date.day, monthrange(year, month + 1)[1]))
+
+
+class ThermometerFacts(Table):
+    """``[[thermometer]]``: a thermometer that recorded temperatures were read from."""
+
+    columns: Annotated[list[Column], Field(min_length=1, max_length=50)] = ["temp_artefact_c"]
+    """Columns of the recording that it gave."""
+    name: str = ""
+    """Name of the thermometer on the certificate."""
+    serial: str = ""
+    """Serial number of the thermometer."""
+    certificate: Traceability = Traceability()
+    """The thermometer's own certificate."""
+
+
+class CertificateFile(FileKeys, Traceability):
+    """The artefact's own certificate, and the file that its certified values are read from."""
+
+    file: str | None = None
+    """File of what is certified. A DCC (XML) gives number, laboratory, dates and certified values with their uncertainty, of
+    every kind; a CSV or a workbook the distances or places of points by their number, which the recording then has not."""
+
+
+class ArtefactFacts(Table):
+    """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
+
+    ``U_um`` with ``k`` or ``degrees_of_freedom`` may stand for ``u_um``, which is then filled in.
+    Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
+
+    Attributes
+    ----------
+    with_references : whether they do; its ``u_um`` may then stand without ``length_mm``.
+    with_recording : whether there is one; otherwise what ``[machine]`` names is measured.
+    with_earlier : whether two recordings of it at two dates can be compared.
+    carries_probe : whether its recording itself says how far from the end of the ram each point was, as tip offsets do.
+    form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
+    certified_values : that the artefact's digital certificate may state, where they do not stand in the recording.
+    """
+
+    with_references: ClassVar[bool] = False
+    with_recording: ClassVar[bool] = True
+    with_earlier: ClassVar[bool] = False
+    carries_probe: ClassVar[bool] = False
+    form_key: ClassVar[str | None] = None
+    certified_values: ClassVar[tuple[CertifiedValue, ...]] = (LENGTH,)
+
+    kind: str
+    """What kind of measurement it is; the further keys of the table depend on it."""
+    name: str = ""
+    """Name of the artefact on the certificate."""
+    serial: str = ""
+    """Serial number of the artefact."""
+    length_mm: Length | None = None
+    """Certified length at 20 °C, of a sphere its diameter; left out for an artefact that is not calibrated."""
+    u_um: LengthUncertainty | None = None
+    """Standard uncertainty (k = 1) of every certified length of the artefact, a number or a formula of the length as
+    `"0.1 + 0.25·L/1000"`; `U_um` with `k` may stand for it."""
+    U_um: LengthUncertainty | None = None
+    """Expanded uncertainty as the artefact's certificate states it, in place of `u_um`: a number, or a formula of the length
+    as `"0.2 + 0.5·L/1000"` or `"Q[0.2; 0.5·L/1000]"`, L in mm; needs `k` or `degrees_of_freedom`."""
+    k: Factor | None = None
+    """Coverage factor of `U_um`, or of a column `reference_U_um`."""
+    degrees_of_freedom: Freedom | None = None
+    """Effective degrees of freedom by the certificate; without `k` the factor is Student's t for 95 % by them."""
+    cte_per_k: AnyFloat = 0.0
+    """Coefficient of thermal expansion of the artefact, 1/K; its recorded temperature `temp_artefact_c` is corrected
+    by it."""
+    certificate: CertificateFile | None = None
+    """The artefact's own certificate, that the results are traceable by."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _expanded(cls, data: Any) -> Any:
+        return with_standard_uncertainty(data, columns=cls.with_references)
+
+    @model_validator(mode="after")
+    def _uncertainty_of_something(self) -> Self:
+        if self.degrees_of_freedom is not None and self.u_um is None and not self.with_references:
+            raise ValueError(
+                "degrees_of_freedom is given without an uncertainty: give U_um or u_um too, or leave it out"
+            )
+        if self.u_um is not None and self.length_mm is None and not self.with_references:
+            raise ValueError("u_um is given without length_mm: give both, or neither for an uncalibrated artefact")
+        if abs(self.cte_per_k) > 1e-3:
+            raise ValueError(
+                f"cte_per_k = {self.cte_per_k:g} is no expansion coefficient: steel has 11.5e-6 per kelvin"
+            )
+        return self
+
+    def u_of(self, lengths_mm: Floats | float) -> Floats:
+        """Standard uncertainty of certified lengths, µm, as stated for them; 0 where nothing is."""
+        if isinstance(self.u_um, Growing):
+            return self.u_um.at(lengths_mm)
+        return np.full(np.shape(lengths_mm), self.u_um or 0.0)
+
+    @property
+    def certified(self) -> bool:
+        """Whether lengths can be compared with it."""
+        return self.length_mm is not None
+
+    @property
+    def nominal_only(self) -> bool:
+        """Whether the job says that nothing of it is certified."""
+        return False
+
+    @property
+    def traced(self) -> bool:
+        """Whether what is found rests on something of it that is certified, and so on its certificate."""
+        return self.certified
+
+
+class ReferencedFacts(ArtefactFacts):
+    """``[artefact]`` of a kind whose certified figures stand in the recording.
+
+    ``nominal`` says that those figures are nominal only: their common scale then stays free.
+    """
+
+    with_references: ClassVar[bool] = True
+
+    nominal: bool = False
+    """Whether the references in the recording are nominal only: their common scale then stays free."""
+
+    _largest_um: float | None = PrivateAttr(default=None)
+    _covariances: tuple[tuple[int, ...], tuple[Floats, ...]] = PrivateAttr(default=((), ()))
+
+    def with_largest(self, u_um: float) -> Self:
+        """The same, of whose points by themselves at most this is stated: it holds for points of which nothing is."""
+        found = self.model_copy()
+        found._largest_um = u_um
+        return found
+
+    @property
+    def of_other_points(self) -> Self:
+        """What is stated of points of which nothing is stated by themselves, as those of a plan."""
+        by_points = self.u_um is None and self._largest_um is not None
+        return self.model_copy(update={"u_um": self._largest_um}) if by_points else self
+
+    def with_covariances(self, numbers: Sequence[int], covariances: Sequence[Floats]) -> Self:
+        """The same with the covariances that a digital certificate gives of its points.
+
+        Parameters
+        ----------
+        numbers : of the f points.
+        covariances : (f, f) µm², for the distances, or for each coordinate.
+        """
+        found = self.model_copy()
+        found._covariances = tuple(numbers), tuple(covariances)
+        return found
+
+    def covariances_at(self, numbers: Ints) -> tuple[Ints, tuple[Floats, ...]]:
+        """Which certified points those of some numbers (n,) are, and covariances (f, f) µm²; none where one is another."""
+        places = {number: i for i, number in enumerate(self._covariances[0])}
+        if not places or not set(numbers.tolist()) <= places.keys():
+            return np.zeros(0, dtype=np.int64), ()
+        index = np.array([places[number] for number in numbers.tolist()], dtype=np.int64)
+        return index, self._covariances[1]
+
+    @model_validator(mode="after")
+    def _nominal_or_certified(self) -> Self:
+        if self.nominal and (self.u_um is not None or self.length_mm is not None):
+            raise ValueError(
+                "nominal = true says that the recording's references are not certified: leave out length_mm and u_um"
+            )
+        return self
+
+    @property
+    def certified(self) -> bool:
+        """Whether lengths can be compared with it."""
+        return not self.nominal
+
+    @property
+    def nominal_only(self) -> bool:
+        """See :attr:`ArtefactFacts.nominal_only`."""
+        return self.nominal

@@ -1,0 +1,251 @@
+"""A standard's clauses as a laboratory holds them against its own copy: a form that it fills in, beside job.toml.
+
+``[test_uncertainty]``, ``[rated_conditions]`` and ``[probe]``: the circumstances of a standard's test.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from cmm_uq.base.files.limits import LISTED
+from cmm_uq.base.files.table import Table, Temperature, Uncertainty
+from cmm_uq.jobs.recording.short_gauge import ShortGauge
+from cmm_uq.jobs.tables.identification import Capability
+from cmm_uq.jobs.tables.identification import RequiredText as Said
+
+
+class HeldClause(Table):
+    """One clause: what the program does of it, and whether that agrees with the laboratory's copy."""
+
+    does: str
+    """What the program does, as it wrote the form; a clause of which it does something else by now is not checked."""
+    source: str = ""
+    """Where that comes from."""
+    agrees: bool | None = None
+    """Whether it agrees with the copy; left out, nobody has looked."""
+    differs: str = ""
+    """How it differs."""
+    stricter: bool = False
+    """Whether the program asks for more than the copy where it differs, so that a pass stays one."""
+    clause: str = ""
+    """Number of the clause in the copy."""
+    checked_by: Said | None = None
+    """Who held this clause against the copy, where another than the form's."""
+    on: dt.date | None = None
+    """When, where another day than the form's."""
+    edition: Said | None = None
+    """Of which edition, where another than the form's."""
+
+    @model_validator(mode="after")
+    def _one_answer(self) -> Self:
+        if (self.agrees is False) != bool(self.differs.strip()):
+            raise ValueError("give agrees = true, or agrees = false with differs = how it does")
+        if self.stricter and self.agrees is not False:
+            raise ValueError("stricter belongs to agrees = false")
+        return self
+
+
+class ClausesForm(Table):
+    """The form of a standard, filled in: ``cmm-uq standards NAME --form FILE`` writes it."""
+
+    standard: str
+    """The standard, by its name in `[[conformity]]`."""
+    checked_by: Said
+    """Who held the clauses against the laboratory's copy."""
+    on: dt.date
+    """When."""
+    edition: Said
+    """Edition of the copy, as its title page has it."""
+    clauses: Annotated[dict[str, HeldClause], Field(max_length=LISTED.most)]
+    """Each clause, by the name that the form has for it."""
+
+
+def _says_something(text: str) -> str:
+    if not text.strip():
+        raise ValueError("must not be empty: the certificate prints it")
+    return text
+
+
+Words = Annotated[str, AfterValidator(_says_something)]
+
+
+class Declared(Table):
+    """What somebody answers for in place of a figure; the certificate prints both."""
+
+    by: Words
+    """Who declares it."""
+    reason: Words
+    """Why."""
+
+
+class MachineLines(Table):
+    """``[test_uncertainty.machine]``: lines of the test uncertainty that are the machine's own, and so what is tested."""
+
+    expansion: Declared | None = None
+    """The machine measures and corrects the artefact's expansion, its coefficient included."""
+    temperature: Declared | None = None
+    """The machine measures and corrects the artefact's temperature."""
+    alignment: Declared | None = None
+    """The machine aligns the artefact."""
+    fixturing: Declared | None = None
+    """The artefact's mounting belongs to the machine."""
+    repeat: Declared | None = None
+    """What changes between repeated readings is the machine's."""
+
+
+class NegligibleLines(Table):
+    """``[test_uncertainty.negligible]``: lines of the test uncertainty that contribute nothing worth counting."""
+
+    calibration: Declared | None = None
+    """Calibration of the artefact."""
+    expansion: Declared | None = None
+    """The artefact's coefficient of expansion."""
+    temperature: Declared | None = None
+    """The artefact's temperature."""
+    alignment: Declared | None = None
+    """Alignment of the artefact."""
+    fixturing: Declared | None = None
+    """Fixturing of the artefact."""
+    form: Declared | None = None
+    """Calibration of the form deviation of a test sphere."""
+    repeat: Declared | None = None
+    """What of the artefact changes between repeated readings."""
+
+
+class TestUncertainty(Table):
+    """``[test_uncertainty]``: what a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165).
+
+    Attributes
+    ----------
+    u_cte_per_k : of the artefact's coefficient of expansion, 1/K.
+    u_temperature_k : of its temperature, K.
+    u_alignment_um, u_fixturing_um : of a length, by misalignment and by what the clamping does to it, µm.
+    u_form_um : of the calibrated form deviation of a test sphere, µm.
+    u_repeat_um : of a range or a difference of repeated readings, by what of the artefact changed between them, µm.
+    negligible, machine : lines that somebody answers for instead.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    u_cte_per_k: Annotated[float, Field(ge=0, le=1e-3)] = 0.0
+    """Standard uncertainty of the artefact's coefficient of expansion, 1/K."""
+    u_temperature_k: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Standard uncertainty of the artefact's temperature."""
+    u_alignment_um: Uncertainty = 0.0
+    """Standard uncertainty of a length by misalignment of the artefact."""
+    u_fixturing_um: Uncertainty = 0.0
+    """Standard uncertainty of a length by what the clamping does to it."""
+    u_form_um: Uncertainty = 0.0
+    """Standard uncertainty of the calibrated form deviation of a test sphere."""
+    u_repeat_um: Uncertainty = 0.0
+    """Standard uncertainty of a range or difference of repeated readings, by what of the artefact changed between
+    them."""
+    negligible: NegligibleLines = NegligibleLines()
+    """Lines that are declared negligible, by whom and why."""
+    machine: MachineLines = MachineLines()
+    """Lines that are declared the machine's own, by whom and why."""
+
+    @model_validator(mode="after")
+    def _stated_or_declared(self) -> Self:
+        for line, key in LINE_KEYS.items():
+            where = [table for table in ("negligible", "machine") if getattr(getattr(self, table), line, None)]
+            if len(where) > 1 or (where and getattr(self, key)):
+                raise ValueError(f"{line} is stated more than once: give {key}, or declare it in one table")
+        return self
+
+    def declared(self, line: str) -> Declared | None:
+        """By whom and why a line is declared negligible or the machine's own."""
+        found: Declared | None = getattr(self.negligible, line, None) or getattr(self.machine, line, None)
+        return found
+
+    @property
+    def of_artefact(self) -> bool:
+        """Whether anything is stated of the artefact's temperature, expansion, alignment or fixturing."""
+        return any((self.u_cte_per_k, self.u_temperature_k, self.u_alignment_um, self.u_fixturing_um))
+
+
+LINE_KEYS = {
+    "expansion": "u_cte_per_k", "temperature": "u_temperature_k", "alignment": "u_alignment_um",
+    "fixturing": "u_fixturing_um", "form": "u_form_um", "repeat": "u_repeat_um",
+}  # fmt: skip
+"""Key of each line of the test uncertainty but the calibration, which ``[artefact]`` states."""
+
+TEST_KEYS = tuple(LINE_KEYS.values())
+
+Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2)]
+Kelvins = Annotated[float, Field(gt=0, le=1000)]
+
+
+class RatedConditions(Table):
+    """``[rated_conditions]``: under which the limits of the machine hold, by its data sheet.
+
+    Attributes
+    ----------
+    temperature_c : lowest and highest temperature, °C.
+    change_k_per_h : largest change in an hour, K/h.
+    difference_k : largest difference between places at one time, K.
+    probe, stylus : for which the limits hold, as ``[probe]`` names them.
+    declared : by whom and why the test counts as one under rated conditions, where no rated temperature is stated.
+    """
+
+    temperature_c: Limits | None = None
+    """Lowest and highest temperature."""
+    change_k_per_h: Kelvins | None = None
+    """Largest change of temperature in an hour."""
+    difference_k: Kelvins | None = None
+    """Largest difference of temperature between places at one time."""
+    probe: str | None = None
+    """Probe for which the limits hold, as `[probe]` names it."""
+    stylus: str | None = None
+    """Stylus for which the limits hold, as `[probe]` names it."""
+    declared: Declared | None = None
+    """By whom and why the test counts as one under rated conditions, where no rated temperature is stated."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.temperature_c is not None and not self.temperature_c[0] < self.temperature_c[1]:
+            raise ValueError(f"temperature_c = {self.temperature_c}: the first number must be the lower one")
+        return self
+
+
+class ProbeFacts(Table):
+    """``[probe]``: with what the recording was made; ``sensing`` says whether it touches."""
+
+    sensing: Literal["contacting", "optical"] | None = None
+    """Whether the probe touches; standards are for one or the other."""
+    name: str = ""
+    """Name of the probe."""
+    stylus: str = ""
+    """Name of the stylus."""
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What a test must know of the job beside its recording.
+
+    Parameters
+    ----------
+    uncertainty, rated, probe : as the job states them.
+    cte_per_k : coefficient of expansion of the artefact, 1/K; ``None`` where it is not stated.
+    short_gauge : recorded beside lengths that are not bidirectional by themselves.
+    cmc : of the laboratory, below which no test value is said to be known.
+    clauses : forms of standards' clauses that the laboratory filled in, by their file.
+    set_aside : measurements that the laboratory leaves out of the estimates, each with its reason.
+    calibration_dof : degrees of freedom that the artefact's certificate states.
+    """
+
+    uncertainty: TestUncertainty = field(default_factory=TestUncertainty)
+    rated: RatedConditions = field(default_factory=RatedConditions)
+    probe: ProbeFacts = field(default_factory=ProbeFacts)
+    cte_per_k: float | None = None
+    short_gauge: ShortGauge | None = None
+    cmc: Capability | None = None
+    clauses: Mapping[str, ClausesForm] = field(default_factory=dict)
+    set_aside: Mapping[int, str] = field(default_factory=dict)
+    calibration_dof: float = inf

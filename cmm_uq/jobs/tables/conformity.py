@@ -1,0 +1,295 @@
+"""``[[conformity]]``: a standard, a limit, and the rule by which it is decided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, Protocol, Self
+
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
+from cmm_uq.base.files.toml_file import checked
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.circumstances import TEST_KEYS, ClausesForm, TestUncertainty
+from cmm_uq.jobs.tables.length_formula import FLATTEST, mpe_of
+
+
+class MaximumPermissibleError(Table):
+    """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
+
+    a_um: Uncertainty | None = None
+    """A of A + L/K."""
+    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+    """K of A + L/K, with L in mm and the result in µm."""
+    b_um: Limit | None = None
+    """Limit that does not grow with the length, or at which A + L/K stops growing."""
+
+    @model_validator(mode="after")
+    def _one_of_three_forms(self) -> Self:
+        if (self.a_um is None) != (self.k is None):
+            raise ValueError("mpe = A + L/K needs both a_um and k")
+        if self.a_um is None and self.b_um is None:
+            raise ValueError("give mpe = { a_um = …, k = … }, the same with b_um = …, or { b_um = … }")
+        return self
+
+
+def _as_table(given: Any) -> Any:
+    """An error that is written as a formula, as the table that says the same."""
+    return mpe_of(given) if isinstance(given, str) else given
+
+
+Permissible = Annotated[
+    MaximumPermissibleError, BeforeValidator(_as_table, json_schema_input_type=MaximumPermissibleError | str)
+]
+"""``mpe``, as a formula or as a table."""
+
+
+class GuardBand(Table):
+    """A guard band of so many expanded uncertainties; between acceptance and rejection lies *undecided*."""
+
+    guard_band: Annotated[float, Field(ge=0, le=100)]
+    """Width of the guard band in expanded uncertainties."""
+
+
+class FalseAccept(Table):
+    """Accept only when the probability of not conforming is at most this."""
+
+    max_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-12)]
+    """Largest probability of not conforming at which a value is accepted."""
+
+
+class UncertaintyRatio(Table):
+    """Simple acceptance where the zone of the specification is so many times as wide as the uncertainty interval."""
+
+    uncertainty_ratio: Annotated[float, Field(gt=0, le=1e6)]
+    """Least width of the specification's zone over that of the uncertainty interval."""
+
+
+class PosteriorProbability(Table):
+    """Accept when the probability of conforming, with what the prior says, is at least this (JCGM 106:2012, 8.3)."""
+
+    posterior_probability: Annotated[float, Field(gt=0.5, lt=1)]
+    """Least probability of conforming, with what the prior says, at which a value is accepted."""
+
+
+class UnconditionalRisk(Table):
+    """Accept so that of all items tested at most this share is wrongly accepted (JCGM 106:2012, 9.5.3)."""
+
+    max_unconditional_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-6)]
+    """Largest share of all items tested that may be wrongly accepted."""
+
+
+class Prior(Table):
+    """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2).
+
+    Attributes
+    ----------
+    sd_um, share_of_limit : its standard deviation, or that over the limit of each error.
+    mean_um : its mean.
+    """
+
+    sd_um: Limit | None = None
+    """Standard deviation of the errors of such machines."""
+    share_of_limit: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    """The same over the limit of each error."""
+    mean_um: Annotated[float, Field(ge=-LARGEST_UM, le=LARGEST_UM)] = 0.0
+    """Mean of the errors of such machines."""
+
+    @model_validator(mode="after")
+    def _one_width(self) -> Self:
+        if (self.sd_um is None) == (self.share_of_limit is None):
+            raise ValueError("give either sd_um or share_of_limit: how far errors of such machines scatter")
+        return self
+
+
+RuleName = Literal[
+    "simple", "ASME B89.7.3.1", "ASME B89.7.3.1-2001", "ISO 14253-1", "ISO 14253-1:2017",
+    "ILAC-G8 binary", "ILAC-G8:09/2019 binary", "ILAC-G8 non-binary", "ILAC-G8:09/2019 non-binary",
+    "JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006",
+]  # fmt: skip
+"""Rules by name, with or without their edition."""
+
+Rule = RuleName | GuardBand | FalseAccept | UncertaintyRatio | PosteriorProbability | UnconditionalRisk
+
+_BY_PRIOR = ("JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006")
+
+
+def needs_prior(rule: Rule) -> bool:
+    """Whether a rule says nothing without a prior."""
+    return isinstance(rule, (PosteriorProbability, UnconditionalRisk)) or rule in _BY_PRIOR
+
+
+class ConformityFacts(Table):
+    """One ``[[conformity]]``: a standard, a limit and a decision rule; ``prior`` for rules and risks that go by one."""
+
+    standard: str
+    """Standard by which it is decided, with its edition."""
+    characteristic: str | None = None
+    """Which of the standard's characteristics, where it has several: E0, R0, E150, P_FTU …; the first where it is
+    left out."""
+    limit_um: Limit | None = None
+    """Limit of the quantity."""
+    mpe: Permissible | None = None
+    """Maximum permissible error: `"3 + L/300"` (L in mm, the error in µm), or a table of `a_um`, `k`, `b_um`."""
+    rule: Rule = "ISO 14253-1"
+    """Decision rule, by name or by its figure."""
+    prior: Prior | None = None
+    """What is known of such machines beforehand, for rules and risks that go by it (JCGM 106:2012, 7.2)."""
+
+    clauses: str | None = None
+    """Form of the standard's clauses, filled in beside the laboratory's own copy (`cmm-uq standards NAME --form FILE`)."""
+
+    @field_validator("standard")
+    @classmethod
+    def _known(cls, name: str, info: ValidationInfo) -> str:
+        standards = standards_in(info)
+        if standards is not None and standards.named(name) is None:
+            raise ValueError(f"no such standard is decided. {suggestion(name, standards.names())}")
+        return name
+
+    @model_validator(mode="before")
+    @classmethod
+    def _k_of_one_meaning(cls, data: Any) -> Any:
+        """A table has L/K; a K of K·L read so would let nearly any error pass."""
+        given = data.get("mpe") if isinstance(data, dict) else None
+        k = given.get("k") if isinstance(given, dict) else None
+        if isinstance(k, (int, float)) and not isinstance(k, bool):
+            guideline = str(data.get("standard", "")).startswith("VDI")
+            if 1e-3 <= k < (FLATTEST if guideline else 1.0):
+                raise ValueError(
+                    f"mpe k = {k:g} means L/{k:g}, which is {1000 / k:.4g} µm in a metre; the K of A + K·L is meant "
+                    f'otherwise: write mpe = "A + L/{k:g}", "A + {k:g}·L/1000" or "A + {k:g}·L", L in mm and the error in µm'
+                )
+        return data
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> Self:
+        if (self.limit_um is None) == (self.mpe is None):
+            raise ValueError('give either limit_um, or mpe = "3 + L/300" with L in mm and the error in µm')
+        return self
+
+    @model_validator(mode="after")
+    def _prior_where_needed(self) -> Self:
+        if needs_prior(self.rule) and self.prior is None:
+            raise ValueError(
+                f"the rule {_key_of(self.rule)} goes by what is known of such machines beforehand: "
+                "give prior = { sd_um = … } or { share_of_limit = … }"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _decided_here(self, info: ValidationInfo) -> Self:
+        if asked := _asked(self, standards_in(info)):
+            asked.characteristic(self.characteristic)
+        return self
+
+
+def clause_files(wishes: list[ConformityFacts]) -> list[str]:
+    """Forms that a job names."""
+    return list(dict.fromkeys(wish.clauses for wish in wishes if wish.clauses is not None))
+
+
+def forms_of(
+    wishes: list[ConformityFacts], inputs: Mapping[str, bytes], folder: Path, standards: Standards
+) -> dict[str, ClausesForm]:  # fmt: skip
+    """The forms that a job names, by their file.
+
+    Raises
+    ------
+    CmmUqError : one is no form, is of another standard, or has a clause that this has not.
+    """
+    found: dict[str, ClausesForm] = {}
+    for i, wish in enumerate(wishes, 1):
+        if wish.clauses is None:
+            continue
+        path = folder / wish.clauses
+        form = found[wish.clauses] = checked(inputs[wish.clauses], path, ClausesForm)
+        if form.standard != wish.standard:
+            raise CmmUqError(
+                f"is the form of {form.standard}, and [[conformity]] {i} states {wish.standard}", where=str(path),
+                fix=f'cmm-uq standards "{wish.standard}" --form FILE writes the one that belongs to it',
+            )  # fmt: skip
+        asked = standards.named(wish.standard)
+        known = () if asked is None else asked.clause_names
+        for name in form.clauses:
+            if name not in known:
+                raise CmmUqError(f"{wish.standard} has no clause {name!r} here", where=f"{path}: [clauses.{name}]",
+                                 fix=suggestion(name, known))  # fmt: skip
+    return found
+
+
+class StandardFacts(Protocol):
+    """What the check of a job must know of a standard."""
+
+    @property
+    def sensing(self) -> str | None:
+        """For which probes it is; ``None`` for any."""
+        ...
+
+    @property
+    def clause_names(self) -> Sequence[str]:
+        """Names of its clauses, as a form has them."""
+        ...
+
+    def characteristic(self, name: str | None) -> object:
+        """One that it decides; ``ValueError`` for a name that it does not."""
+        ...
+
+    def uncertainty_missing(
+        self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
+    ) -> str | None:  # fmt: skip
+        """The key whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
+        ...
+
+
+@dataclass(frozen=True)
+class Standards:
+    """The standards that a job may name: what is asked of each, and their names."""
+
+    named: Callable[[str], StandardFacts | None]
+    names: Callable[[], Sequence[str]]
+
+
+def standards_in(info: ValidationInfo) -> Standards | None:
+    """The standards that a job is checked against; ``None`` for a table that is made by itself, without a job."""
+    return info.context if isinstance(info.context, Standards) else None
+
+
+def uncertainty_missing(
+    wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty, standards: Standards | None
+) -> str | None:  # fmt: skip
+    """See :meth:`StandardFacts.uncertainty_missing`; ``None`` where there is nothing to check against."""
+    asked = _asked(wish, standards)
+    return asked.uncertainty_missing(wish, artefact, stated) if asked else None
+
+
+def _asked(wish: ConformityFacts, standards: Standards | None) -> StandardFacts | None:
+    return None if standards is None else standards.named(wish.standard)
+
+
+def probe_unfit(wish: ConformityFacts, sensing: str | None, standards: Standards | None) -> str | None:
+    """That a standard is for other probes than that of the recording, and how to mend it; ``None`` where it is for it."""
+    asked = _asked(wish, standards)
+    if asked is None or None in (asked.sensing, sensing) or asked.sensing == sensing:
+        return None
+    return (
+        f"the standard {wish.standard} is for {asked.sensing} probes, and the recording was made with one that is not. "
+        f"State {'ISO 10360-8:2013' if sensing == 'optical' else 'another standard'}, or leave the statement out"
+    )
+
+
+def needed(key: str, wish: ConformityFacts) -> tuple[str, str]:
+    """That a rule needs an uncertainty which the job does not state, and how to mend it."""
+    table = "test_uncertainty" if key in TEST_KEYS else "artefact"
+    return (
+        f"the rule {_key_of(wish.rule)} needs the uncertainty of what {wish.standard} compares with, "
+        f"and [{table}] states no {key} above 0",
+        f'Give {key} in [{table}], or rule = "simple", which takes no account of it',
+    )
+
+
+def _key_of(rule: Rule) -> str:
+    return rule if isinstance(rule, str) else next(iter(rule.model_dump()))

@@ -1,0 +1,207 @@
+"""``[job]`` and ``[laboratory]``: id and date, whose it is, the certificate that it replaces, and who answers for it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import re
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from cmm_uq.base.files.table import Limit, Table, at_least
+from cmm_uq.base.languages.translation import ENGLISH, Code
+from cmm_uq.jobs.source import device_name
+
+RequiredText = Annotated[str, Field(min_length=1, pattern=r"\S")]
+"""Words that must not be left out."""
+
+REPLACED = "replaced-results.json"
+"""Results of the certificate that is replaced, as the records have them: an input, so that anybody can compare again."""
+
+_FIGURES = r"(?:figures?|values?|results?|numbers?|decisions?|outcomes?)"
+_WERTE = r"(?:(?:mess|zahlen)?werte?n?|zahl(?:en)?|ergebnis(?:se)?n?|entscheidung(?:en)?)"
+_VALEURS = r"(?:valeurs?|chiffres?|résultats?|décisions?)"
+_NOTHING_CHANGED = re.compile(
+    rf"\bno (?:other |measured |further )?{_FIGURES}\b|\bnone of the {_FIGURES}\b|\b{_FIGURES}: none\b"
+    rf"|\bnothing (?:else )?(?:is |was |has |has been )?chang|\bno (?:other |further )?changes?\b"
+    rf"|\bwithout (?:any )?changes?\b|\b{_FIGURES}\b[^.;]{{0,30}}\b(?:unchanged|unaltered|unaffected|the same|not (?:been )?"
+    rf"(?:changed|affected|altered))|\bunchanged {_FIGURES}\b"
+    rf"|\bkeine?n? (?:anderen? |weiteren? )?{_WERTE}\b|\bkeine änderung|\bohne änderung|\bnichts (?:hat sich )?geändert"
+    rf"|\b{_WERTE}\b[^.;]{{0,30}}\b(?:unverändert|nicht (?:geändert|verändert|betroffen)|gleich geblieben|bleiben gleich)"
+    rf"|\bunveränderte[nr]? {_WERTE}\b"
+    rf"|\baucune? (?:autre )?{_VALEURS}\b|\baucun changement|\baucune modification|\bsans (?:changement|modification)"
+    rf"|\brien n['’ ]?a changé|\b{_VALEURS}\b[^.;]{{0,30}}\b(?:inchangée?s?|ne changent pas|n['’]ont pas changé)"
+    r"|変更(?:は|が)?(?:な[しい]|ありません|ございません)|(?:数値|結果|値|判定)[^。;]{0,12}"
+    r"(?:不変|変わらない|変わりません|変わっていない|変わっていません|変わりな[しい]|変更な[しい]|同じ|変更されていない|変更していない)",
+    re.IGNORECASE,
+)
+"""The usual ways, in the languages of certificates, of saying that figures or decisions did not change."""
+
+
+class ReplacedCertificate(Table):
+    """The certificate that this one replaces, why, and what changed."""
+
+    number: RequiredText
+    """Number of the certificate that is replaced."""
+    date: dt.date
+    """Its date of issue."""
+    reason: RequiredText
+    """Why it is replaced."""
+    changed: RequiredText
+    """What is changed in this certificate against it (7.8.8.1)."""
+    figures_changed: bool | None = None
+    """Whether a figure or a decision is changed against it; `false` is refused where one is."""
+    results: str | None = None
+    """`results.json` of the certificate that is replaced, or the folder with it inside the job's, where no records have it."""
+
+    @model_validator(mode="after")
+    def _one_answer(self) -> Self:
+        if self.figures_changed and self.denies_in_words:
+            raise ValueError(
+                f"figures_changed = true, and changed = {self.changed!r} says that none is: say in changed which are"
+            )
+        return self
+
+    @property
+    def denies_in_words(self) -> bool:
+        """Whether its words say that no figure is changed."""
+        return denies_a_change(self.changed)
+
+    @property
+    def denies(self) -> bool:
+        """Whether it says that no figure is changed."""
+        return self.figures_changed is False or self.denies_in_words
+
+
+def denies_a_change(words: str) -> bool:
+    """Whether words say that no figure, or nothing, is changed."""
+    return _NOTHING_CHANGED.search(" ".join(words.split())) is not None
+
+
+class Identification(Table):
+    """Identification, and free text for the certificate."""
+
+    id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
+    """Name of the job and of the folder its reports go to: letters, digits, `.`, `_` and `-`."""
+    date: dt.date
+    """Date of the measurement."""
+    number: str = ""
+    """Number of the certificate; the id where it is left out."""
+    replaces: ReplacedCertificate | None = None
+    """The certificate that this one replaces (7.8.8), in a table of its own."""
+    issued: dt.date | None = None
+    """Date on which the certificate is issued (ISO/IEC 17025:2017, 7.8.2.1 j)."""
+    customer: str = ""
+    """Name of the customer (7.8.2.1 e)."""
+    address: str = ""
+    """How to reach the customer (7.8.2.1 e)."""
+    place: str = ""
+    """Where the measurement was made (7.8.2.1 c)."""
+    operator: str = ""
+    """Who measured."""
+    procedure: str = ""
+    """The method of the measurement (7.8.2.1 f)."""
+    order: str = ""
+    """Number of the customer's order."""
+    conditions: str = ""
+    """Conditions that influence the results, in words (7.8.4.1 b)."""
+    received: dt.date | None = None
+    """Day on which the item was received, where that matters for the results (7.8.2.1 h)."""
+    deviations: str = ""
+    """Additions to, deviations from and exclusions from the method (7.8.2.1 n)."""
+    external: str = ""
+    """Results that external providers gave, and who they are (7.8.2.1 p)."""
+    from_customer: str = ""
+    """Data that the customer gave and the results may rest on; the certificate says that they are the customer's (7.8.2.2)."""
+    remarks: str = ""
+    """Free text of the certificate."""
+    language: Code = ENGLISH
+    """Language of the documents: `en`, `de`, `fr` or `ja`; files for programs stay English."""
+
+    @model_validator(mode="after")
+    def _numbered_anew(self) -> Self:
+        if self.replaces is not None and self.replaces.number == (self.number or self.id):
+            raise ValueError(
+                f"replaces.number = {self.replaces.number!r} is the number of this certificate itself: give the new one "
+                "a number of its own"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _names_a_folder(self) -> Self:
+        if set(self.id) == {"."}:
+            raise ValueError("must name a folder of its own, so it cannot consist of dots")
+        if device_name(self.id):
+            raise ValueError("must name a folder of its own, and Windows takes this name for a device")
+        return self
+
+
+_LENGTHS = {"mm": 1e-3, "µm": 1.0}
+"""Units of lengths, and how many of each a micrometre is."""
+
+_RATIOS, _ANGLES = ("ppm", "µm/m"), ("″",)
+
+
+class LengthCapability(Table):
+    """U = A + L/K of a length, L in mm and U in µm; without ``k`` the same for every length."""
+
+    a_um: Limit
+    """A of U = A + L/K."""
+    k: Annotated[float, Field(gt=0, le=1e12), at_least(1e-3)] | None = None
+    """K of U = A + L/K, with L in mm and U in µm; without it U is the same for every length."""
+
+
+class Capability(Table):
+    """``[laboratory.cmc]``: calibration and measurement capability, the least U (95 %, k = 2) that a certificate may state.
+
+    Attributes
+    ----------
+    length : of what is stated in mm or µm.
+    scale_ppm : of what is stated in ppm or µm/m.
+    angle_arcsec : of what is stated in ″.
+    """
+
+    length: LengthCapability | None = None
+    """Least U of what is stated in mm or µm."""
+    scale_ppm: Limit | None = None
+    """Least U of what is stated in ppm or µm/m."""
+    angle_arcsec: Limit | None = None
+    """Least U of what is stated in ″."""
+
+    def least(self, unit: str, length_mm: float) -> float:
+        """The least U of a quantity in its own unit; 0 where none is given for it.
+
+        Parameters
+        ----------
+        unit : as printed.
+        length_mm : that the quantity is of, or rests on.
+        """
+        if unit in _LENGTHS and self.length is not None:
+            per_length = length_mm / self.length.k if self.length.k else 0.0
+            return (self.length.a_um + per_length) * _LENGTHS[unit]
+        if unit in _RATIOS:
+            return self.scale_ppm or 0.0
+        return (self.angle_arcsec or 0.0) if unit in _ANGLES else 0.0
+
+
+class Laboratory(Table):
+    """``[laboratory]``: who answers for the certificate."""
+
+    name: str = ""
+    """Name of the laboratory (7.8.2.1 b)."""
+    address: str = ""
+    """Address of the laboratory (7.8.2.1 b)."""
+    country: Annotated[str, Field(pattern=r"^([A-Z]{2})?$")] = ""
+    """Country of the laboratory, two capital letters of ISO 3166-1; the digital certificate asks for it."""
+    accreditation: str = ""
+    """Accreditation as it is printed, with its number."""
+    signatory: str = ""
+    """Who authorises the certificate (7.8.2.1 o)."""
+    signatory_role: str = ""
+    """Function of who authorises it."""
+    logo: str = ""
+    """File of its logo, SVG or PNG, beside job.toml: it stands at the head of certificates."""
+    four_eyes: bool = False
+    """Whether two persons, neither of them the operator, must release a certificate before it is released."""
+    cmc: Capability | None = None
+    """Calibration and measurement capability: the least U (95 %, k = 2) that a certificate may state."""

@@ -1,0 +1,230 @@
+"""Limits and uncertainties of a length as standards and certificates write them: ``3 + L/300``, ``Q[0.2; 0.5·L/1000]``.
+
+A maximum permissible error as standards and data sheets write it: ``3 + L/300``, ``2.5 + 4·L/1000``, ``min(3 + L/300; 8)``.
+
+L is in mm and the error in µm. ISO 10360 writes A + L/K, VDI/VDE 2617 A + K·L: ``3 + 0.004·L`` is ``3 + L/250``. A decimal
+comma is taken as one, so what stands beside each other in ``min`` is then separated by a semicolon. ``1,000`` and
+``L/1.000``, which may be a thousand or one, are refused.
+
+The uncertainty of a calibrated length as its certificate states it: U or u, a number or a formula of the length.
+
+Certificates print ``U = 0.2 µm + 0.5·10⁻⁶·L, k = 2`` or ``Q[0.2; 0.5·L/1000]``, the root of the sum of both squares. L is
+in mm and the result in µm; what may be read in two ways is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field, WithJsonSchema, WrapValidator
+
+from cmm_uq.base.files.table import LARGEST_UM, LONGEST_MM, Uncertainty
+from cmm_uq.base.points import Floats
+
+_NUMBER = r"(?:\d+(?:[.,]\d+)?|[.,]\d+)"
+_FORM = re.compile(
+    rf"(?P<a>{_NUMBER})(?:\+(?:(?P<slope>{_NUMBER})[*·×]?)?L/(?P<k>{_NUMBER})|\+(?P<per_mm>{_NUMBER})[*·×]?L)?"
+)
+_SLOPE_ONLY = re.compile(rf"(?:(?P<slope>{_NUMBER})[*·×]?)?L/(?P<k>{_NUMBER})|(?P<per_mm>{_NUMBER})[*·×]?L")
+_LEAST = re.compile(r"min\((?P<first>[^;]+?);(?P<second>[^;]+)\)")
+_LEAST_BY_COMMA = re.compile(r"min\((?P<first>[^,;]+),(?P<second>[^,;]+)\)")
+
+_THOUSAND = re.compile(r"[1-9]\d*,\d{3}(?!\d)|/\d+[.]\d{3}(?!\d)")
+"""What may be a thousand with its separator as well as a decimal: a factor of a thousand in the limit."""
+
+FLATTEST = 1000**0.5
+"""K of L/K, L in mm, that is K·L of the same figure with L in m: of a smaller figure L/K is the larger error of the two."""
+
+HOW_MPE = (
+    'is no maximum permissible error: write it as "3 + L/300" or "min(3 + L/300; 8)", L in mm and the error in µm, '
+    "or as { a_um = 3.0, k = 300.0 }"
+)
+
+
+def mpe_of(text: str) -> dict[str, float]:
+    """Keys of the table that says the same.
+
+    Parameters
+    ----------
+    text : A + L/K, A + B·L/K, min(A + L/K; B) or A; ``±`` before it and ``µm`` behind it change nothing.
+
+    Raises
+    ------
+    ValueError : it is none of these.
+    """
+    plain = re.sub(r"\s+", "", text)
+    plain = re.sub(r"^±\((.*)\)(?:µm|μm|um)?$|^±(.*)$", lambda found: found[1] or found[2], plain)
+    plain = re.sub(r"(?:µm|μm|um)$", "", plain)
+    if _THOUSAND.search(plain):
+        raise ValueError("may mean a thousand or a decimal: write thousands without a separator, as L/1000")
+    least = _LEAST.fullmatch(plain) or _LEAST_BY_COMMA.fullmatch(plain)
+    if least is None:
+        return _growing(plain)
+    parts = [_growing(least["first"]), _growing(least["second"])]
+    rising = [part for part in parts if "k" in part]
+    flat = [part for part in parts if "k" not in part]
+    if len(rising) != 1 or len(flat) != 1:
+        raise ValueError(HOW_MPE)
+    return {**rising[0], **flat[0]}
+
+
+def _growing(plain: str) -> dict[str, float]:
+    found = _FORM.fullmatch(plain) or _SLOPE_ONLY.fullmatch(plain)
+    if found is None:
+        raise ValueError(HOW_MPE)
+    told = found.groupdict()
+    first = _number(told["a"]) if told.get("a") else 0.0
+    if told["per_mm"] is not None:
+        slope = _number(told["per_mm"])
+        if not 0 < slope <= 1 / FLATTEST:
+            raise ValueError("may have its slope in µm per mm or in µm per m: write 4 µm per m as 4·L/1000")
+        return {"a_um": first, "k": 1 / slope}
+    if told["k"] is None:
+        return {"b_um": first}
+    slope, k = (1.0 if told["slope"] is None else _number(told["slope"])), _number(told["k"])
+    if not slope or not k:
+        raise ValueError(HOW_MPE)
+    return {"a_um": first, "k": k / slope}
+
+
+def _number(text: str) -> float:
+    return float(text.replace(",", "."))
+
+
+HOW_U = (
+    'is no uncertainty of a length: write it as "0.2 + 0.5·L/1000", "0.2 + L/2000", "0.2 + 0.5·10^-6·L" or '
+    '"Q[0.2; 0.5·L/1000]" (the root of the sum of both squares), L in mm and the uncertainty in µm'
+)
+
+_LEVEL = 0.95
+"""Probability of the interval that a certificate with degrees of freedom and without k states (JCGM 100:2008, table G.2)."""
+
+_MINUS = str.maketrans(
+    {"⁻": "-", "−": "-", "–": "-", **{raised: str(digit) for digit, raised in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")}}
+)
+_IN_A_METRE = re.compile(rf"(?P<slope>{_NUMBER})?(?:[*·×]?10\^?\(?-6\)?|(?<=\d)[eE]-0?6|(?:µm|μm|um)/m)[*·×]?L(?!/)")
+"""0.5·10⁻⁶·L, both in one unit, 0.5e-6·L, and 0.5 µm/m·L."""
+
+_BARE = re.compile(r"L(?!/)")
+_QUADRATIC = re.compile(r"Q[\[(](?P<first>[^;]+);(?P<second>[^;]+)[\])]")
+_QUADRATIC_BY_COMMA = re.compile(r"Q[\[(](?P<first>[^,;]+),(?P<second>[^,;]+)[\])]")
+_LEADING_ZERO = re.compile(r"(?<![\d.,])0,(?=\d)")
+
+
+@dataclass(frozen=True)
+class Growing:
+    """Uncertainty of a length, µm, that grows with it: ``fixed_um`` + ``per_mm`` · L, or the root of the sum of both squares.
+
+    Parameters
+    ----------
+    fixed_um, per_mm : µm, and µm per mm.
+    squares : whether the squares are added.
+    """
+
+    fixed_um: float
+    per_mm: float
+    squares: bool = False
+
+    def at(self, lengths_mm: Floats | float) -> Floats:
+        """Of some lengths, µm."""
+        longer = self.per_mm * np.abs(np.asarray(lengths_mm, dtype=np.float64))
+        return np.hypot(self.fixed_um, longer) if self.squares else np.asarray(self.fixed_um + longer)
+
+    def over(self, k: float) -> Growing:
+        """Divided by a coverage factor."""
+        return replace(self, fixed_um=self.fixed_um / k, per_mm=self.per_mm / k)
+
+
+def growing_of(text: str) -> Growing | float:
+    """An uncertainty as a certificate prints it; a number where it is one.
+
+    Raises
+    ------
+    ValueError : it is none, or may be read in two ways.
+    """
+    plain = re.sub(r"\s+", "", text.translate(_MINUS))
+    plain = re.sub(r"^[uU](?:95)?(?:\([lL]\))?=|(?:µm|μm|um)(?!/)", "", plain)
+    plain = re.sub(r"^\((.*)\)$", r"\1", plain)
+    plain = _LEADING_ZERO.sub("0.", plain)
+    terms = _QUADRATIC.fullmatch(plain) or _QUADRATIC_BY_COMMA.fullmatch(plain)
+    parts = [_term(terms["first"]), _term(terms["second"])] if terms else [_term(plain)]
+    if (terms and sorted(bool(slope) for _, slope in parts) != [False, True]) or any(
+        a and b for a, b in parts if terms
+    ):
+        raise ValueError(HOW_U)
+    fixed, per_mm = (sum(column) for column in zip(*parts, strict=True))
+    if not fixed + per_mm * LONGEST_MM > 0 or fixed > LARGEST_UM or per_mm * 1000 > LARGEST_UM:
+        raise ValueError(HOW_U)
+    return Growing(fixed, per_mm, bool(terms)) if per_mm else fixed
+
+
+def _term(plain: str) -> tuple[float, float]:
+    """Fixed part, µm, and slope, µm per mm."""
+    plain = _IN_A_METRE.sub(lambda found: f"{found['slope'] or 1}·L/1000", plain)
+    if _BARE.search(plain):
+        raise ValueError(
+            "does not say in which unit L is: write 0.5 µm in a metre as 0.5·L/1000 (L in mm) or as 0.5·10^-6·L"
+        )
+    try:
+        found = mpe_of(plain)
+    except ValueError as error:
+        raise ValueError(str(error) if "thousand" in str(error) else HOW_U) from None
+    if {"b_um", "k"} <= found.keys():
+        raise ValueError(HOW_U)  # the lesser of two is no uncertainty
+    return found.get("b_um", found.get("a_um", 0.0)), 1 / found["k"] if "k" in found else 0.0
+
+
+def _checked(value: Any, number: Any) -> Any:
+    return growing_of(value) if isinstance(value, str) else value if isinstance(value, Growing) else number(value)
+
+
+if TYPE_CHECKING:
+    LengthUncertainty = float | Growing
+else:
+    LengthUncertainty = Annotated[
+        Uncertainty,
+        WrapValidator(_checked),
+        WithJsonSchema({"anyOf": [{"type": "number", "minimum": 0, "maximum": LARGEST_UM}, {"type": "string"}]}),
+    ]
+
+Factor = Annotated[float, Field(ge=1, le=10)]
+Freedom = Annotated[float, Field(ge=1, le=1e9)]
+
+
+def factor_of(k: float | None, degrees_of_freedom: float | None) -> float | None:
+    """Coverage factor as stated, or by the degrees of freedom; ``None`` where neither is stated."""
+    if k is not None or degrees_of_freedom is None:
+        return k
+    from scipy.special import stdtrit  # takes long to import
+
+    return float(stdtrit(degrees_of_freedom, 0.5 + 0.5 * _LEVEL))
+
+
+def with_standard_uncertainty(data: Any, *, columns: bool = False) -> Any:
+    """A table with ``u_um`` beside ``U_um``, which stays as stated, or as it is where it has none.
+
+    Parameters
+    ----------
+    columns : whether ``k`` may belong to a column of the recording alone.
+
+    Raises
+    ------
+    ValueError : one of them without the other, beside ``u_um``, or no uncertainty.
+    """
+    if not (isinstance(data, dict) and {"U_um", "k"} & data.keys()):
+        return data
+    if columns and not {"U_um", "u_um"} & data.keys():
+        return data
+    if "U_um" not in data or "u_um" in data or not {"k", "degrees_of_freedom"} & data.keys():
+        raise ValueError("give u_um, or U_um together with its coverage factor k (or its degrees_of_freedom)")
+    expanded, k, freedom = data["U_um"], data.get("k"), data.get("degrees_of_freedom")
+    stated = [value for value in (expanded, k, freedom) if value is not None and not isinstance(value, str)]
+    numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in stated)
+    if not numbers or isinstance(k, str) or not 1 <= (2 if k is None else k) <= 10 or (freedom or 1) < 1:
+        raise ValueError("give U_um as a number in µm or as a formula of the length, and k as one from 1 to 10")
+    factor = factor_of(k, freedom) or 1.0
+    whole = growing_of(expanded) if isinstance(expanded, str) else expanded
+    return {**data, "u_um": whole.over(factor) if isinstance(whole, Growing) else whole / factor}

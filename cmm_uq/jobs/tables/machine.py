@@ -1,0 +1,251 @@
+"""``[machine]``: the machine, its travel, its error maps, the temperatures of its scales, and when it is calibrated again."""
+
+from __future__ import annotations
+
+import datetime as dt
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
+from cmm_uq.base.files.table import Column, Number, Range, Table, Temperature, Triple, at_least
+
+Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
+
+Months = Annotated[int, Field(ge=1, le=600)]
+
+
+class Recalibration(Table):
+    """``calibrate``: without a method a fixed interval, or method A3 where a reliability is given."""
+
+    every_months: Months = 12
+    """Months between calibrations; where a method adapts them, the interval it begins with."""
+    method: Method | None = None
+    """How the interval follows from the history: `fixed`, NCSLI RP-1 `A3` or `S2`, `staircase`, `control chart`, `drift`."""
+    reliability: Annotated[float, Field(ge=0.5, le=0.999)] | None = None
+    """Probability with which the machine is to be within its limits at its next calibration; 0.95 where nothing is said."""
+    shortest_months: Months = 1
+    """Shortest interval that a method may come to."""
+    longest_months: Months | None = None
+    """Longest interval that a method, or with a fixed one interim checks in control, may come to."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        longest = self.longest_months
+        if longest is not None and not self.shortest_months <= self.every_months <= longest:
+            raise ValueError(
+                f"every_months = {self.every_months} lies outside {self.shortest_months} to {longest} months: "
+                "give shortest_months ≤ every_months ≤ longest_months"
+            )
+        if self.method == "fixed" and self.reliability is not None:
+            raise ValueError("a fixed interval knows no reliability: leave it out, or name another method")
+        return self
+
+
+HOTTEST_C = 100.0
+"""°C at which a machine may be mapped: far beyond any, and far below any temperature in kelvin."""
+
+ZERO_C = 273.15
+"""K."""
+
+SHORTEST_TRAVEL_MM = 1e-3
+"""Positions are divided by the travel."""
+
+Angle = Annotated[float, Field(ge=-36_000, le=36_000)]
+"""A squareness error, ″: ten degrees."""
+
+Turn = Annotated[float, Field(ge=-360, le=360)]
+"""An angle of a pose, °."""
+
+Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
+"""Columns of the thermocouples on one scale."""
+
+
+class Travel(Table):
+    """``travel_mm``: lowest and highest scale reading of each axis."""
+
+    x: Range | None = None
+    """Lowest and highest scale reading of x."""
+    y: Range | None = None
+    """Lowest and highest scale reading of y."""
+    z: Range | None = None
+    """Lowest and highest scale reading of z."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis in "xyz":
+            given = getattr(self, axis)
+            if given and not given[0] < given[1]:
+                raise ValueError(f"{axis} = {given}: the first number must be the lower one")
+            if given and given[1] - given[0] < SHORTEST_TRAVEL_MM:
+                raise ValueError(f"{axis} = {given}: a travel of less than {SHORTEST_TRAVEL_MM:g} mm is none")
+        return self
+
+
+class SquarenessFacts(Table):
+    """``squareness_arcsec``: beside an error map."""
+
+    xy: Angle = 0.0
+    """Squareness of y to x: e_x = −S·y."""
+    yz: Angle = 0.0
+    """Squareness of z to y: e_y = −S·z."""
+    zx: Angle = 0.0
+    """Squareness of z to x: e_x = −S·z."""
+
+
+def _of_a_workshop(celsius: float) -> float:
+    if celsius > HOTTEST_C:
+        kelvin = f": {celsius:g} K are {celsius - ZERO_C:g} °C" if ZERO_C - 50 <= celsius <= ZERO_C + HOTTEST_C else ""
+        raise ValueError(f"no machine is mapped at {celsius:g} °C{kelvin}. Give the temperature in °C")
+    return celsius
+
+
+class ErrorMapFile(Table):
+    """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
+
+    file: str
+    """CSV of the map: axis, position_mm, three translations in µm and three rotations in ″."""
+    temperature_c: Annotated[Temperature, AfterValidator(_of_a_workshop)]
+    """Temperature of the scales at which the map was taken."""
+    squareness_arcsec: SquarenessFacts | None = None
+    """Squareness of the axes at that temperature."""
+
+
+def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
+    without = [given.file for given in maps if given.squareness_arcsec is None]
+    if without and len(without) < len(maps):
+        raise ValueError(
+            f"the map {without[0]!r} has no squareness_arcsec, and another has: between them it would fall to zero. "
+            "Give it for each map"
+        )
+    return maps
+
+
+class ScaleColumns(Table):
+    """``columns`` of a temperature log: the thermocouples on each scale, by the names of their columns."""
+
+    x: Sensors
+    """Columns of the thermocouples on the scale of x."""
+    y: Sensors
+    """Columns of the thermocouples on the scale of y."""
+    z: Sensors
+    """Columns of the thermocouples on the scale of z."""
+
+
+class TemperatureLogFile(Table):
+    """``temperature_log``: what the scales' thermocouples showed while the recording was made."""
+
+    file: str
+    """CSV of the log: `time_s` or `time`, and the temperatures."""
+    start: dt.datetime | None = None
+    """Moment at which the recording's `time_s` was 0, for a log that gives dates."""
+    columns: ScaleColumns | None = None
+    """Columns of the thermocouples on each scale, where their names do not say so."""
+    max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    """Longest interval of the log that is interpolated over."""
+
+
+class Pose(Table):
+    """Attitude of a digitizer in one index of the wrist: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
+
+    pose: Number = 1
+    """Number of the pose, as the cloud or the recording gives it."""
+    alpha_deg: Turn
+    """First Euler angle (3-1-3)."""
+    beta_deg: Turn
+    """Second Euler angle."""
+    gamma_deg: Turn
+    """Third Euler angle."""
+
+
+class DigitizerFacts(Table):
+    """``digitizer``: a laser digitizer on the ram.
+
+    Attributes
+    ----------
+    offset_mm : [U1 V1 W1], the mount in the digitizer's frame.
+    poses : its attitudes.
+    calibration : in place of both, the results.json of its calibration, or the folder with it, inside the job's; ``poses``
+        beside it replace those in which it was calibrated.
+    """
+
+    offset_mm: Triple | None = None
+    """[U1, V1, W1]: the mount in the digitizer's frame."""
+    poses: Annotated[list[Pose], Field(max_length=LISTED.most)] = []
+    """Attitudes of the digitizer."""
+    calibration: Annotated[str, Field(min_length=1)] | None = None
+    """In place of both: `results.json` of the digitizer's calibration, or the folder with it, inside the job's."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if (self.offset_mm is None) == (self.calibration is None):
+            raise ValueError('give either offset_mm = [U1, V1, W1] with poses, or calibration = "FOLDER"')
+        if self.offset_mm is not None and not self.poses:
+            raise ValueError("offset_mm is given without poses: give the Euler angles of each")
+        return self
+
+    @model_validator(mode="after")
+    def _poses_once(self) -> Self:
+        numbers = [given.pose for given in self.poses]
+        twice = next((number for number in numbers if numbers.count(number) > 1), None)
+        if twice is not None:
+            raise ValueError(f"pose {twice} is there twice: number each pose as the cloud does")
+        return self
+
+
+def check_carriages(chain: str) -> None:
+    """Refuse a chain without each of its three carriages once.
+
+    Raises
+    ------
+    ValueError : it has others.
+    """
+    if sorted(chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
+        raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
+
+
+class MachineFacts(Table):
+    """``[machine]``."""
+
+    name: str
+    """Name of the machine."""
+    manufacturer: str = ""
+    """Manufacturer of the machine."""
+    model: str = ""
+    """Model or type of the machine."""
+    serial: str = ""
+    """Serial number of the machine (7.8.2.1 g)."""
+    owner: str = ""
+    """Owner of the machine."""
+    chain: Annotated[str, Field(pattern=r"^[XYZF]{3,4}$")] = "XYZ"
+    """Carriages from the table to the ram, with F for the frame where the workpiece moves."""
+    travel_mm: Travel = Travel()
+    """Lowest and highest scale reading of each axis."""
+    origin_mm: Triple = [0.0, 0.0, 0.0]
+    """Scale reading of the recording's origin: scale reading = recorded coordinate + origin."""
+    error_map: Annotated[
+        list[ErrorMapFile], Field(max_length=MAPS.most), AfterValidator(_squareness_of_all_or_none)
+    ] = []
+    """Error maps of the machine; several are interpolated by the temperature of the scales."""
+    squareness_arcsec: SquarenessFacts | None = None
+    """Squareness of the axes beside an error map."""
+    temperature_log: TemperatureLogFile | None = None
+    """What the scales' thermocouples showed while the recording was made."""
+    digitizer: DigitizerFacts | None = None
+    """A laser digitizer on the ram."""
+    calibrate: Recalibration | None = None
+    """When the machine is to be calibrated again, for `cmm-uq due`."""
+
+    @model_validator(mode="after")
+    def _squareness_once(self) -> Self:
+        twice = [given.file for given in self.error_map if given.squareness_arcsec is not None]
+        if self.squareness_arcsec is not None and twice:
+            raise ValueError(
+                f"squareness_arcsec is given for the machine and for the map {twice[0]!r}: leave out one of the two"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _three_carriages(self) -> Self:
+        check_carriages(self.chain)
+        return self

@@ -1,0 +1,186 @@
+"""``[plan]``, ``[acquire]`` and ``[prove]``: what may be measured, by which instruments, and what a proof must reach."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from cmm_uq.base.files.limits import COLUMNS, LISTED
+from cmm_uq.base.files.table import AnyFloat, Column, Duration, Length, Names, Range, Table, Uncertainty, at_least
+
+Criterion = Literal["separation", "D", "A", "worst"]
+
+_SHORTEST = 1e-6
+"""Length of a direction below which it is none."""
+
+Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
+
+
+class FixtureFacts(Table):
+    """``[plan.fixtures]``: how the artefact may stand.
+
+    ``directions``: of a bar or gauge along its length, of a plate or triangle across it, either way; any without them.
+    ``heights_mm``: lowest and highest z reading of the artefact's middle.
+    """
+
+    directions: Annotated[list[Direction], Field(max_length=LISTED.most)] = []
+    """Directions in which a bar or gauge can be held, either way along it, or normals of a plate or triangle; any
+    without them."""
+    heights_mm: Range | None = None
+    """Lowest and highest z reading of the artefact's middle."""
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if any(not any(direction) for direction in self.directions):
+            raise ValueError("directions: [0, 0, 0] points nowhere")
+        if any(hypot(*direction) < _SHORTEST for direction in self.directions):
+            raise ValueError(f"directions: one is shorter than {_SHORTEST:g}")
+        if self.heights_mm is not None and not self.heights_mm[0] <= self.heights_mm[1]:
+            raise ValueError(f"heights_mm = {self.heights_mm}: the first number must be the lower one")
+        return self
+
+
+class PlanFacts(Table):
+    """``[plan]``.
+
+    ``ready`` names the plan to start from where there is no recording. With a ``criterion`` a better one is searched for:
+    of ``number`` placings, or of ``more`` beside those that there are. The noise is that of ``noise_from``, the results.json
+    of an earlier recording, or has the set-up offset and growth that are stated.
+    """
+
+    ready: str | None = None
+    """Name of the ready plan to start from; the usual one of the kind where it is left out."""
+    volume_mm: dict[Literal["x", "y", "z"], Range] = {}
+    """Scale readings that points may have; the machine's travel, else the recorded range."""
+    margin_mm: Annotated[float, Field(ge=0, le=1e6)] = 10.0
+    """Kept free at each end of that range."""
+    fixtures: FixtureFacts = FixtureFacts()
+    """How the artefact may stand."""
+    length_mm: Length | None = None
+    """Length of an artefact that is not certified, roughly."""
+    lengths_mm: Annotated[list[Length], Field(max_length=LISTED.most)] = []
+    """Distances of a gauge's faces from the first, or lengths of blocks."""
+    pitch_mm: Length | None = None
+    """Distance of neighbouring faces of a gauge (20 mm by default) or balls of a plate."""
+    grid: Annotated[list[Annotated[int, Field(ge=2, le=100)]], Field(min_length=2, max_length=2)] = [5, 5]
+    """Balls of a plate, or points on a surface, along each side."""
+    both_ways: bool | None = None
+    """Whether faces of a gauge are met on the way back too; the ready plan of ISO 10360-2 does so by default."""
+    repeats: Annotated[int, Field(ge=1, le=20)] = 3
+    """How often each point is measured."""
+    rivals: Names | None = None
+    """Effects that may act and are not named in the model; by default all linear ones that these columns could show."""
+    columns: Annotated[dict[Column, AnyFloat], Field(max_length=COLUMNS.most)] = {}
+    """Further columns of the recording at a constant value, such as temperatures."""
+    unseen: bool | None = None
+    """Whether what a diagnosis says to measure next shall also show what the recording could not have shown; by default where
+    it agrees with the model."""
+    criterion: Criterion | None = None
+    """What a better plan is searched by: that effects can be told apart, or the volume, mean or worst variance."""
+    number: Annotated[int, Field(ge=1, le=200)] | None = None
+    """Placings of the better plan; as many as the ready plan by default."""
+    more: Annotated[int, Field(ge=1, le=50)] | None = None
+    """Placings to be added to those that there are."""
+    candidates: Annotated[int, Field(ge=1, le=2000)] = 300
+    """Placings that a better plan is chosen from."""
+    minutes_per_placing: Duration = 5.0
+    """Time to set up the artefact once, min."""
+    seconds_per_point: Duration = 10.0
+    """Time to measure one point, s."""
+    noise_from: str | None = None
+    """`results.json` of an earlier recording, or the folder with it inside the job's, whose noise is expected again."""
+    placing_um: Uncertainty | None = None
+    """Standard deviation of a set-up offset, instead."""
+    growth_um: Uncertainty | None = None
+    """Standard deviation of what grows with the length, at the longest, instead."""
+    budget_min: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] | None = None
+    """Time that there is, min; unlimited by default."""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for axis, (low, high) in self.volume_mm.items():
+            if not low < high:
+                raise ValueError(f"volume_mm: {axis} = [{low:g}, {high:g}]: the first number must be the lower one")
+        if self.number is not None and self.more is not None:
+            raise ValueError("number and more are both given: a plan of so many, or so many beside what there is")
+        if self.noise_from is not None and (self.placing_um is not None or self.growth_um is not None):
+            raise ValueError(
+                "noise_from and placing_um or growth_um are both given: name the recording, or state the sizes"
+            )
+        if self.criterion is None and (self.number is not None or self.more is not None):
+            raise ValueError('number and more need a criterion: criterion = "separation", "D", "A" or "worst"')
+        return self
+
+
+class DeclaredSource(Table):
+    """One ``[[acquire.source]]``: an instrument, the port it is at, and what of it is recorded."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=60)]
+    """Name of the source in this job, unique: letters, digits, `.`, `_` and `-`."""
+    profile: Annotated[str, Field(min_length=1, max_length=200)]
+    """How the instrument speaks: a ready profile (`cmm-uq instruments list`), or a TOML file of one's own beside job.toml."""
+    port: Annotated[str, Field(max_length=300)] = ""
+    """Where it is: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `rfc2217://host:port`, `tcp://host:port`,
+    `visa://RESOURCE`, or `file:NAME` to replay bytes.
+    """
+    serial: str = ""
+    """Serial number of the instrument; one that it gives itself must be the same."""
+    certificate: str = ""
+    """Number of its calibration certificate."""
+    values: Annotated[dict[str, Column], Field(max_length=100)] = {}
+    """Column of the recording by the quantity that the instrument gives; without it each goes into the column of its name."""
+    latency_ms: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """How long before the last byte of a message came its quantities were measured."""
+
+
+class AcquireFacts(Table):
+    """``[acquire]``: a recording taken live, by `cmm-uq acquire`."""
+
+    plan: str | None = None
+    """Plan to be measured, a CSV of `cmm-uq plan` beside job.toml; without it the one that `[plan]` asks for."""
+    folder: str | None = None
+    """Folder that the machine's program drops results into, as seen from job.toml; each file is read once it stands still."""
+    max_gap_s: Annotated[float, Field(gt=0, le=1e6), at_least(1e-3)] = 10.0
+    """Longest time between two readings of an instrument that is interpolated over; in a longer one a point has no value."""
+    soak_k_per_h: Annotated[float, Field(gt=0, le=1000)] | None = None
+    """Largest change of each temperature in an hour before the measurement begins; that of `[rated_conditions]` without it."""
+    soak_min: Annotated[float, Field(gt=0, le=1e5), at_least(0.01)] = 30.0
+    """Time over which that change is taken, min."""
+    repeats_most: Annotated[int, Field(ge=1, le=100)] = 5
+    """How often a set-up is measured at most, where the scatter of its repeats asks for more."""
+    source: Annotated[list[DeclaredSource], Field(max_length=100)] = []
+    """The instruments, each a table of its own."""
+
+    @field_validator("source")
+    @classmethod
+    def _names_differ(cls, sources: list[DeclaredSource]) -> list[DeclaredSource]:
+        names = [source.name for source in sources]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"two sources are called {name!r}: give each a name of its own")
+        return sources
+
+
+Percent = Annotated[float, Field(ge=0, le=100)]
+
+
+class ProveFacts(Table):
+    """``[prove]``: what `cmm-uq prove` compares its figures with. It is sealed with the truth of the cases."""
+
+    false_alarms_pct: Annotated[float, Field(gt=0, lt=100)] = 2.0
+    """Largest rate of false alarms, in percent of the recordings that hide nothing."""
+    coverage_pct: Annotated[list[Percent], Field(min_length=2, max_length=2)] = [93.0, 97.0]
+    """Lowest and highest percentage of 95 % intervals that hold the truth."""
+    wrong_names_pct: Annotated[float, Field(gt=0, lt=100)] | None = None
+    """Largest percentage of recordings in which an effect is named that does not act."""
+    found_pct: Percent | None = None
+    """Least percentage of hidden effects that are found, of all strengths that are drawn."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        low, high = self.coverage_pct
+        if not low < high:
+            raise ValueError(f"coverage_pct = [{low:g}, {high:g}]: the first number must be the lower one")
+        return self
