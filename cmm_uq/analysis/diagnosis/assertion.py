@@ -50,57 +50,57 @@ class WithheldEffect:
     modes: tuple[Mode, ...] = ()
 
 
-def withhold_unresolved(found: SearchResult) -> tuple[SearchResult, tuple[WithheldEffect, ...]]:
+def withhold_unresolved(result: SearchResult) -> tuple[SearchResult, tuple[WithheldEffect, ...]]:
     """Without the effects that have a period, and of which the positions tell too little, and these."""
     gone = {}
-    for i in sorted(found.chosen):
-        modes = period_modes(found, i)
-        if modes and (why := _too_little(found, i, modes)) is not None:
-            gone[i] = replace(_withheld(found, i, why), modes=modes)
-    return (withhold(found, frozenset(gone)), tuple(gone.values())) if gone else (found, ())
+    for i in sorted(result.chosen):
+        modes = period_modes(result, i)
+        if modes and (why := _too_little(result, i, modes)) is not None:
+            gone[i] = replace(_withheld(result, i, why), modes=modes)
+    return (withhold(result, frozenset(gone)), tuple(gone.values())) if gone else (result, ())
 
 
-def period_settled(found: SearchResult, index: int, modes: tuple[Mode, ...]) -> bool:
+def period_settled(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> bool:
     """Whether an effect with the most probable of its periods is more probable than not, as asked of any effect."""
-    combinations = found.combinations
+    combinations = result.combinations
     if combinations is None:
         return False
-    group = group_of(combinations, found.chosen, index) | {index}
+    group = group_of(combinations, result.chosen, index) | {index}
     return combinations.of_any(group) * modes[0].probability >= ASSERTED
 
 
-def _too_little(found: SearchResult, index: int, modes: tuple[Mode, ...]) -> Text | None:
+def _too_little(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> Text | None:
     """Why neither an error with a period nor one without is asserted."""
-    combinations = found.combinations
-    if combinations is None or not holds_whole_period(found, index, modes[0]):
+    combinations = result.combinations
+    if combinations is None or not holds_whole_period(result, index, modes[0]):
         return NOT_WHOLE
-    if period_settled(found, index, modes):
+    if period_settled(result, index, modes):
         return None
     return None if combinations.of(index) >= ASSERTED else UNRESOLVED
 
 
-def withhold_unpredicted(found: SearchResult, unseen: Text) -> tuple[WithheldEffect, ...]:
+def withhold_unpredicted(result: SearchResult, unseen: Text) -> tuple[WithheldEffect, ...]:
     """All that was found, withheld because held-out placings, or points, do not speak for it."""
     why = say("it does not predict {unseen} that the fit had not seen better than noise would", unseen=unseen)
-    return tuple(replace(_withheld(found, i, why), modes=period_modes(found, i)) for i in sorted(found.chosen))
+    return tuple(replace(_withheld(result, i, why), modes=period_modes(result, i)) for i in sorted(result.chosen))
 
 
-def effects_without_size(found: SearchResult, joint: JointPosterior) -> dict[int, WithheldEffect]:
+def effects_without_size(result: SearchResult, joint: JointPosterior) -> dict[int, WithheldEffect]:
     """The effects of whose size the joint posterior says too little."""
-    gone, shares = {}, _chance(found, joint)
-    for i in sorted(found.chosen):
-        effect = effect_of(found.first.explanations[i])
-        modes = period_modes(found, i)
-        sizes = _sizes(found, joint, effect, modes)
+    gone, shares = {}, _chance(result, joint)
+    for i in sorted(result.chosen):
+        effect = effect_of(result.first.explanations[i])
+        modes = period_modes(result, i)
+        sizes = _sizes(result, joint, effect, modes)
         why = None
         if _holds_zero(sizes):
             why = HOLDS_ZERO
         elif modes and not _phase_known(sizes):
             why = PHASE_OPEN
-        elif shares[effect.name] * _tried(found, i) > _BY_NOISE:
+        elif shares[effect.name] * _tried(result, i) > _BY_NOISE:
             why = WITHIN_NOISE
         if why is not None:
-            gone[i] = replace(_withheld(found, i, why), modes=modes)
+            gone[i] = replace(_withheld(result, i, why), modes=modes)
     return gone
 
 
@@ -112,19 +112,19 @@ def group_of(combinations: Combinations, chosen: Key, index: int) -> Key:
     return group | combinations.imitating(index)
 
 
-def _withheld(found: SearchResult, index: int, why: Text) -> WithheldEffect:
-    effect = effect_of(found.first.explanations[index])
-    probability = found.combinations.of(index) if found.combinations is not None else 0.0
+def _withheld(result: SearchResult, index: int, why: Text) -> WithheldEffect:
+    effect = effect_of(result.first.explanations[index])
+    probability = result.combinations.of(index) if result.combinations is not None else 0.0
     return WithheldEffect(effect.name, effect.title, probability, why)
 
 
-def _tried(found: SearchResult, index: int) -> float:
+def _tried(result: SearchResult, index: int) -> float:
     """How many periods of an effect the search tried: of noise, the best of many takes more than one."""
-    explanation = found.first.explanations[index]
+    explanation = result.first.explanations[index]
     return float(sum(member.weight for member in explanation.members)) if explanation.shaped else 1.0
 
 
-def _sizes(found: SearchResult, joint: JointPosterior, effect: Effect, modes: tuple[Mode, ...]) -> Floats:
+def _sizes(result: SearchResult, joint: JointPosterior, effect: Effect, modes: tuple[Mode, ...]) -> Floats:
     """Draws (N, k) of an effect's coefficients; of a period those of its sine and cosine about the middle of the readings.
 
     They are of the most probable of its periods: those of several have phases that say nothing together.
@@ -134,7 +134,7 @@ def _sizes(found: SearchResult, joint: JointPosterior, effect: Effect, modes: tu
     axis = effect.shape[0].period_along if effect.shape else None
     if axis is None:
         return draws
-    readings = found.first.model.artefact.points.readings[axis]
+    readings = result.first.model.artefact.points.readings[axis]
     middle = 0.5 * (float(readings.min()) + float(readings.max()))
     period = joint.shapes[effect.name][:, 0]
     own = modes[0].holds(period) if modes else np.ones(len(period), dtype=np.bool_)
@@ -160,16 +160,16 @@ def _phase_known(draws: Floats) -> bool:
     return float(np.mean(towards > 0)) >= _COVERED
 
 
-def _chance(found: SearchResult, joint: JointPosterior) -> dict[str, float]:
+def _chance(result: SearchResult, joint: JointPosterior) -> dict[str, float]:
     """Of each effect found, the probability that noise alone gives it as much of the misfit (F test of what it takes last)."""
-    if not found.chosen:
+    if not result.chosen:
         return {}
-    linear = found.model.estimate().linear.uncorrelated(joint.components.white(joint.posterior.sizes.typical))
+    linear = result.model.estimate().linear.uncorrelated(joint.components.white(joint.posterior.sizes.typical))
     linear = replace(linear, sigma=None)
     whole = solve(linear)
     left, dof = float(whole.residuals @ whole.residuals), max(whole.degrees_of_freedom, 1)
     chance = {}
-    for name in found.effects:
+    for name in result.effects:
         own = [i for i, unknown in enumerate(linear.unknowns) if unknown.key[0] == name]
         more = _left_without(linear, own) - left
         ratio = max(more, 0.0) / len(own) / max(left / dof, 1e-300)

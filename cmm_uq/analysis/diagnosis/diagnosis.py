@@ -92,7 +92,7 @@ class Diagnosis:
     itself with its probability, most probable first; ``noise``, ``improvement`` see their classes; ``before``,
     ``after`` the job's model, and with what was left out; ``components`` of the noise, for the model after;
     ``posterior`` joint, of the model after; ``compared`` observations that the candidates were compared on; what was
-    found is estimated from all; ``found`` the search that it rests on; ``withheld`` effects that are probable, and yet
+    found is estimated from all; ``search`` the search that it rests on; ``withheld`` effects that are probable, and yet
     not asserted; ``remaining`` combinations of explanations that remain, and what they make of the named effects.
     """
 
@@ -110,7 +110,7 @@ class Diagnosis:
     components: Components
     posterior: NoisyPosterior
     compared: int
-    found: SearchResult
+    search: SearchResult
     withheld: tuple[WithheldEffect, ...] = ()
     remaining: ModelAverage = field(default_factory=ModelAverage)
 
@@ -145,40 +145,40 @@ def diagnose(
 
 
 def _asserted(
-    found: SearchResult, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
+    result: SearchResult, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
 ) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...]]:
     """What of a search may be asserted, estimated from all observations, and what is withheld.
 
     Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place. Where there
     is none, the least probable of those whose size is open goes first: without it that of the others may be known.
     """
-    found, gone = withhold_unresolved(found)
+    result, gone = withhold_unresolved(result)
     places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
     while True:
-        found = _of_all(found, model)
-        joint = joint_posterior(found, seed, progress, known)
-        more = effects_without_size(found, joint)
+        result = _of_all(result, model)
+        joint = joint_posterior(result, seed, progress, known)
+        more = effects_without_size(result, joint)
         if not more:
-            return found, joint, gone
+            return result, joint, gone
         tried |= frozenset(more)
         alone = []
         for i, withheld in more.items():
-            if (instead := substitute(found, i, tried)) is not None:
-                found, other = instead
+            if (instead := substitute(result, i, tried)) is not None:
+                result, other = instead
                 places[other] = places.get(i, withheld)
             else:
                 alone.append(i)
         if len(alone) == len(more):
             least = min(alone, key=lambda i: more[i].probability)
-            found, gone = withhold(found, frozenset({least})), (*gone, places.get(least, more[least]))
+            result, gone = withhold(result, frozenset({least})), (*gone, places.get(least, more[least]))
 
 
-def _of_all(found: SearchResult, model: MeasurementModel) -> SearchResult:
+def _of_all(result: SearchResult, model: MeasurementModel) -> SearchResult:
     """The same, its model that of all observations."""
-    if not found.chosen or found.model.artefact is model.artefact:
-        return found if found.chosen else replace(found, model=model)
-    return replace(found, model=replace(found.model, artefact=model.artefact, used=model.used))
+    if not result.chosen or result.model.artefact is model.artefact:
+        return result if result.chosen else replace(result, model=model)
+    return replace(result, model=replace(result.model, artefact=model.artefact, used=model.used))
 
 
 def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
@@ -187,25 +187,25 @@ def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
     return replace(model, least_noise=least) if least > model.least_noise else model
 
 
-def _verdict(found: SearchResult, alpha: float) -> str:
-    if found.first.p_value >= alpha:
+def _verdict(result: SearchResult, alpha: float) -> str:
+    if result.first.p_value >= alpha:
         return "consistent"
-    if not found.effects:
+    if not result.effects:
         return "unexplained"
-    return "partial" if found.rough or found.unexplained > _UNKNOWN else "explained"
+    return "partial" if result.rough or result.unexplained > _UNKNOWN else "explained"
 
 
-def _left_out(found: SearchResult, joint: JointPosterior, before: MeasurementModel) -> tuple[OmittedEffect, ...]:
-    index = {str.__str__(found.first.explanations[i].name): i for i in found.chosen}
+def _left_out(result: SearchResult, joint: JointPosterior, before: MeasurementModel) -> tuple[OmittedEffect, ...]:
+    index = {str.__str__(result.first.explanations[i].name): i for i in result.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}
-    linear, first = found.model.estimate().linear, _squares(before.estimate().linear, ())
+    linear, first = result.model.estimate().linear, _squares(before.estimate().linear, ())
     total = first - _squares(linear, ())
     listed = []
-    for effect in (e for e in found.model.effects if e.name in found.effects):
-        modes = period_modes(found, index[effect.name])
-        known = not modes or period_settled(found, index[effect.name], modes)
-        probability, together, group = _probability(found, index[effect.name], known=known)
+    for effect in (e for e in result.model.effects if e.name in result.effects):
+        modes = period_modes(result, index[effect.name])
+        known = not modes or period_settled(result, index[effect.name], modes)
+        probability, together, group = _probability(result, index[effect.name], known=known)
         draws = posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
         shapes = joint.shapes.get(effect.name, np.zeros((len(draws), 0)))
         if modes and known:  # what is reported of a period is reported of one
@@ -233,15 +233,15 @@ def _of_a_period(effect: Effect) -> frozenset[str]:
     return frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
 
 
-def _probability(found: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
+def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
     """Of an effect by itself, and with all that could stand in its place; and the names of those.
 
     Without a known period these are the functions of the reading, too.
     """
-    combinations = found.combinations
+    combinations = result.combinations
     if combinations is None:
         return 0.0, 0.0, ()
-    group = group_of(combinations, found.chosen, index)
+    group = group_of(combinations, result.chosen, index)
     group |= frozenset() if known else combinations.imitating(index)
     names = tuple(
         combinations.explanations[i].name
@@ -263,14 +263,14 @@ def _squares(linear: LinearModel, without: Sequence[int]) -> float:
     return float(np.sum(solve(linear.only(kept)).residuals ** 2))
 
 
-def _indistinguishable(found: SearchResult) -> tuple[tuple[str, ...], ...]:
-    if found.combinations is None:
+def _indistinguishable(result: SearchResult) -> tuple[tuple[str, ...], ...]:
+    if result.combinations is None:
         return ()
-    names, groups = [e.name for e in found.first.explanations], []
-    for i in sorted(found.chosen):
-        odds = found.combinations.instead(found.chosen, i)
+    names, groups = [e.name for e in result.first.explanations], []
+    for i in sorted(result.chosen):
+        odds = result.combinations.instead(result.chosen, i)
         rivals = sorted((r for r in odds if odds[r] > _ODDS), key=lambda r: -odds[r])
-        if rivals and found.combinations.of(i) < _TOLD_APART:
+        if rivals and result.combinations.of(i) < _TOLD_APART:
             groups.append((names[i], *(names[r] for r in rivals)))
     return tuple(groups)
 
@@ -280,19 +280,19 @@ def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
     return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
 
-def _noise(found: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseEstimate:
+def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseEstimate:
     """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
-    sizes, weight = joint.posterior.sizes, found.last.noise_posterior().sum(axis=1)
-    estimate = found.model.estimate()
+    sizes, weight = joint.posterior.sizes, result.last.noise_posterior().sum(axis=1)
+    estimate = result.model.estimate()
     residuals = studentised(estimate.linear, joint.components, sizes.typical, estimate.least_squares.residuals)
     likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
-    squares = found.last.squares[likeliest] * found.last.kinds[likeliest].scatter ** 2
+    squares = result.last.squares[likeliest] * result.last.kinds[likeliest].scatter ** 2
     return NoiseEstimate(
         Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
         Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,
-        probability_by_name(found.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
-        stated is not None and _contradicts(stated, squares, found.last.degrees_of_freedom),
+        probability_by_name(result.last.kinds, weight).get("tails", 0.0) > _NOISE_KIND or has_heavy_tails(residuals),
+        stated is not None and _contradicts(stated, squares, result.last.degrees_of_freedom),
     )
 
 

@@ -47,23 +47,23 @@ class Mode:
         return (shape >= self.ends[0]) & (shape <= self.ends[1])
 
 
-def period_modes(found: SearchResult, index: int) -> tuple[Mode, ...]:
+def period_modes(result: SearchResult, index: int) -> tuple[Mode, ...]:
     """All modes of the period of an effect that was found, the most probable first; none of one without a period.
 
     Periods shorter than those that are searched count too: where positions repeat at equal distances, they fit as well.
     """
-    explanation = found.first.explanations[index]
+    explanation = result.first.explanations[index]
     effect = effect_of(explanation)
     if not (effect.shape and effect.shape[0].period_along):
         return ()
-    given = [v for v in found.versions if v.explanation != index]
-    member, evidence, before = found.first.comparison.of_versions(index, given)
+    given = [v for v in result.versions if v.explanation != index]
+    member, evidence, before = result.first.comparison.of_versions(index, given)
     total = evidence + before
     weight = np.exp(total - special.logsumexp(total))
     frequency = even_scale(effect, np.array([explanation.members[m].shape[0] for m in member]))
     likely = np.flatnonzero(weight > _LIKELY * weight.max())
     likely = likely[np.argsort(frequency[likely])]
-    span = _span(found, effect.shape[0].period_along)
+    span = _span(result, effect.shape[0].period_along)
     apart = np.split(likely, np.flatnonzero(np.diff(frequency[likely]) > _APART / span) + 1)
     found_modes = []
     for part in (peak for trials in apart for peak in _peaks(trials, evidence)):
@@ -76,10 +76,10 @@ def period_modes(found: SearchResult, index: int) -> tuple[Mode, ...]:
     return tuple(sorted((m for m in found_modes if m.probability > _TOLD), key=lambda m: -m.probability))
 
 
-def holds_whole_period(found: SearchResult, index: int, mode: Mode) -> bool:
+def holds_whole_period(result: SearchResult, index: int, mode: Mode) -> bool:
     """Whether the readings hold a whole period of an effect: less is a bow, or any other curve."""
-    axis = effect_of(found.first.explanations[index]).shape[0].period_along
-    return axis is None or mode.period.interval95[1] <= _span(found, axis)
+    axis = effect_of(result.first.explanations[index]).shape[0].period_along
+    return axis is None or mode.period.interval95[1] <= _span(result, axis)
 
 
 def _peaks(trials: Ints, evidence: Floats) -> Iterator[Ints]:
@@ -94,8 +94,8 @@ def _peaks(trials: Ints, evidence: Floats) -> Iterator[Ints]:
         yield trials
 
 
-def _span(found: SearchResult, axis: str) -> float:
-    return float(np.ptp(found.first.model.artefact.points.readings[axis]))
+def _span(result: SearchResult, axis: str) -> float:
+    return float(np.ptp(result.first.model.artefact.points.readings[axis]))
 
 
 def _within(periods: Floats, weight: Floats, unit: Unit, ends: Floats) -> Quantity:
@@ -121,25 +121,25 @@ class JointPosterior:
 
 
 def joint_posterior(
-    found: SearchResult, seed: int, progress: Progress | None = None, known: NoisyPosterior | None = None
+    result: SearchResult, seed: int, progress: Progress | None = None, known: NoisyPosterior | None = None
 ) -> JointPosterior:
     """Sample everything at once.
 
     ``known`` posterior of the job's own model, which it stays where nothing is found.
     """
-    model = found.model
+    model = result.model
     components = replace(noise_of(model), known=model.least_noise)
-    if known is not None and not found.effects:
+    if known is not None and not result.effects:
         return JointPosterior(known, components, {})
     estimate = model.estimate()
-    new = [e for e in model.effects if e.shape and e.name in found.effects]
+    new = [e for e in model.effects if e.shape and e.name in result.effects]
     posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, None if new else progress)
     if not new:
         return JointPosterior(with_curvature(model, components, posterior), components, {})
     # what shapes columns is sampled under the noise that is typical with the shapes held
     white = components.white(posterior.sizes.typical)
     linear, values = estimate.linear.uncorrelated(white), estimate.about
-    shaped = [_shaped(found, model, effect, values) for effect in new]
+    shaped = [_shaped(result, model, effect, values) for effect in new]
     shaped = [replace(some, table=np.stack([white(columns) for columns in some.table])) for some in shaped]
     drawn = sample_shaped(replace(linear, sigma=None), shaped, seed, progress)
     sizes = posterior.sizes.at(np.resize(np.arange(len(posterior.draws)), len(drawn.draws)))
@@ -149,20 +149,20 @@ def joint_posterior(
     )
 
 
-def _shaped(found: SearchResult, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
+def _shaped(result: SearchResult, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
     """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
-    nodes = _nodes(found, effect)
+    nodes = _nodes(result, effect)
     table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])
     keys = [unknown.key for unknown in model.unknowns]
     return Shaped([keys.index((effect.name, c.name)) for c in effect.coefficients], nodes, table)
 
 
-def _nodes(found: SearchResult, effect: Effect) -> Floats:
-    comparison = found.first.comparison
-    index = next(i for i in found.chosen if found.first.explanations[i].name == effect.name)
-    given = [v for v in found.versions if v.explanation != index]
+def _nodes(result: SearchResult, effect: Effect) -> Floats:
+    comparison = result.first.comparison
+    index = next(i for i in result.chosen if result.first.explanations[i].name == effect.name)
+    given = [v for v in result.versions if v.explanation != index]
     member, evidence, _ = comparison.of_versions(index, given)
-    even = even_scale(effect, np.array([found.first.explanations[index].members[m].shape[0] for m in member]))
+    even = even_scale(effect, np.array([result.first.explanations[index].members[m].shape[0] for m in member]))
     step = float(np.median(np.diff(np.sort(even)))) if len(even) > 1 else 0.1 * abs(float(even[0]))
     likely = even[evidence > evidence.max() - _IMPROBABLE]
     offsets = np.arange(-_FINER, _FINER + 1) / _FINER

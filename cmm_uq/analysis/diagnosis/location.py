@@ -92,14 +92,14 @@ def locate(compared: ModelComparison, alpha: float, effects: Collection[int] = (
 
 
 def _beside(
-    compared: ModelComparison, given: Sequence[Version], functions: Collection[int]
+    compared: ModelComparison, conditions: Sequence[Version], functions: Collection[int]
 ) -> dict[int, tuple[float, Version]]:
     """Log odds of each function beside those given, and its best version."""
     comparison = compared.comparison
-    alone = float(comparison.log_evidence_of(given)[0]) if given else 0.0
-    found = comparison.beside(given, functions)
+    alone = float(comparison.log_evidence_of(conditions)[0]) if conditions else 0.0
+    found = comparison.beside(conditions, functions)
     return {
-        i: (evidence - alone if given else float(compared.log_odds[i]), version)
+        i: (evidence - alone if conditions else float(compared.log_odds[i]), version)
         for i, (evidence, version) in found.items()
         if i in functions
     }

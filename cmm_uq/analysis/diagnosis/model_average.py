@@ -78,15 +78,15 @@ class ModelAverage:
         return [rival.probability for rival in self.rivals]
 
 
-def average_models(found: SearchResult, joint: JointPosterior, before: MeasurementModel, seed: int) -> ModelAverage:
+def average_models(result: SearchResult, joint: JointPosterior, before: MeasurementModel, seed: int) -> ModelAverage:
     """What remains of a search.
 
     ``before`` the job's model.
     """
-    combinations = found.combinations
+    combinations = result.combinations
     if combinations is None:
         return ModelAverage()
-    whole = found.first.model.artefact is before.artefact
+    whole = result.first.model.artefact is before.artefact
     total: dict[Key, float] = {}
     for key, p in needed_combinations(combinations).items():
         # functions are known where the candidates were compared: of a large recording, on some of the observations
@@ -97,7 +97,7 @@ def average_models(found: SearchResult, joint: JointPosterior, before: Measureme
         return ModelAverage()
     typical = joint.posterior.sizes.typical
     noise = joint.components.white(typical), float(typical.coordinate[0])
-    rivals = tuple(_rival(found, combinations, noise, before, key, total[key], seed) for key in order)
+    rivals = tuple(_rival(result, combinations, noise, before, key, total[key], seed) for key in order)
     draws = _over_all(rivals, before, seed)
     return ModelAverage(rivals, _reported(before, draws), draws)
 
@@ -118,7 +118,7 @@ def needed_combinations(combinations: Combinations) -> dict[Key, float]:
     One whose evidence is not three times that without a member is no other explanation than that without it: its probability
     goes there. (A recording that is consistent leaves open as well what it does not show.)
     """
-    evidence = {key: one.log_posterior - one.log_prior for key, one in combinations.found.items()}
+    evidence = {key: one.log_posterior - one.log_prior for key, one in combinations.by_key.items()}
     total = dict(combinations.probability)
     for key in sorted(total, key=lambda key: -len(key)):
         fewer = [key - {i} for i in key if key - {i} in evidence]
@@ -129,29 +129,29 @@ def needed_combinations(combinations: Combinations) -> dict[Key, float]:
 
 
 def _rival(
-    found: SearchResult, combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: MeasurementModel,
+    result: SearchResult,
+    combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: MeasurementModel,
     key: Key, probability: float, seed: int,
 ) -> Rival:  # fmt: skip
     """One that remains; ``noise`` is what whitens observations, and its standard deviation of a reading, mm."""
-    explanations, (white, sigma) = found.first.explanations, noise
+    explanations, (white, sigma) = result.first.explanations, noise
     functions = sorted(i for i in key if explanations[i].kind == UNKNOWN)
-    combination = max(
-        (k for k in combinations.found if key <= k and combinations.effects_of(k) == combinations.effects_of(key)),
-        key=lambda k: combinations.found[k].log_posterior,
+    combination = combinations.likeliest(
+        k for k in combinations.by_key if key <= k and combinations.effects_of(k) == combinations.effects_of(key)
     )
-    versions = combinations.found[combination].versions
+    versions = combinations.by_key[combination].versions
     effects = key - frozenset(functions)
     model = before
     if effects:
-        model = with_effects(found.first, versions, effects)
+        model = with_effects(result.first, versions, effects)
         model = replace(model, artefact=before.artefact, used=before.used)
-    linear = replace(model.linearised(_about(model, before, found.model)), sigma=None)
+    linear = replace(model.linearised(_about(model, before, result.model)), sigma=None)
     for version in versions:
         if version.explanation in functions:
             member = explanations[version.explanation].members[version.member]
             linear = _with_columns(linear, member.columns, version.amplitude * sigma)
     own = linear.uncorrelated(white)
-    draws = _drawn(own, sigma, found.stated, seed)[:, : len(model.unknowns)]
+    draws = _drawn(own, sigma, result.stated, seed)[:, : len(model.unknowns)]
     reported = _reported(model, draws)
     added = tuple(effect.name for effect in model.effects if effect.name not in {e.name for e in before.effects})
     return Rival(

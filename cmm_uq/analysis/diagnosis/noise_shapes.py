@@ -169,13 +169,13 @@ def _latent(components: Components, numbers: Floats) -> Floats:
     return found
 
 
-def _more(shapes: Shapes, few: Sequence[_Density], told: Sequence[_Density]) -> Shapes:
+def _more(shapes: Shapes, few: Sequence[_Density], densities: Sequence[_Density]) -> Shapes:
     """With draws from what is proposed for the densities; all together count as drawn from the mixture of what drew them."""
     n, d = shapes.latent.shape
-    components = told[0].marginal.noise
+    components = densities[0].marginal.noise
     near = present(few[0], beginning(components.names[1:]), 0, tried=_TRIED)
     proposals = []
-    for seed, density in enumerate(told):  # beside rivals it costs the more, and lies near that without them
+    for seed, density in enumerate(densities):  # beside rivals it costs the more, and lies near that without them
         near = near if density is few[0] else present(density, near, seed, 1, _TRIED)
         proposals.append(near)
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(len(proposals))))

@@ -92,12 +92,12 @@ class SmallestEffect:
         return self.common and there and (self.detected is None or self.detected > BLIND * self.allowed)
 
 
-def smallest_effects(found: SearchResult, alpha: float, model: MeasurementModel) -> tuple[SmallestEffect, ...]:
+def smallest_effects(result: SearchResult, alpha: float, model: MeasurementModel) -> tuple[SmallestEffect, ...]:
     """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
 
     Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
     """
-    view = Visibility.of(found)
+    view = Visibility.of(result)
     named = {effect.name for effect in model.effects}
     listed = [
         (i, explanation, effect)
@@ -110,7 +110,7 @@ def smallest_effects(found: SearchResult, alpha: float, model: MeasurementModel)
     each = dict(zip(which, thresholds(view, which, columns, alpha), strict=True))
     rows = [signal.smallest(view, each.get(signal.index)) for signal in signals]
     known = {explanation.name for explanation in view.explanations}
-    rows += [_never(effect) for effect in _motionless(found.first.model, named | known)]
+    rows += [_never(effect) for effect in _motionless(result.first.model, named | known)]
     return tuple(sorted(rows, key=lambda row: -_reach(row)))
 
 
@@ -160,7 +160,7 @@ class _Signal:
 
     @classmethod
     def shaped(cls, view: Visibility, index: int, explanation: Explanation, effect: Effect) -> _Signal:
-        scale = view.found.first.comparison.noise_scale[:, None]
+        scale = view.result.first.comparison.noise_scale[:, None]
         members = [member for member in explanation.members if member.shape and not member.rough]
         raws = np.stack([member.columns / scale for member in members])
         p, m, r = raws.shape
@@ -205,7 +205,7 @@ class _Signal:
 def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]) -> list[_Signal]:
     """What each of some effects shows; of several coefficients the first."""
     straight = [row for row in listed if not row[1].shaped]
-    scale, none = view.found.first.comparison.noise_scale, np.zeros(0)
+    scale, none = view.result.first.comparison.noise_scale, np.zeros(0)
     raws = np.column_stack([np.zeros((len(scale), 0)), *(e.members[0].columns[:, 0] / scale for _, e, _ in straight)])
     lefts = view.rest(raws)
     there = np.linalg.norm(lefts, axis=0) > ABSORBED * np.linalg.norm(raws, axis=0)

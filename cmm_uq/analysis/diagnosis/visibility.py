@@ -45,7 +45,7 @@ class Visibility:
     probability of each kind of noise and ``squares`` (k,) its mean σ², mm²; ``known`` degrees of freedom of σ beforehand.
     """
 
-    found: SearchResult
+    result: SearchResult
     fitted: Floats
     noise: Floats
     weight: Floats
@@ -54,13 +54,13 @@ class Visibility:
     left: int
 
     @classmethod
-    def of(cls, found: SearchResult) -> Visibility:
-        comparison = found.first.comparison
+    def of(cls, result: SearchResult) -> Visibility:
+        comparison = result.first.comparison
         scale = comparison.noise_scale[:, None]
         columns = [
             comparison.explanations[v.explanation].members[v.member].columns / scale
-            for v in found.versions
-            if v.explanation in found.chosen
+            for v in result.versions
+            if v.explanation in result.chosen
         ]
         fitted = np.zeros((len(scale), 0))
         if columns:
@@ -73,29 +73,29 @@ class Visibility:
         of_sigma = both.sum(axis=0)
         variance = float(of_sigma @ log_sigma**2 - (of_sigma @ log_sigma) ** 2)
         left = comparison.degrees_of_freedom - fitted.shape[1]
-        return cls(found, fitted, noise, weight, squares, max(0.5 / max(variance, 1e-12) - left, 0.0), left)
+        return cls(result, fitted, noise, weight, squares, max(0.5 / max(variance, 1e-12) - left, 0.0), left)
 
     @property
     def explanations(self) -> Sequence[Explanation]:
-        return self.found.first.explanations
+        return self.result.first.explanations
 
     def rest(self, columns: Floats) -> Floats:
         """What baseline and asserted effects leave of columns (m, b)."""
-        left = self.found.first.comparison.rest(columns)
+        left = self.result.first.comparison.rest(columns)
         return left - self.fitted @ (self.fitted.T @ left)
 
     def lengths(self, columns: Floats) -> Floats:
         """Visible length (b,) of columns (m, b) of which everything fitted has been taken."""
-        each = self.found.first.comparison.lengths(columns)
+        each = self.result.first.comparison.lengths(columns)
         variance = (self.weight[:, None] * self.squares[:, None] / np.maximum(each, 1e-300)).sum(axis=0)
         return np.asarray(np.where(each.min(axis=0) > 0, 1 / np.sqrt(variance), 0.0))
 
     def taking(self, raw: Floats) -> tuple[str, ...]:
         """Names of what takes most of a column (m,) up: what was asserted, or else what the model names."""
-        left = self.found.first.comparison.rest(raw[:, None])
+        left = self.result.first.comparison.rest(raw[:, None])
         if np.linalg.norm(left) >= HIDDEN * np.linalg.norm(raw):
-            return self.found.effects
-        return _imitators(self.found.first.model, raw)
+            return self.result.effects
+        return _imitators(self.result.first.model, raw)
 
 
 def phases(view: Visibility, lefts: Floats) -> tuple[Floats, Floats, Floats]:
@@ -229,7 +229,7 @@ def thresholds(view: Visibility, which: Sequence[int], columns: Floats, alpha: f
     """
     if not which:
         return
-    first = view.found.first
+    first = view.result.first
     comparison, explanations = first.comparison, first.explanations
     gate = _gate(first.null, alpha)
     prior = log_prior(explanations)

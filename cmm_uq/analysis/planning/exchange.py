@@ -38,7 +38,7 @@ class Selection:
     before: float
 
 
-def score_of(criterion: str, told: Information, targets: Sequence[int]) -> Score:
+def score_of(criterion: str, placings_information: Information, targets: Sequence[int]) -> Score:
     targets = list(targets)
     least = 2 if criterion == "separation" else 1
     if criterion not in CRITERIA:
@@ -49,7 +49,7 @@ def score_of(criterion: str, told: Information, targets: Sequence[int]) -> Score
             fix="Name more effects, or rivals to tell apart",
         )  # fmt: skip
     if criterion == "separation":
-        base = [i for i in range(len(told.prior)) if i not in targets]
+        base = [i for i in range(len(placings_information.prior)) if i not in targets]
         upper = np.triu_indices(len(targets), 1)
 
         def apart(information: Floats) -> Floats:
@@ -58,8 +58,8 @@ def score_of(criterion: str, told: Information, targets: Sequence[int]) -> Score
             return np.asarray(-np.log(sine + _FLOOR).mean(axis=-1))
 
         return apart
-    nuisance = told.nuisance
-    effects = [i for i in range(len(told.prior)) if i not in nuisance]
+    nuisance = placings_information.nuisance
+    effects = [i for i in range(len(placings_information.prior)) if i not in nuisance]
     at = [effects.index(i) for i in targets]
 
     def uncertain(information: Floats) -> Floats:
@@ -78,7 +78,9 @@ def step(score: Score, start: Floats, each: Floats) -> Floats:
     return score(start + each)
 
 
-def choose(told: Information, start: Floats, score: Score, count: int, *, again: bool = False) -> Selection:
+def choose(
+    placings_information: Information, start: Floats, score: Score, count: int, *, again: bool = False
+) -> Selection:
     """Take ``count`` candidates, greedily, then exchange them one for one until nothing gains.
 
     Where no single candidate improves the score (nothing is told apart by one placing alone), the one is taken that shrinks
@@ -86,19 +88,23 @@ def choose(told: Information, start: Floats, score: Score, count: int, *, again:
 
     ``start`` (k, k) information of what is there already, certificates included.
     """
-    again = again or count > len(told.each)
-    everything = score_of("D", told, [i for i in range(len(told.prior)) if i not in told.nuisance])
+    again = again or count > len(placings_information.each)
+    everything = score_of(
+        "D",
+        placings_information,
+        [i for i in range(len(placings_information.prior)) if i not in placings_information.nuisance],
+    )
     taken: list[int] = []
     information, before = start.copy(), float(score(start[None])[0])
     now = before
     for _ in range(count):
-        scores = _free(step(score, information, told.each), taken, again)
+        scores = _free(step(score, information, placings_information.each), taken, again)
         best = int(np.argmin(scores))
         if scores[best] > now - _GAIN * (1 + abs(now)):
-            best = int(np.argmin(_free(step(everything, information, told.each), taken, again)))
+            best = int(np.argmin(_free(step(everything, information, placings_information.each), taken, again)))
         taken.append(best)
-        information, now = information + told.each[best], float(scores[best])
-    return Selection(*_exchanged(told, information, score, taken, again), before)
+        information, now = information + placings_information.each[best], float(scores[best])
+    return Selection(*_exchanged(placings_information, information, score, taken, again), before)
 
 
 def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
@@ -110,17 +116,22 @@ def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
 
 
 def _exchanged(
-    told: Information, information: Floats, score: Score, taken: list[int], again: bool
+    placings_information: Information, information: Floats, score: Score, taken: list[int], again: bool
 ) -> tuple[tuple[int, ...], float]:
     """Exchange one for one, in turn, until a whole round gains nothing."""
     now = float(score(information[None])[0])
     at, unchanged, tries = 0, 0, 0
     while unchanged < len(taken) and tries < _MOST_TRIES:
-        without = information - told.each[taken[at]]
-        scores = _free(step(score, without, told.each), taken, again)
+        without = information - placings_information.each[taken[at]]
+        scores = _free(step(score, without, placings_information.each), taken, again)
         best = int(np.argmin(scores))
         unchanged, tries = unchanged + 1, tries + 1
         if scores[best] < now - _BETTER * (1 + abs(now)):
-            taken[at], information, now, unchanged = best, without + told.each[best], float(scores[best]), 0
+            taken[at], information, now, unchanged = (
+                best,
+                without + placings_information.each[best],
+                float(scores[best]),
+                0,
+            )
         at = (at + 1) % len(taken)
     return tuple(sorted(taken)), now

@@ -144,11 +144,11 @@ class RepeatsComparison:
         return first if first <= len(better) else None
 
 
-def _placing_is_better(one: RepeatsRow, following: RepeatsRow) -> bool:
+def _placing_is_better(row: RepeatsRow, following: RepeatsRow) -> bool:
     """Whether the logarithm of every uncertainty falls more in a minute of one more placing than of the following repeat."""
-    there = np.isfinite(one.u)
-    by_placing = np.log(one.u[there] / one.u_more[there]) * (following.minutes - one.minutes)
-    by_repeat = np.log(one.u[there] / following.u[there]) * (one.minutes_more - one.minutes)
+    there = np.isfinite(row.u)
+    by_placing = np.log(row.u[there] / row.u_more[there]) * (following.minutes - row.minutes)
+    by_repeat = np.log(row.u[there] / following.u[there]) * (row.minutes_more - row.minutes)
     return bool(np.all(by_placing > by_repeat))
 
 

@@ -91,7 +91,7 @@ def next_plan(
     observe: Observe,
     planning: Planning | None,
     plan: PlanFacts | None = None,
-    wanted: Sequence[DetectionGoal] = (),
+    goals: Sequence[DetectionGoal] = (),
 ) -> NextPlan | None:
     """The fewest set-ups, within the machine's travel or the recorded volume, that part all that cannot be told apart.
 
@@ -99,10 +99,10 @@ def next_plan(
     it says.
     """
     groups = _groups(diagnosis)
-    if not (groups or wanted) or planning is None or planning.elsewhere is None:
+    if not (groups or goals) or planning is None or planning.elsewhere is None:
         return None
     after = diagnosis.after
-    names = sorted({name for group in groups for name in group.names} | {one.effect for one in wanted})
+    names = sorted({name for group in groups for name in group.names} | {one.effect for one in goals})
     model = _with_all(after, names)
     if facts.with_references:  # one placing alone does not show how long the artefact is
         facts = facts.model_copy(update={"length_mm": after.artefact.sizes[0].nominal})
@@ -118,8 +118,8 @@ def next_plan(
         return None
     aims = _Aims(known, groups, (), _sizes(after, groups), _variances(diagnosis))
     everything = known.recorded + known.told.each.sum(axis=0)
-    most = aims.amplitudes(everything[None], wanted)[0]
-    showing = [one for one, amplitude in zip(wanted, most, strict=True) if amplitude < _NEVER]
+    most = aims.amplitudes(everything[None], goals)[0]
+    showing = [one for one, amplitude in zip(goals, most, strict=True) if amplitude < _NEVER]
     aims = replace(aims, wanted=tuple(showing))
     found = _within_reach(aims)
     if found is None:
@@ -135,13 +135,13 @@ def next_plan(
 def _groups(diagnosis: Diagnosis) -> list[_Group]:
     """What cannot be told apart, with the odds by which the diagnosis says so."""
     found = []
-    combinations_found = diagnosis.found.combinations
-    index = {str.__str__(e.name): i for i, e in enumerate(diagnosis.found.first.explanations)}
+    combinations_found = diagnosis.search.combinations
+    index = {str.__str__(e.name): i for i, e in enumerate(diagnosis.search.first.explanations)}
     for names in diagnosis.indistinguishable:
         taken = names[:_OF_A_GROUP]
         instead: Mapping[int, float] = {}
         if combinations_found is not None and names[0] in index:
-            instead = combinations_found.instead(diagnosis.found.chosen, index[names[0]])
+            instead = combinations_found.instead(diagnosis.search.chosen, index[names[0]])
         odds = [1.0, *(instead.get(index.get(name, -1), 1.0) for name in taken[1:])]
         found.append(_Group(taken, np.log(odds)))
     return [group for group in found if group.pairs]
@@ -271,14 +271,14 @@ class _Aims:
             DetectionChange(one.effect, *amplitudes) for one, amplitudes in zip(self.wanted, found, strict=True)
         )
 
-    def amplitudes(self, information: Floats, wanted: Sequence[DetectionGoal]) -> Floats:
+    def amplitudes(self, information: Floats, goals: Sequence[DetectionGoal]) -> Floats:
         """Smallest amplitude (c, w) of each effect by itself that is detected, over its prior standard deviation."""
-        names = [one.effect for one in wanted]
+        names = [one.effect for one in goals]
         rows = [self.known.rows(name)[0] for name in names]
         left = np.einsum("...ii->...i", self.known.left(information, rows, names))
         alone = np.einsum("...ii->...i", information)[..., rows]
         there = left > _ROUNDING * np.maximum(alone, 1e-300)
-        length = np.array([one.length for one in wanted])
+        length = np.array([one.length for one in goals])
         return np.asarray(np.where(there, length / np.sqrt(np.where(there, left, 1.0)), _NEVER))
 
     def _of_group(self, information: Floats, g: int) -> Floats:

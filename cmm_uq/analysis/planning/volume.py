@@ -111,14 +111,14 @@ class Volume:
         )  # fmt: skip
 
 
-def _within_travel(machine: Machine, axis: str, wanted: Sequence[float]) -> Sequence[float]:
+def _within_travel(machine: Machine, axis: str, interval: Sequence[float]) -> Sequence[float]:
     low, high = machine.travel_mm[AXES.index(axis)]
-    if wanted[0] < low - _ROUNDING or wanted[1] > high + _ROUNDING:  # false where the travel is not known
+    if interval[0] < low - _ROUNDING or interval[1] > high + _ROUNDING:  # false where the travel is not known
         raise CmmUqError(
-            f"{axis} = [{wanted[0]:g}, {wanted[1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
+            f"{axis} = [{interval[0]:g}, {interval[1]:g}] mm goes beyond the travel of {low:g} to {high:g} mm",
             where="job.toml [plan] volume_mm", fix="Keep inside the travel, or mend [machine] travel_mm",
         )  # fmt: skip
-    return wanted
+    return interval
 
 
 _FLAT = 1e-3  # extent across an artefact, over its length, below which it has none

@@ -268,7 +268,7 @@ def _longest_run(values: Floats) -> tuple[int, int]:
     return int(starts[longest]), int(lengths[longest])
 
 
-def about_whole_column(found: Finding, points: Points) -> bool:
+def about_whole_column(item: Finding, points: Points) -> bool:
     """Whether half a column or more is concerned."""
-    concerned = np.isin(points.lines, found.lines) if found.lines else np.isin(points.measurement, found.measurements)
-    return found.column in points.columns and 2 * int(concerned.sum()) >= len(points)
+    concerned = np.isin(points.lines, item.lines) if item.lines else np.isin(points.measurement, item.measurements)
+    return item.column in points.columns and 2 * int(concerned.sum()) >= len(points)

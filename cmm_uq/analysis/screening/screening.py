@@ -221,17 +221,17 @@ def _measurement(points: Points, group: int) -> int:
     return points.run_of(group)[0]
 
 
-def _aside(found: Finding, set_aside: Collection[int]) -> bool:
+def _aside(item: Finding, set_aside: Collection[int]) -> bool:
     """Whether the estimates leave out what was found: a copy, or a measurement that the job leaves out."""
-    *others, last = found.measurements
-    return last in set_aside or (found.kind == "duplicate" and not any(other in set_aside for other in others))
+    *others, last = item.measurements
+    return last in set_aside or (item.kind == "duplicate" and not any(other in set_aside for other in others))
 
 
-def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Finding:
+def _reversal(item: Finding, points: Points, needed: Collection[str]) -> Finding:
     """A bar numbered the other way round is left out where the model uses what was recorded beside each ball."""
-    if found.kind != "swapped" or found.rows:
-        return found
-    rows = np.flatnonzero(np.isin(points.lines, found.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
+    if item.kind != "swapped" or item.rows:
+        return item
+    rows = np.flatnonzero(np.isin(points.lines, item.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
     differing = [
         name
         for name in needed
@@ -239,24 +239,24 @@ def _reversal(found: Finding, points: Points, needed: Collection[str]) -> Findin
         if np.ptp(points.column(name)[points.group == group]) > 0
     ]
     if not differing:
-        return found
+        return item
     why = say(
         "{why}; the model uses {differing}: number the balls as in the other repeats",
-        why=found.why,
+        why=item.why,
         differing=Verbatim(differing[0]),
     )
-    return replace(found, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
+    return replace(item, kind=REVERSED, set_aside=True, rows=tuple(rows.tolist()), why=why)
 
 
-def _left_out(found: Finding) -> Finding:
+def _left_out(item: Finding) -> Finding:
     """Copies of a block are left out, and columns of sensors that cannot be trusted."""
-    return replace(found, set_aside=found.set_aside or bool(found.rows) or found.column in SENSORS)
+    return replace(item, set_aside=item.set_aside or bool(item.rows) or item.column in SENSORS)
 
 
-def _told(found: Finding, damaged: Sequence[Finding]) -> bool:
+def _told(item: Finding, damaged: Sequence[Finding]) -> bool:
     """Whether a reading outside the travel is told already as what it is."""
     lines = {line for other in damaged for line in other.lines}
-    return found.kind == "impossible" and found.column in ("x_mm", "y_mm", "z_mm") and set(found.lines) <= lines
+    return item.kind == "impossible" and item.column in ("x_mm", "y_mm", "z_mm") and set(item.lines) <= lines
 
 
 def _hint(points: Points, axis: int) -> Text:
@@ -281,6 +281,6 @@ def _hint(points: Points, axis: int) -> Text:
     return say(": look for {hints}", hints=comma_or(hints))
 
 
-def _place(where: str, found: Finding) -> str:
-    line = f" line {found.lines[0]}" if found.lines else ""
-    return f"{where}{line}, column {found.column}"
+def _place(where: str, item: Finding) -> str:
+    line = f" line {item.lines[0]}" if item.lines else ""
+    return f"{where}{line}, column {item.column}"

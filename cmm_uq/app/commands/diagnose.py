@@ -91,7 +91,7 @@ def diagnose_model(
     diagnosis = diagnose(
         model, stated_um=stated_um, alpha=alpha, seed=seed, progress=progress, known=known, observe=artefact_at
     )
-    unseen = smallest_effects(diagnosis.found, alpha, diagnosis.after)
+    unseen = smallest_effects(diagnosis.search, alpha, diagnosis.after)
     goals = detection_goals(job, diagnosis, unseen) if show else ()
     plan = next_plan(diagnosis, facts.artefact, observe, kind.offers("plan", Planning), facts.plan, goals)
     found = Diagnosed(job, findings, diagnosis, suggestions(plan, model.artefact.title), unseen=unseen, next_plan=plan)
@@ -120,9 +120,9 @@ def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEff
     return tuple(goals)
 
 
-def outcome_of(found: Found, seed: int = 0) -> Outcome:
+def outcome_of(result: Found, seed: int = 0) -> Outcome:
     """What there is to write of what :func:`diagnose_read` found."""
-    return _recipe(found.job).outcome(found, seed)
+    return _recipe(result.job).outcome(result, seed)
 
 
 def _recipe(job: Job) -> Recipe:
@@ -133,9 +133,9 @@ def _recipe(job: Job) -> Recipe:
     return recipe_of(job, lambda own: own.diagnose, lambda kind: usual, "diagnosed as a recording of an artefact")
 
 
-def _outcome(found: Diagnosed) -> Outcome:
+def _outcome(result: Diagnosed) -> Outcome:
     from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
-    plan = found.next_plan
+    plan = result.next_plan
     files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
-    return replace(diagnosed_outcome(found), files=files)
+    return replace(diagnosed_outcome(result), files=files)

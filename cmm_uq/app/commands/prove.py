@@ -75,7 +75,7 @@ class ProofOptions:
 
 
 def prove_job(
-    job: Job, asked: ProofOptions, *, folder: Path | None = None, stage: Stage = silent, sealed: Sealed | None = None
+    job: Job, options: ProofOptions, *, folder: Path | None = None, stage: Stage = silent, sealed: Sealed | None = None
 ) -> tuple[DiagnosisProof, AnswersFolder | None]:
     """Prove the diagnosis on the set-ups of a job.
 
@@ -84,15 +84,15 @@ def prove_job(
     stage("Finding the noise of the job", 0.0)
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
         job, design = design_of(job)
-        stage(f"Drawing {asked.cases} cases", 0.02)
-        cases = tuple(design.case(asked.seed, number) for number in range(asked.cases))
+        stage(f"Drawing {options.cases} cases", 0.02)
+        cases = tuple(design.case(options.seed, number) for number in range(options.cases))
     named = true_values(design)
-    truth = truth_file(cases, _common(job, asked, named))
+    truth = truth_file(cases, _common(job, options, named))
     kept = None if folder is None else AnswersFolder(folder, truth)
     try:
         if sealed is not None:
             sealed(sha256_of(truth))
-        records = _records(job, design, cases, asked, kept, stage)
+        records = _records(job, design, cases, options, kept, stage)
     except BaseException:
         if kept is not None:
             kept.close()
@@ -100,15 +100,20 @@ def prove_job(
     of_artefact = {name for name, effect in every().items() if effect.mechanism == _OF_ARTEFACT}
     judged = tuple(judge(case, records[case.number], named, of_artefact.__contains__) for case in cases)
     ordered = tuple(records[case.number] for case in cases)
-    return DiagnosisProof(job, design, asked.seed, asked.alpha, truth, ordered, Judgement(judged)), kept
+    return DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, Judgement(judged)), kept
 
 
 def _records(
-    job: Job, design: Design, cases: tuple[Case, ...], asked: ProofOptions, kept: AnswersFolder | None, stage: Stage
+    job: Job,
+    design: Design,
+    cases: tuple[Case, ...],
+    options: ProofOptions,
+    answers: AnswersFolder | None,
+    stage: Stage,
 ) -> dict[int, Record]:
-    records = {} if kept is None else kept.records
-    if kept is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
-        raise CmmUqError("holds an answer that none of these processes gave", where=str(kept.folder / RECORDS),
+    records = {} if answers is None else answers.records
+    if answers is not None and any(REFUSED not in one and not one.keys() >= ANSWER for one in records.values()):
+        raise CmmUqError("holds an answer that none of these processes gave", where=str(answers.folder / RECORDS),
                          fix="Remove the folder and begin again")  # fmt: skip
     todo = {case.number: case for case in cases if case.number not in records}
 
@@ -116,30 +121,37 @@ def _records(
         stage(f"Diagnosing cases: {len(records)} of {len(cases)}", 0.03 + 0.9 * len(records) / len(cases))
 
     def keep(record: Record) -> None:
-        if kept is None:
+        if answers is None:
             records[record["number"]] = record
         else:
-            kept.keep(record)
+            answers.keep(record)
         told()
 
     points = design.model.artefact.points
     points = replace(points, columns=dict(points.columns))  # without what it remembers, which cannot be sent
     setting = CaseSetting(
-        dict(job.inputs), points, design.values, design.noise, design.cte_per_k, design.dates, asked.seed, asked.alpha
+        dict(job.inputs),
+        points,
+        design.values,
+        design.noise,
+        design.cte_per_k,
+        design.dates,
+        options.seed,
+        options.alpha,
     )
     told()
-    with _saying(kept, records, len(cases)):
-        answer_tasks(_PROGRAM, setting, todo, asked.workers, keep=keep)
+    with _saying(answers, records, len(cases)):
+        answer_tasks(_PROGRAM, setting, todo, options.workers, keep=keep)
     return records
 
 
 @contextlib.contextmanager
-def _saying(kept: AnswersFolder | None, records: dict[int, Record], count: int) -> Iterator[None]:
-    if kept is None:
+def _saying(answers: AnswersFolder | None, records: dict[int, Record], count: int) -> Iterator[None]:
+    if answers is None:
         yield
         return
     with interruption.keeping(
-        lambda: f"{len(records)} of {count} cases are kept in {kept.folder}: the same command goes on"
+        lambda: f"{len(records)} of {count} cases are kept in {answers.folder}: the same command goes on"
     ):
         yield
 
@@ -220,11 +232,11 @@ def true_values(design: Design) -> dict[str, float]:
     return found
 
 
-def _common(job: Job, asked: ProofOptions, named: dict[str, float]) -> dict[str, object]:
+def _common(job: Job, options: ProofOptions, named: dict[str, float]) -> dict[str, object]:
     """What the sealed file says of all cases: a run is the same where all of it is."""
     return {
         "program": f"cmm-uq {__version__}", "plugins": plugins(), "job": job.facts.job.id, "inputs_sha256": sha256(job.inputs),
-        "seed": asked.seed, "alpha": asked.alpha, "count": asked.cases, "accepted_by": job.facts.prove.model_dump(),
+        "seed": options.seed, "alpha": options.alpha, "count": options.cases, "accepted_by": job.facts.prove.model_dump(),
         "named": named,
     }  # fmt: skip
 
@@ -236,23 +248,23 @@ UNFINISHED = "cases.unfinished"
 
 
 @naming_package()
-def prove_outcome(job: Job, asked: ProofOptions, *, stage: Stage = silent) -> Outcome:
+def prove_outcome(job: Job, options: ProofOptions, *, stage: Stage = silent) -> Outcome:
     """Prove the diagnosis on the set-ups of a job that was read; nothing is written."""
-    return _outcome(job, asked, stage)[0]
+    return _outcome(job, options, stage)[0]
 
 
 def _outcome(
-    job: Job, asked: ProofOptions, stage: Stage, folder: Path | None = None, sealed: Sealed | None = None
+    job: Job, options: ProofOptions, stage: Stage, folder: Path | None = None, sealed: Sealed | None = None
 ) -> tuple[Outcome, AnswersFolder | None]:
     from cmm_uq.certificate.proof.results import proof_outcome
 
-    proof, kept = prove_job(job, asked, folder=folder, stage=stage, sealed=sealed)
+    proof, kept = prove_job(job, options, folder=folder, stage=stage, sealed=sealed)
     stage("Composing the page", 0.94)
     return proof_outcome(proof), kept
 
 
 def write_proof(
-    job: Path, asked: ProofOptions, out: Path | None = None, *, force: bool = False, stage: Stage | None = None,
+    job: Path, options: ProofOptions, out: Path | None = None, *, force: bool = False, stage: Stage | None = None,
     sealed: Sealed | None = None, language: Code | None = None,
 ) -> Written:  # fmt: skip
     """Prove the diagnosis on a job's set-ups and write page, truth, answers and ``results.json``, all or none.
@@ -270,7 +282,7 @@ def write_proof(
 
     @naming_package()
     def outcome() -> Outcome:
-        found, kept = _outcome(read, asked, tell, folder, sealed)
+        found, kept = _outcome(read, options, tell, folder, sealed)
         if kept is not None:
             open_.append(kept)
         return found

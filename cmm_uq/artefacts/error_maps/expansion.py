@@ -64,7 +64,7 @@ def _weighted(compared: ColumnComparison, index: int) -> Iterator[Normals]:
     for key, probability in compared.combinations.probability.items():
         if index not in key or probability < _FOLLOWED:
             continue
-        versions = compared.combinations.found[key].versions
+        versions = compared.combinations.by_key[key].versions
         for kind, share in zip(compared.comparison.kinds, compared.comparison.noise_probability(versions), strict=True):
             if share <= _FOLLOWED:
                 continue

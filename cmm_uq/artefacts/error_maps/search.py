@@ -138,7 +138,7 @@ class ColumnComparison:
     @cached_property
     def versions(self) -> tuple[Version, ...]:
         """Of the most probable combination, the sizes at their best."""
-        return self.combinations.found[self.best].versions
+        return self.combinations.by_key[self.best].versions
 
     @cached_property
     def effect(self) -> int | None:

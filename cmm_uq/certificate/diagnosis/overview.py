@@ -39,42 +39,42 @@ _RAREST = 1e-4  # probability below which only this is told
 _TOLD = 0.05  # probability from which another explanation is told beside what is asserted
 
 
-def overview_of(found: Diagnosed) -> Overview:
-    d = found.diagnosis
+def overview_of(result: Diagnosed) -> Overview:
+    d = result.diagnosis
     rows = (
-        (say("Found"), _found(found)), (say("Where"), _where(d)), (say("How sure"), _sure(found)),
-        (say("What to do"), _to_do(found)),
+        (say("Found"), _found(result)), (say("Where"), _where(d)), (say("How sure"), _sure(result)),
+        (say("What to do"), _to_do(result)),
     )  # fmt: skip
     title, standing = VERDICT_TITLES[d.verdict], STANDING[d.verdict]
-    if without_power(found):
+    if without_power(result):
         title, standing = say("Consistent, as far as this recording can show"), "open"
     if d.verdict == "explained" and (_otherwise(d) or any(_instead(d, item) for item in d.effects)):
         title = say("Explained: more than one cause is possible")
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 
-def _found(found: Diagnosed) -> Text:
-    d = found.diagnosis
+def _found(result: Diagnosed) -> Text:
+    d = result.diagnosis
     if d.verdict == "consistent":
-        if found.simulated is None:
+        if result.simulated is None:
             return say("Nothing beyond the effects that the job names: what they leave is noise.")
         return say("Nothing beyond the simulation: what it leaves is noise.")
     if not d.effects:
         return lines((say("A misfit that no known effect accounts for."), *withheld_sentences(d.withheld)))
-    told = [_one(found, item) for item in d.effects]
+    told = [_one(result, item) for item in d.effects]
     if d.verdict == "partial":
         told.append(say("And more that no known effect accounts for."))
     return lines(told)
 
 
-def _one(found: Diagnosed, item: OmittedEffect) -> Text:
-    d = found.diagnosis
+def _one(result: Diagnosed, item: OmittedEffect) -> Text:
+    d = result.diagnosis
     effect = effect_of(item.effect, d.after.effects)
     told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
     if others := _instead(d, item):
         small = alternatives(say("{title:small}", title=title) for title in titles(others, d.after.effects))
         told = say("{told} It could as well be: {others}.", told=told, others=small)
-    return after(told, contained(found.simulated, item.effect))
+    return after(told, contained(result.simulated, item.effect))
 
 
 def _instead(d: Diagnosis, item: OmittedEffect) -> list[str]:
@@ -94,11 +94,11 @@ def _where(d: Diagnosis) -> Text:
     return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
 
 
-def _sure(found: Diagnosed) -> Text:
-    d = found.diagnosis
+def _sure(result: Diagnosed) -> Text:
+    d = result.diagnosis
     if d.verdict == "consistent":
         told = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
-        return lines(text for text in (told, without_power(found)) if text)
+        return lines(text for text in (told, without_power(result)) if text)
     by_chance = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
     if not d.effects:
         return by_chance
@@ -145,10 +145,10 @@ def share_of(p_value: float) -> Text:
     return say("{many:.0f} of 100", many=100 * p_value)
 
 
-def _to_do(found: Diagnosed) -> Text:
-    d = found.diagnosis
+def _to_do(result: Diagnosed) -> Text:
+    d = result.diagnosis
     told: list[Text] = []
-    if found.next_plan is not None and d.verdict != "consistent":
+    if result.next_plan is not None and d.verdict != "consistent":
         told.append(say("First measure the set-ups that are told below, to part what this recording cannot."))
     told += [_look_at(d, item) for item in d.effects]
     if d.verdict in ("partial", "unexplained"):
@@ -158,8 +158,8 @@ def _to_do(found: Diagnosed) -> Text:
     if d.verdict == "explained":
         told.append(say("Then measure again."))
     if d.verdict == "consistent":
-        told.append(_nothing_to_do(found.findings))
-        if found.next_plan is not None:
+        told.append(_nothing_to_do(result.findings))
+        if result.next_plan is not None:
             told.append(say("To see what it could not have shown, measure the set-ups that are told below."))
     return lines(dict.fromkeys(told))
 
@@ -205,45 +205,45 @@ VERDICTS_IN_SHORT: Mapping[str, Text] = {
 """The same, to begin a summary with."""
 
 
-def verdict_of(found: Diagnosed) -> Text:
-    told = VERDICTS if found.simulated is None else AGAINST
-    return told[found.diagnosis.verdict]
+def verdict_of(result: Diagnosed) -> Text:
+    told = VERDICTS if result.simulated is None else AGAINST
+    return told[result.diagnosis.verdict]
 
 
-def summary_lines(found: Diagnosed) -> list[Text]:
+def summary_lines(result: Diagnosed) -> list[Text]:
     """Verdict, the overview and what else follows, a sentence or two each."""
-    d = found.diagnosis
+    d = result.diagnosis
     own = d.after.effects
     said = [
-        verdict_of(found),
-        *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(found).rows),
+        verdict_of(result),
+        *(say("{label}: {text}", label=label, text=text) for label, text in overview_of(result).rows),
         *withheld_sentences(d.withheld),
     ]
     said += [ambiguous(titles(group, own)) for group in d.indistinguishable]
-    if told := next_sentence(found):
+    if told := next_sentence(result):
         said.append(told)
-    return said + list(noise_words(d, stated_um(found)))
+    return said + list(noise_words(d, stated_um(result)))
 
 
 def ambiguous(group: Sequence[Text]) -> Text:
     return say("This recording cannot tell apart: {effects}.", effects=commas(group))
 
 
-def stated_um(found: Diagnosed) -> float | None:
+def stated_um(result: Diagnosed) -> float | None:
     """Standard uncertainty of a coordinate, µm, that the job states; with that of the prediction that it is compared with."""
-    stated = found.job.facts.recording.u_coordinate_um
+    stated = result.job.facts.recording.u_coordinate_um
     return (
         stated
-        if stated is None or found.simulated is None
-        else math.hypot(stated, found.simulated.u_um, found.simulated.u_turned_um)
+        if stated is None or result.simulated is None
+        else math.hypot(stated, result.simulated.u_um, result.simulated.u_turned_um)
     )
 
 
-def sentence(item: OmittedEffect, gain: Improvement, own: Iterable[Effect] = ()) -> Text:
+def sentence(item: OmittedEffect, gain: Improvement, effects: Iterable[Effect] = ()) -> Text:
     """One left-out effect: size, cause, what it explains, and what was held out says."""
     told = say(
         "{title}: {size}. What it points to: {points_to}. {sure:capital}; {gain}.",
-        title=item.title, size=size_of(effect_of(item.effect, own), item.parameters), points_to=item.points_to,
+        title=item.title, size=size_of(effect_of(item.effect, effects), item.parameters), points_to=item.points_to,
         sure=sure(item), gain=held_out(gain),
     )  # fmt: skip
     return after(told, other_periods(item))
@@ -300,9 +300,9 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
     return tuple(texts)
 
 
-def summary_of(facts: JobFile, verdict: str, told: Sequence[Text], findings: Iterable[Finding]) -> Summary:
+def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], findings: Iterable[Finding]) -> Summary:
     """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
-    first = Verdict(VERDICTS_IN_SHORT[verdict], STANDING[verdict], told[0], ())
+    first = Verdict(VERDICTS_IN_SHORT[verdict], STANDING[verdict], sentences[0], ())
     warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
     machine = Verbatim(facts.machine.name)
-    return Summary(machine, day(facts.job.date), (first,), remarks=tuple(told[1:]), warnings=warned)
+    return Summary(machine, day(facts.job.date), (first,), remarks=tuple(sentences[1:]), warnings=warned)

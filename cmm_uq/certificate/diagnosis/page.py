@@ -48,10 +48,10 @@ from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.maths.uncertainty.rounding import alike, figure
 
 
-def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
-    posterior = found.diagnosis.posterior
+def diagnosis_results(result: Diagnosed) -> dict[str, Any]:
+    posterior = result.diagnosis.posterior
     return {
-        **head(found.job),
+        **head(result.job),
         "sampling": {
             "sampler": posterior.sampler,
             "seed": posterior.seed,
@@ -59,17 +59,17 @@ def diagnosis_results(found: Diagnosed) -> dict[str, Any]:
             "rhat_max": posterior.rhat_max,
             "converged": posterior.converged,
         },
-        "diagnosis": diagnosis_data(found),
+        "diagnosis": diagnosis_data(result),
     }
 
 
-def diagnosis_document(found: Diagnosed) -> Document:
-    facts, d = found.job.facts, found.diagnosis
+def diagnosis_document(result: Diagnosed) -> Document:
+    facts, d = result.job.facts, result.diagnosis
     return working_page(
         facts,
         say("Diagnosis"),
-        say("{came_about} {date}", came_about=came_about(found.job), date=day(facts.job.date)),
-        overview=overview_of(found),
+        say("{came_about} {date}", came_about=came_about(result.job), date=day(facts.job.date)),
+        overview=overview_of(result),
         particulars=(
             Facts(
                 (
@@ -79,74 +79,74 @@ def diagnosis_document(found: Diagnosed) -> Document:
                     (say("False-alarm rate"), say("{alpha:g} %", alpha=100 * d.alpha)),
                 )
             ),
-            Facts((_explained_by(found),)),
+            Facts((_explained_by(result),)),
         ),
-        warnings=(say("{why:capital}.", why=f.why) for f in found.findings),
-        sections=_sections(found),
+        warnings=(say("{why:capital}.", why=f.why) for f in result.findings),
+        sections=_sections(result),
         produced_by=say(
             "{program}, {sampler}, seed {seed}",
-            program=program(found.job),
+            program=program(result.job),
             sampler=Verbatim(d.posterior.sampler),
             seed=d.posterior.seed,
         ),
-        attachments=(*names(found.job.inputs), Verbatim("results.json")),
+        attachments=(*names(result.job.inputs), Verbatim("results.json")),
     )
 
 
-def diagnosis_sections(found: Diagnosed) -> tuple[Section, ...]:
+def diagnosis_sections(result: Diagnosed) -> tuple[Section, ...]:
     """What a diagnosis says, as sections of any document, the overview first."""
-    return (Section(say("Diagnosis"), (overview_of(found),)), *_sections(found))
+    return (Section(say("Diagnosis"), (overview_of(result),)), *_sections(result))
 
 
-def _sections(found: Diagnosed) -> tuple[Section, ...]:
+def _sections(result: Diagnosed) -> tuple[Section, ...]:
     """What is to be done first, what it rests on behind it, long tables last."""
-    noise = noise_words(found.diagnosis, stated_um(found))
+    noise = noise_words(result.diagnosis, stated_um(result))
     sections = (
-        Section(say("What was left out"), _left_out(found)),
-        where_section(found.diagnosis),
-        Section(say("What remains"), _consistent(found)),
-        next_section(found),
-        Section(say("Before and after"), _before_after(found)),
-        Section(say("What a correction would change"), _consequences(found)),
-        costs_section(found),
-        unseen_section(found),
-        *_simulation(found),
+        Section(say("What was left out"), _left_out(result)),
+        where_section(result.diagnosis),
+        Section(say("What remains"), _consistent(result)),
+        next_section(result),
+        Section(say("Before and after"), _before_after(result)),
+        Section(say("What a correction would change"), _consequences(result)),
+        costs_section(result),
+        unseen_section(result),
+        *_simulation(result),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise)),
-        Section(say("Candidate explanations"), (_rivals(found),)),
+        Section(say("Candidate explanations"), (_rivals(result),)),
     )
     return tuple(section for section in sections if section.blocks)
 
 
-def _explained_by(found: Diagnosed) -> tuple[Text, Text]:
+def _explained_by(result: Diagnosed) -> tuple[Text, Text]:
     """What the recording is compared with, in short."""
-    if found.simulated is None:
-        return say("Effects that the job names"), commas(titles(found.job.facts.model.effects)) or say("none")
-    return say("Compared with the simulation"), commas(names(found.simulated.files))
+    if result.simulated is None:
+        return say("Effects that the job names"), commas(titles(result.job.facts.model.effects)) or say("none")
+    return say("Compared with the simulation"), commas(names(result.simulated.files))
 
 
-def _simulation(found: Diagnosed) -> tuple[Section, ...]:
-    if found.simulated is None:
+def _simulation(result: Diagnosed) -> tuple[Section, ...]:
+    if result.simulated is None:
         return ()
-    d = found.diagnosis
-    return (simulation_section(found.simulated, corrections(found.simulated, d.after, d.posterior)),)
+    d = result.diagnosis
+    return (simulation_section(result.simulated, corrections(result.simulated, d.after, d.posterior)),)
 
 
-def _left_out(found: Diagnosed) -> tuple[Block, ...]:
-    d = found.diagnosis
+def _left_out(result: Diagnosed) -> tuple[Block, ...]:
+    d = result.diagnosis
     if d.verdict == "consistent":
         return ()
-    blocks: list[Block] = [Paragraph(verdict_of(found))]
-    blocks += [_effect(found, item) for item in d.effects]
+    blocks: list[Block] = [Paragraph(verdict_of(result))]
+    blocks += [_effect(result, item) for item in d.effects]
     blocks += [Paragraph(text) for text in withheld_sentences(d.withheld)]
     blocks += [Paragraph(ambiguous(titles(group, d.after.effects)), tone="warning") for group in d.indistinguishable]
     return tuple(blocks)
 
 
-def _effect(found: Diagnosed, item: OmittedEffect) -> Facts:
+def _effect(result: Diagnosed, item: OmittedEffect) -> Facts:
     """One effect: what it is, how large, what to look at, how sure."""
-    d = found.diagnosis
+    d = result.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
-    told = (say("{size:capital}.", size=size), other_periods(item), contained(found.simulated, item.effect))
+    told = (say("{size:capital}.", size=size), other_periods(item), contained(result.simulated, item.effect))
     return Facts((
         (say("Effect"), item.title),
         (say("Size"), sentences(filter(None, told))),
@@ -156,28 +156,28 @@ def _effect(found: Diagnosed, item: OmittedEffect) -> Facts:
     ))  # fmt: skip
 
 
-def _consistent(found: Diagnosed) -> tuple[Block, ...]:
+def _consistent(result: Diagnosed) -> tuple[Block, ...]:
     """The residuals of a recording that agrees with its model: within their uncertainty, and no other picture."""
-    d = found.diagnosis
+    d = result.diagnosis
     if d.verdict != "consistent":
         return ()
-    left, expanded, odd = _residuals(d.before), _expanded(d), _odd(found)
+    left, expanded, odd = _residuals(d.before), _expanded(d), _odd(result)
     plot = residual_plot(
         d.before.artefact.measurement.astype(np.float64), left,
         expanded_um=expanded, reference=say("no residual"), flagged=odd, position_label=d.before.artefact.set_up,
-        label=_label_before(found),
+        label=_label_before(result),
         caption=say(
             "Residual of each observation, with U (k = {k}) from the noise.",
             k=number(factor_of_noise(d.noise.coordinate), ".2f"),
         ),
         alternative=say("Residuals of {rms} µm rms.", rms=alike(d.improvement.rms_before_um)[0]),
     )  # fmt: skip
-    return Paragraph(verdict_of(found)), plot
+    return Paragraph(verdict_of(result)), plot
 
 
-def _before_after(found: Diagnosed) -> tuple[Block, ...]:
+def _before_after(result: Diagnosed) -> tuple[Block, ...]:
     """Where something was found: each observation before and after, and what is gained."""
-    d = found.diagnosis
+    d = result.diagnosis
     if not d.effects:
         return ()
     expanded, gain = _expanded(d), d.improvement
@@ -189,9 +189,9 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
         expanded_before_um=expanded,
         expanded_after_um=expanded,
         reference=say("no residual"),
-        flagged=_odd(found),
+        flagged=_odd(result),
         position_label=d.before.artefact.set_up,
-        before_label=_label_before(found),
+        before_label=_label_before(result),
         after_label=say("With what was left out"),
         caption=say(
             "Residual of each observation before and after, with U (k = {k}) from the noise.",
@@ -203,7 +203,7 @@ def _before_after(found: Diagnosed) -> tuple[Block, ...]:
         gain, say("Residual rms"), say("Rms on held-out {unseen}", unseen=gain.unseen),
         say("{unseen:capital} are left out with all their repeats; ± is one standard error.", unseen=gain.unseen),
     )  # fmt: skip
-    changes = _changes(found)
+    changes = _changes(result)
     return (plot, table, changes) if changes else (plot, table)
 
 
@@ -217,18 +217,18 @@ def _expanded(d: Diagnosis) -> Floats:
     return factor_of_noise(d.noise.coordinate) * d.noise.coordinate.value * d.before.artefact.noise_scale
 
 
-def _odd(found: Diagnosed) -> NDArray[np.bool_]:
+def _odd(result: Diagnosed) -> NDArray[np.bool_]:
     """(m,) whether the screening found the measurement odd."""
-    return np.isin(found.diagnosis.before.artefact.measurement, [m for f in found.findings for m in f.measurements])
+    return np.isin(result.diagnosis.before.artefact.measurement, [m for f in result.findings for m in f.measurements])
 
 
-def _label_before(found: Diagnosed) -> Text:
-    return say("Residuals of the job's model") if found.simulated is None else say("Recorded minus predicted")
+def _label_before(result: Diagnosed) -> Text:
+    return say("Residuals of the job's model") if result.simulated is None else say("Recorded minus predicted")
 
 
-def _changes(found: Diagnosed) -> Table | None:
+def _changes(result: Diagnosed) -> Table | None:
     """Estimates of the effects that the job names, before and after: how biased they were."""
-    d = found.diagnosis
+    d = result.diagnosis
     if not d.effects:
         return None
     before, after = (model.estimate().least_squares for model in (d.before, d.after))
@@ -260,13 +260,13 @@ def _title_of(key: tuple[str, str], model: MeasurementModel) -> Text:
     return parameter_title(owner, name, model.effects)
 
 
-def _consequences(found: Diagnosed) -> tuple[Block, ...]:
+def _consequences(result: Diagnosed) -> tuple[Block, ...]:
     """Figures and decisions of the recording, and of the same recording corrected for what was left out."""
-    if found.consequences is None:
+    if result.consequences is None:
         return ()
     blocks: list[Block] = []
     rows = []
-    for name, (before, after) in found.consequences.figures.items():
+    for name, (before, after) in result.consequences.figures.items():
         rows.append((TITLES[name], with_uncertainty(before), with_uncertainty(after), UNITS[name]))
     heads = (
         Column(say("Figure"), numeric=False),
@@ -289,7 +289,7 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
             OUTCOME_WORDS[before.outcome],
             OUTCOME_WORDS[after.outcome],
         )
-        for before, after in found.consequences.statements
+        for before, after in result.consequences.statements
     )
     if decisions:
         columns = tuple(
@@ -299,11 +299,11 @@ def _consequences(found: Diagnosed) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _rivals(found: Diagnosed) -> Table:
-    rows = tuple((title_of(name), probability(p)) for name, p in found.diagnosis.rivals)
+def _rivals(result: Diagnosed) -> Table:
+    rows = tuple((title_of(name), probability(p)) for name, p in result.diagnosis.rivals)
     heads = (Column(say("Explanation"), numeric=False), Column(say("Probability")))
     notes: list[Text] = [say("Nothing missing has the rest.")]
-    some, every = found.diagnosis.compared, int(found.diagnosis.before.used.sum())
+    some, every = result.diagnosis.compared, int(result.diagnosis.before.used.sum())
     if some < every:
         notes.append(say(
             "Explanations were compared on {some} of {every} observations, drawn at random; what is asserted was then "
@@ -313,9 +313,9 @@ def _rivals(found: Diagnosed) -> Table:
     return Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
 
 
-def diagnosed_outcome(found: Diagnosed) -> Outcome:
-    short = summary_of(found.job.facts, found.diagnosis.verdict, summary_lines(found), found.findings)
-    with lettered_in(found.job.facts.job.language):
-        document = diagnosis_document(found)
-    consistent = found.diagnosis.verdict == "consistent"
-    return Outcome(found, lambda: document, diagnosis_results(found), short, document.warnings, in_order=consistent)
+def diagnosed_outcome(result: Diagnosed) -> Outcome:
+    short = summary_of(result.job.facts, result.diagnosis.verdict, summary_lines(result), result.findings)
+    with lettered_in(result.job.facts.job.language):
+        document = diagnosis_document(result)
+    consistent = result.diagnosis.verdict == "consistent"
+    return Outcome(result, lambda: document, diagnosis_results(result), short, document.warnings, in_order=consistent)

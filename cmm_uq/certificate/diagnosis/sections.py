@@ -44,27 +44,27 @@ _PARTED = 3.0  # odds from which on two are parted at all
 TO_FILL_IN = "next_plan.csv"  # file that a diagnosis writes the set-ups to
 
 
-def next_section(found: Diagnosed) -> Section:
+def next_section(result: Diagnosed) -> Section:
     """The set-ups that would part what this recording cannot, or show what it could not have shown."""
-    title, plan = say("What to measure next"), found.next_plan
+    title, plan = say("What to measure next"), result.next_plan
     if plan is None:
         return Section(title, ())
-    blocks: list[Block] = [Paragraph(_what(found, plan)), _set_ups(plan)]
+    blocks: list[Block] = [Paragraph(_what(result, plan)), _set_ups(plan)]
     if plan.partings:
         blocks.append(_partings(plan))
     if plan.shown:
-        blocks.append(_shown(plan, found.diagnosis.after.artefact))
+        blocks.append(_shown(plan, result.diagnosis.after.artefact))
     return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
 
 
-def next_sentence(found: Diagnosed) -> Text:
+def next_sentence(result: Diagnosed) -> Text:
     """The set-ups in a sentence, with the odds that they are expected to reach; nothing without any."""
-    plan = found.next_plan
+    plan = result.next_plan
     if plan is None:
         return NOTHING
     ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.placings)
     told = say(
-        "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(found, plan), ends=ends
+        "Measure next: {what} First and last point in scale readings: {ends}.", what=_what(result, plan), ends=ends
     )
     if not plan.partings:
         return told
@@ -86,12 +86,12 @@ def next_sentence(found: Diagnosed) -> Text:
     return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
 
 
-def _what(found: Diagnosed, plan: NextPlan) -> Text:
+def _what(result: Diagnosed, plan: NextPlan) -> Text:
     times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
     count = plural(len(plan.placings), one=say("one set-up"), many=say("{count} set-ups", count=len(plan.placings)))
     what = say(
         "{count:capital} more of the {artefact:small}, each measured {times}, added to this recording.", count=count,
-        artefact=found.diagnosis.before.artefact.title, times=times,
+        artefact=result.diagnosis.before.artefact.title, times=times,
     )  # fmt: skip
     if plan.reached:
         return what
@@ -140,9 +140,9 @@ def _shown(plan: NextPlan, artefact: Artefact) -> Table:
     return Table(say("What the set-ups show"), heads, tuple(rows), (note,))
 
 
-def _acting(one: DetectionChange, artefact: Artefact) -> Effect:
+def _acting(change: DetectionChange, artefact: Artefact) -> Effect:
     """The effect with the sizes that this artefact allows it, where it is a fault of its own."""
-    return artefact.acting(every()[one.effect])
+    return artefact.acting(every()[change.effect])
 
 
 def _amplitude(effect: Effect, size: float) -> Text:
@@ -168,22 +168,23 @@ def next_data(plan: NextPlan | None, artefact: Artefact) -> dict[str, Any] | Non
     }
 
 
-def _shown_data(one: DetectionChange, effect: Effect) -> dict[str, Any]:
+def _shown_data(change: DetectionChange, effect: Effect) -> dict[str, Any]:
     parameter = effect.coefficients[0]
     before, after = (
-        size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None for size in (one.before, one.after)
+        size * parameter.prior_sd if np.isfinite(size) and size <= ALLOWED else None
+        for size in (change.before, change.after)
     )
     name = effect.reported[0].name
-    return {"effect": one.effect, "parameter": name, "detected_before": before, "detected_after": after}
+    return {"effect": change.effect, "parameter": name, "detected_before": before, "detected_after": after}
 
 
 _SHOWN = 4  # explanations that a table has columns for
 
 
-def costs_section(found: Diagnosed) -> Section:
+def costs_section(result: Diagnosed) -> Section:
     """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
-    title, rivals = say("What the choice of an explanation costs"), found.diagnosis.remaining.rivals
-    rows = tuple(_cost_rows(found)) if rivals else ()
+    title, rivals = say("What the choice of an explanation costs"), result.diagnosis.remaining.rivals
+    rows = tuple(_cost_rows(result)) if rivals else ()
     if not rows:  # as against a simulation, where no effect of the job takes part
         return Section(title, ())
     heads = (
@@ -214,9 +215,9 @@ def costs_section(found: Diagnosed) -> Section:
     return Section(title, (Table(say("What follows from each explanation that remains"), heads, rows, tuple(notes)),))
 
 
-def costs_data(found: Diagnosed) -> dict[str, Any]:
+def costs_data(result: Diagnosed) -> dict[str, Any]:
     """For results.json: what remains, and the average; nothing where one explanation is settled."""
-    remaining, costs = found.diagnosis.remaining, found.costs
+    remaining, costs = result.diagnosis.remaining, result.costs
     if not remaining.rivals:
         return {}
     each: list[dict[str, Any]] = []
@@ -241,9 +242,9 @@ def explanation(rival: Rival) -> Text:
     return commas(words) if words else say("nothing missing")
 
 
-def _cost_rows(found: Diagnosed) -> Iterator[tuple[Text, ...]]:
+def _cost_rows(result: Diagnosed) -> Iterator[tuple[Text, ...]]:
     """Of what the job names, of every figure and of every decision: under each explanation, and averaged."""
-    remaining, costs = found.diagnosis.remaining, found.costs
+    remaining, costs = result.diagnosis.remaining, result.costs
     for effect, parameters in remaining.averaged.items():
         for name, quantity in parameters.items():
             each = (with_uncertainty(rival.named[effect][name]) for rival in remaining.rivals[:_SHOWN])
@@ -277,12 +278,12 @@ _NAMED = 5  # effects that the sentence beside the verdict names
 _RANGES = 3
 
 
-def without_power(found: Diagnosed) -> Text:
+def without_power(result: Diagnosed) -> Text:
     """What follows a verdict of agreement where even a plausible common effect would not have shown; else nothing."""
-    if found.diagnosis.verdict != "consistent":
+    if result.diagnosis.verdict != "consistent":
         return NOTHING
     order = {name: i for i, name in enumerate(every())}
-    blind = sorted((row for row in found.unseen if row.blind), key=lambda row: order.get(row.effect, len(order)))
+    blind = sorted((row for row in result.unseen if row.blind), key=lambda row: order.get(row.effect, len(order)))
     if not blind:
         return NOTHING
     words = [
@@ -299,7 +300,7 @@ def without_power(found: Diagnosed) -> Text:
     return say("But this recording could not have shown: {effects}.", effects=listed(words))
 
 
-def unseen_section(found: Diagnosed) -> Section:
+def unseen_section(result: Diagnosed) -> Section:
     """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
     rows = tuple(
         (
@@ -309,7 +310,7 @@ def unseen_section(found: Diagnosed) -> Section:
             _size(row.allowed, row.unit),
             _why(row),
         )
-        for row in found.unseen
+        for row in result.unseen
         if row.common or not row.shown
     )
     if not rows:
@@ -326,7 +327,7 @@ def unseen_section(found: Diagnosed) -> Section:
             power=100 * POWER,
         ),
     )
-    beside = without_power(found)
+    beside = without_power(result)
     head = (Paragraph(beside, tone="warning"),) if beside else ()
     return Section(
         say("What would not have been seen"),

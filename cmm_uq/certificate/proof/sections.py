@@ -118,7 +118,7 @@ def _faults(proof: DiagnosisProof) -> list[Text]:
 _HEIGHT_MM = 72
 
 
-def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], found: DetectionCurve) -> Plot:
+def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], curve: DetectionCurve) -> Plot:
     """Part of the hidden effects that is found, by their strength, with the fitted curve."""
     counted = [(low, high, rate) for low, high, rate in in_bins if rate.of]
     middle = np.array([0.5 * (low + high) for low, high, _ in counted])
@@ -127,13 +127,13 @@ def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], found: Detecti
         figure = new_figure(_HEIGHT_MM)
         ax = figure.subplots()
         figure.subplots_adjust(left=0.09, right=0.985, bottom=0.15, top=0.96)
-        across = np.append(found.strengths, found.strengths[::-1])
-        ax.fill(across, 100 * np.append(found.low, found.high[::-1]), color=BAND, lw=0, zorder=0)
-        ax.plot(found.strengths, 100 * found.curve, color=ACCENT, lw=1.3)
+        across = np.append(curve.strengths, curve.strengths[::-1])
+        ax.fill(across, 100 * np.append(curve.low, curve.high[::-1]), color=BAND, lw=0, zorder=0)
+        ax.plot(curve.strengths, 100 * curve.curve, color=ACCENT, lw=1.3)
         ax.axhline(100 * OFTEN, color=MUTED, lw=0.6, ls=(0, (4, 3)), zorder=1)
         bars(ax, middle, low, high, 1.0, INK)
         dots(ax, middle, share, 4.0, INK)
-        ax.set(xlim=(found.strengths[0] - 0.5, found.strengths[-1] + 0.5), ylim=(-3, 103))
+        ax.set(xlim=(curve.strengths[0] - 0.5, curve.strengths[-1] + 0.5), ylim=(-3, 103))
         ax.grid(axis="y")
         ax.set_xlabel(say("Strength √λ of the hidden effect"))
         ax.set_ylabel(say("Found / %"))
@@ -142,7 +142,7 @@ def strength_plot(in_bins: tuple[tuple[float, float, Rate], ...], found: Detecti
             say("Hidden effects that were found, by strength: counted with 95 % intervals, and the fitted curve with its "
                 "band; the broken line is nine in ten."),
             say("Share of hidden effects found, growing with their strength from {low:g} to {high:g}.",
-                low=float(found.strengths[0]), high=float(found.strengths[-1])),
+                low=float(curve.strengths[0]), high=float(curve.strengths[-1])),
         )  # fmt: skip
 
 

@@ -103,27 +103,27 @@ def in_words(rate: Rate) -> Text:
                interval=interval(rate))  # fmt: skip
 
 
-def limits(one: AcceptanceFigure) -> Text:
-    if one.low == 0:
-        return say("at most {high:g} %", high=100 * one.high)
-    if one.high == 1:
-        return say("at least {low:g} %", low=100 * one.low)
-    return say("{low:g} to {high:g} %", low=100 * one.low, high=100 * one.high)
+def limits(figure: AcceptanceFigure) -> Text:
+    if figure.low == 0:
+        return say("at most {high:g} %", high=100 * figure.high)
+    if figure.high == 1:
+        return say("at least {low:g} %", low=100 * figure.low)
+    return say("{low:g} to {high:g} %", low=100 * figure.low, high=100 * figure.high)
 
 
-def standing(one: AcceptanceFigure) -> Text:
+def standing(figure: AcceptanceFigure) -> Text:
     """Whether it is kept, and what would decide it."""
-    told = STANDING_WORDS[one.standing]
-    if one.standing == OPEN and one.kept and one.cases is not None and one.rate.of < one.cases:
+    told = STANDING_WORDS[figure.standing]
+    if figure.standing == OPEN and figure.kept and figure.cases is not None and figure.rate.of < figure.cases:
         return say(
             "{told}; counted within the limit; {needed} cases of this sort without one would show it",
             told=told,
-            needed=one.cases,
+            needed=figure.cases,
         )
-    if one.standing == OPEN and one.rate.of:
+    if figure.standing == OPEN and figure.rate.of:
         return (
             say("{told}; counted within the limits", told=told)
-            if one.kept
+            if figure.kept
             else say("{told}; counted outside the limits", told=told)
         )
     return told

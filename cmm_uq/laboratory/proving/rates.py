@@ -130,13 +130,13 @@ class DetectionCurve:
     high: Floats
 
 
-def detection_curve(strengths: Sequence[float], found: Sequence[bool]) -> DetectionCurve | None:
+def detection_curve(strengths: Sequence[float], detected: Sequence[bool]) -> DetectionCurve | None:
     """How it grows with strength, from what was hidden and what was found; ``None`` of too few."""
     if len(strengths) < FEWEST:
         return None
     m, b = (grid.ravel() for grid in np.meshgrid(_MIDDLE, _SLOPE, indexing="ij"))
     z = b[:, None] * (np.asarray(strengths, dtype=np.float64) - m[:, None])
-    log = np.where(np.asarray(found, dtype=bool), -np.logaddexp(0, -z), -np.logaddexp(0, z)).sum(axis=1)
+    log = np.where(np.asarray(detected, dtype=bool), -np.logaddexp(0, -z), -np.logaddexp(0, z)).sum(axis=1)
     weight = np.exp(log - log.max())
     weight /= weight.sum()
     often = m + np.log(OFTEN / (1 - OFTEN)) / b

@@ -44,7 +44,7 @@ def diagnosed(
         combinations=SimpleNamespace(instead=lambda chosen, index: instead),
     )  # fmt: skip
     noise = SimpleNamespace(placing=SimpleNamespace(value=0.0), coordinate=SimpleNamespace(value=1.0))
-    return SimpleNamespace(after=after, indistinguishable=(group,) if group else (), found=found, noise=noise)
+    return SimpleNamespace(after=after, indistinguishable=(group,) if group else (), search=found, noise=noise)
 
 
 def planned(found: Any, facts: ArtefactFacts, wanted: tuple[DetectionGoal, ...] = ()) -> NextPlan | None:

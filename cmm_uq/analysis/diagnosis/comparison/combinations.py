@@ -44,20 +44,24 @@ class Combination:
 class Combinations:
     """All combinations worth following.
 
-    ``explanations`` of which they are made; ``found`` by the indices of their explanations; ``counts`` probability,
+    ``explanations`` of which they are made; ``by_key`` by the indices of their explanations; ``counts`` probability,
     beforehand, of none, one, two … known effects that act by themselves; ``imitated`` nonparametric terms that leave
     next to nothing of an effect in this recording.
     """
 
     explanations: Sequence[Explanation]
-    found: Mapping[Key, Combination]
+    by_key: Mapping[Key, Combination]
     counts: tuple[float, ...] = EFFECTS
     imitated: Mapping[int, Key] = field(default_factory=dict)
 
     @cached_property
     def probability(self) -> dict[Key, float]:
-        log = np.array([c.log_posterior for c in self.found.values()])
-        return dict(zip(self.found, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
+        log = np.array([c.log_posterior for c in self.by_key.values()])
+        return dict(zip(self.by_key, np.exp(log - special.logsumexp(log)).tolist(), strict=True))
+
+    def likeliest(self, keys: Iterable[Key]) -> Key:
+        """The most probable of some combinations."""
+        return max(keys, key=lambda key: self.by_key[key].log_posterior)
 
     def effects_of(self, key: Key) -> Key:
         return frozenset(i for i in key if self.explanations[i].kind == EFFECT)
@@ -78,12 +82,12 @@ class Combinations:
     @property
     def most_members(self) -> int:
         """How many explanations, unknown functions too, the most probable combination has."""
-        return len(max(self.found, key=lambda key: self.found[key].log_posterior))
+        return len(self.likeliest(self.by_key))
 
     def versions(self, effects: Key) -> tuple[Version, ...]:
         """Of the most probable combination with these known effects, or more."""
-        keys = [key for key in self.found if self.effects_of(key) >= effects]
-        return self.found[max(keys, key=lambda key: self.found[key].log_posterior)].versions
+        keys = [key for key in self.by_key if self.effects_of(key) >= effects]
+        return self.by_key[self.likeliest(keys)].versions
 
     def imitating(self, index: int) -> Key:
         """Nonparametric terms that could pass for an effect: by its form, or in this recording."""
@@ -99,8 +103,8 @@ class Combinations:
     def of(self, index: int) -> float:
         return self.of_any(frozenset((index,)))
 
-    def of_any(self, those: Key) -> float:
-        return min(1.0, float(sum(p for key, p in self.probability.items() if those & key)))
+    def of_any(self, explanations: Key) -> float:
+        return min(1.0, float(sum(p for key, p in self.probability.items() if explanations & key)))
 
     def instead(self, effects: Key, index: int) -> dict[int, float]:
         """Odds of each other known effect in the place of one, or of one and more, the rest kept.
@@ -157,7 +161,7 @@ def _explored(
     known = (
         {}
         if before is None
-        else {key: one for key, one in before.found.items() if not key & changed and np.isfinite(one.log_posterior)}
+        else {key: one for key, one in before.by_key.items() if not key & changed and np.isfinite(one.log_posterior)}
     )  # one of more effects than were looked for may be possible now
     search = _Search(comparison, known, counts)
     search.climb(frozenset())

@@ -193,7 +193,7 @@ class Conditioning:
     by_noise: Callable[[Floats], Floats]
 
     def beside(
-        self, given: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool
+        self, conditions: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool
     ) -> ConditionedData:
         """Data beside explanations at their sizes.
 
@@ -201,10 +201,10 @@ class Conditioning:
         noise; ``own`` whether the data are the recording's, so that inner products with them are kept.
         """
         squares = np.einsum("mb,kmb->kb", plain, weighed)
-        if not given:
+        if not conditions:
             none = np.zeros((len(weighed), 0, len(plain)))
             return ConditionedData(weighed, none, none @ plain, squares, log, () if own else None)
-        order, rows, mixing, logs = self._rows(given)
+        order, rows, mixing, logs = self._rows(conditions)
         seen = rows @ plain
         made_of = None
         if own and _FEW * mixing.shape[2] <= len(plain):
@@ -220,7 +220,7 @@ class Conditioning:
         """Of a version (m, r), for coefficients of one."""
         return self.stack[:, self.where[version.explanation, version.member]]
 
-    def _rows(self, given: Sequence[Version]) -> tuple[list[Version], Floats, Floats, Floats]:
+    def _rows(self, conditions: Sequence[Version]) -> tuple[list[Version], Floats, Floats, Floats]:
         """Rows (k, g, m) of what is given (see :class:`ConditionedData`).
 
         The widest comes first and by its principal axes, of which a search, that gives it again and again at several sizes,
@@ -229,7 +229,7 @@ class Conditioning:
         Gives the versions in this order; the rows; as factors (k, g, r) of the members' weighed columns or principal
         axes; half the logarithm (k,) of the determinant.
         """
-        order = list(given)
+        order = list(conditions)
         widest = max(order, key=lambda version: self.columns(version).shape[1])
         wide = self.columns(widest).shape[1]
         if wide < _WIDE:
@@ -252,17 +252,17 @@ class Conditioning:
             logs + own,
         )
 
-    def _joined(self, given: Sequence[Version], rows: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+    def _joined(self, conditions: Sequence[Version], rows: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """Rows (k, g, m) of versions beside rows (k, h, m), what they are made of (k, g, h + g), and half the logarithm."""
-        taken = np.hstack([version.amplitude * self.columns(version) for version in given])
-        weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in given], axis=2)
+        taken = np.hstack([version.amplitude * self.columns(version) for version in conditions])
+        weighed = np.concatenate([v.amplitude * self._weighed_columns(v) for v in conditions], axis=2)
         before = np.zeros((len(weighed), 0, taken.shape[1]))
         if rows is not None:
             before = rows @ taken
             weighed = weighed - rows.swapaxes(1, 2) @ before
         factor = np.linalg.cholesky(np.eye(taken.shape[1]) + taken.T @ weighed)
         inverse = np.linalg.inv(factor)
-        sizes = np.concatenate([np.full(self.columns(v).shape[1], v.amplitude) for v in given])
+        sizes = np.concatenate([np.full(self.columns(v).shape[1], v.amplitude) for v in conditions])
         mixing = np.concatenate([-inverse @ before.swapaxes(1, 2), inverse * sizes], axis=2)
         logs = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
         return inverse @ weighed.swapaxes(1, 2), mixing, logs

@@ -190,13 +190,13 @@ class CandidateComparison:
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def log_evidence(
-        self, left: Floats | None = None, given: Sequence[Version] = (), among: Container[int] | None = None
+        self, left: Floats | None = None, conditions: Sequence[Version] = (), among: Container[int] | None = None
     ) -> tuple[Floats, Floats]:
         """Log evidence (b,) of what is given, and (c, b) of each explanation beside it.
 
         ``left`` (m, b) data, by default the recording's.
         """
-        known = self._beside(left, given)
+        known = self._beside(left, conditions)
         return self._of_given(known), self._total(known, among)
 
     def _total(self, known: ConditionedData, among: Container[int] | None = None) -> Floats:
@@ -208,14 +208,14 @@ class CandidateComparison:
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first, axis=0))
         return total
 
-    def of_versions(self, index: int, given: Sequence[Version] = ()) -> tuple[Ints, Floats, Floats]:
+    def of_versions(self, index: int, conditions: Sequence[Version] = ()) -> tuple[Ints, Floats, Floats]:
         """Visible versions (v,) of an explanation, log evidence of each beside what is given, and its log weight.
 
         Their sizes are summed.
         """
         found = [
             (group.member, special.logsumexp(cube[:, :, 0], axis=1), group.weight)
-            for group, cube in self.each(None, given, (index,))
+            for group, cube in self.each(None, conditions, (index,))
         ]
         if not found:
             return np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0)
@@ -238,19 +238,21 @@ class CandidateComparison:
         return self._total(known) - self._of_given(known)
 
     def beside(
-        self, given: Sequence[Version] = (), among: Collection[int] | None = None
+        self, conditions: Sequence[Version] = (), among: Collection[int] | None = None
     ) -> dict[int, tuple[float, Version]]:
         """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
-        known = self._best.setdefault(frozenset(given), {})
+        known = self._best.setdefault(frozenset(conditions), {})
         if among is None or not known.keys() >= set(among):
-            found = self._beside_each(given, among)
+            found = self._beside_each(conditions, among)
             known.update(found if among is None else {i: found[i] for i in found.keys() & set(among)})
         return known
 
-    def _beside_each(self, given: Sequence[Version], among: Collection[int] | None) -> dict[int, tuple[float, Version]]:
+    def _beside_each(
+        self, conditions: Sequence[Version], among: Collection[int] | None
+    ) -> dict[int, tuple[float, Version]]:
         total = np.full(len(self.explanations), -np.inf)
         most, best = total.copy(), {}
-        for group, cube in self.each(None, given, among):
+        for group, cube in self.each(None, conditions, among):
             each = cube[:, :, 0]
             gains = log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
@@ -278,32 +280,32 @@ class CandidateComparison:
                 most[column] = flat[at[column], column]
         return found
 
-    def left_of(self, version: Version, given: Sequence[Version]) -> float:
+    def left_of(self, version: Version, conditions: Sequence[Version]) -> float:
         """Part of the squared visible length of a version that is left beside what is given."""
         columns = self._given.columns(version)
-        alone, beside = (self._weigh(columns, others).squares.sum(axis=1) for others in ((), given))
-        probability = self.noise_probability(given)
+        alone, beside = (self._weigh(columns, others).squares.sum(axis=1) for others in ((), conditions))
+        probability = self.noise_probability(conditions)
         return float(probability @ beside / max(float(probability @ alone), 1e-300))
 
-    def log_evidence_of(self, given: Sequence[Version], left: Floats | None = None) -> Floats:
+    def log_evidence_of(self, conditions: Sequence[Version], left: Floats | None = None) -> Floats:
         """Log evidence (b,) of what is given, at its size, for data (m, b)."""
-        return self._of_given(self._beside(left, given))
+        return self._of_given(self._beside(left, conditions))
 
     def _of_given(self, known: ConditionedData) -> Floats:
         """Log evidence (b,) of what data are beside."""
         return log_sum(self._integral(known.squares.copy()) + known.log[:, None], 0)
 
-    def noise_probability(self, given: Sequence[Version]) -> Floats:
+    def noise_probability(self, conditions: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
-        known = self._beside(None, given)
+        known = self._beside(None, conditions)
         log = self._integral(known.squares.copy())[:, 0] + known.log
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def each(
-        self, data: Floats | None, given: Sequence[Version], among: Container[int] | None = None
+        self, data: Floats | None, conditions: Sequence[Version], among: Container[int] | None = None
     ) -> Iterator[tuple[MemberGroup, Floats]]:
         """Log evidence (M, a, b) of members at every size beside what is given, by groups; ``among`` are wanted at least."""
-        yield from self._each(self._beside(data, given), among)
+        yield from self._each(self._beside(data, conditions), among)
 
     def _each(
         self, known: ConditionedData, among: Container[int] | None, *, sizes: bool = True
@@ -390,24 +392,24 @@ class CandidateComparison:
         log = self._integral.beside(known.squares, gain, square, constant, sizes=sizes)
         return log.reshape(len(amplitudes), -1, b)
 
-    def _beside(self, data: Floats | None, given: Sequence[Version]) -> ConditionedData:
+    def _beside(self, data: Floats | None, conditions: Sequence[Version]) -> ConditionedData:
         """Data (m, b), the recording's by default, weighed by each kind of noise and what is given."""
         if data is not None:
-            return self._weigh(data, given)
-        kept, key = self._weighed, frozenset(given)
+            return self._weigh(data, conditions)
+        kept, key = self._weighed, frozenset(conditions)
         if key not in kept:
-            new = self._weigh(None, given)
+            new = self._weigh(None, conditions)
             most = max(1, _KEPT // (len(new.squares) * len(self.left) * new.width))
             while len(kept) >= most:
                 del kept[next(iter(kept))]
             kept[key] = new
         return kept[key]
 
-    def _weigh(self, data: Floats | None, given: Sequence[Version]) -> ConditionedData:
+    def _weigh(self, data: Floats | None, conditions: Sequence[Version]) -> ConditionedData:
         own = data is None
         plain, weighed = (self.left[:, None], self._left_weighed) if data is None else (data, self._by_noise(data))
         log = np.array([noise.log for noise in self._noises])
-        return self._given.beside(given, plain, weighed, log, own=own)
+        return self._given.beside(conditions, plain, weighed, log, own=own)
 
     @cached_property
     def _given(self) -> Conditioning:

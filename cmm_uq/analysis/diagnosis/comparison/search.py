@@ -167,35 +167,35 @@ def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated:
     return SearchResult(first, last, combinations, chosen, versions, found, beside, rough, stated)
 
 
-def withhold(found: SearchResult, gone: Key) -> SearchResult:
+def withhold(result: SearchResult, withheld: Key) -> SearchResult:
     """The same search with some of the effects not asserted: what they stood for stays unexplained."""
-    chosen = found.chosen - gone
-    combinations = found.combinations
-    if combinations is None or not gone:
-        return found
+    chosen = result.chosen - withheld
+    combinations = result.combinations
+    if combinations is None or not withheld:
+        return result
     versions = combinations.versions(chosen)
-    model = with_effects(found.first, versions, chosen) if chosen else found.first.model
-    last = comparison_of(model, found.stated, ()) if chosen else found.first.comparison
+    model = with_effects(result.first, versions, chosen) if chosen else result.first.model
+    last = comparison_of(model, result.stated, ()) if chosen else result.first.comparison
     return replace(
-        found, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=found.rough - gone
+        result, last=last, chosen=chosen, versions=versions, model=model, unexplained=1.0, rough=result.rough - withheld
     )
 
 
-def substitute(found: SearchResult, index: int, tried: Key) -> tuple[SearchResult, int] | None:
+def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResult, int] | None:
     """The same search with the next most probable in the place of an effect, and which that is; ``None`` where none may be.
 
     It is one that these data cannot tell from it, is probable enough to be named, and has with all such one half, as any.
     """
-    combinations = found.combinations
+    combinations = result.combinations
     if combinations is None:
         return None
-    for other in sorted(rivals_of(combinations, found.chosen, index) - tried, key=lambda i: -combinations.of(i)):
-        chosen = found.chosen - {index} | {other}
-        if chosen not in combinations.of_effects or found.first.explanations[other].shaped:
+    for other in sorted(rivals_of(combinations, result.chosen, index) - tried, key=lambda i: -combinations.of(i)):
+        chosen = result.chosen - {index} | {other}
+        if chosen not in combinations.of_effects or result.first.explanations[other].shaped:
             continue
         if combinations.of(other) >= _MECHANISM and probability_with_rivals(combinations, chosen, other) >= ASSERTED:
-            instead = _of(found.first, combinations, chosen, found.stated)
-            return replace(instead, unexplained=max(instead.unexplained, found.unexplained)), other
+            instead = _of(result.first, combinations, chosen, result.stated)
+            return replace(instead, unexplained=max(instead.unexplained, result.unexplained)), other
     return None
 
 
@@ -212,17 +212,15 @@ def _shaped(combinations: Combinations) -> set[int]:
     return {
         version.explanation
         for key, probability in combinations.probability.items()
-        for version in (combinations.found[key].versions if probability > _PROBABLE else ())
+        for version in (combinations.by_key[key].versions if probability > _PROBABLE else ())
         if combinations.explanations[version.explanation].members[version.member].shape
     }
 
 
 def _refined(first: ModelComparison, combinations: Combinations, index: int) -> Explanation:
     """An effect with a nonlinear parameter, finer wherever that fits beside what is most probable with it, however short."""
-    most = max(
-        (key for key in combinations.found if index in key), key=lambda key: combinations.found[key].log_posterior
-    )
-    others = [v for v in combinations.found[most].versions if v.explanation != index]
+    most = combinations.likeliest(key for key in combinations.by_key if index in key)
+    others = [v for v in combinations.by_key[most].versions if v.explanation != index]
     explanation = first.explanations[index]
     gains = _gains(first, explanation, others)
     shows = bool(gains.max() > _SHOWN)
@@ -297,9 +295,8 @@ def _imitated(comparison: CandidateComparison, combinations: Combinations) -> di
 
 def _version(combinations: Combinations, index: int) -> Version:
     """The version of an explanation in the most probable combination that contains it."""
-    keys = [key for key in combinations.found if index in key]
-    most = max(keys, key=lambda key: combinations.found[key].log_posterior)
-    return next(v for v in combinations.found[most].versions if v.explanation == index)
+    most = combinations.likeliest(key for key in combinations.by_key if index in key)
+    return next(v for v in combinations.by_key[most].versions if v.explanation == index)
 
 
 def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
