@@ -303,13 +303,7 @@ def without_power(result: Diagnosed) -> Text:
 def unseen_section(result: Diagnosed) -> Section:
     """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
     rows = tuple(
-        (
-            row.title,
-            _found(row, row.detected),
-            _found(row, row.named),
-            _size(row.allowed, row.unit),
-            _why(row),
-        )
+        (row.title, _found(row, row.detected), _found(row, row.named), _size(row.allowed, row.unit), _why(row))
         for row in result.unseen
         if row.common or not row.shown
     )

@@ -10,59 +10,30 @@ from typing import Any
 from cmm_uq.base.messages import DASH, Text, number, say
 from cmm_uq.certificate.diagnosis.overview import VERDICT_WORDS
 from cmm_uq.jobs.job import Job
-from cmm_uq.laboratory.proving.cases import (
-    ARTEFACT,
-    AXIS,
-    GROWING,
-    NOTHING,
-    ONE,
-    OUTSIDE,
-    OWN,
-    RESOLUTION,
-    SET_UP,
-    SLOWLY,
-    TAILS,
-    TWO,
-    WALKING,
-    WHITE,
-    canonical_json,
-    sha256_of,
-)
+from cmm_uq.laboratory.proving import cases, judgement
+from cmm_uq.laboratory.proving.cases import canonical_json, sha256_of
 from cmm_uq.laboratory.proving.design import Design
-from cmm_uq.laboratory.proving.judgement import (
-    MET,
-    MISSED,
-    NAMED,
-    NAMED_BESIDE,
-    NAMED_GROUPED,
-    NAMED_MISSED,
-    OPEN,
-    REFUSED,
-    STATED,
-    AcceptanceFigure,
-    Judgement,
-    acceptance_figures,
-)
+from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, AcceptanceFigure, Judgement, acceptance_figures
 from cmm_uq.laboratory.proving.rates import Rate
 from cmm_uq.laboratory.proving.reach import FaultReach, Reach, fault_reaches, reaches
 
 KIND_WORDS: Mapping[str, Text] = {
-    NOTHING: say("nothing"),
-    ONE: say("one effect"),
-    TWO: say("two effects"),
-    OUTSIDE: say("a function outside the catalogue"),
-    ARTEFACT: say("a fault of the artefact"),
+    cases.NOTHING: say("nothing"),
+    cases.ONE: say("one effect"),
+    cases.TWO: say("two effects"),
+    cases.OUTSIDE: say("a function outside the catalogue"),
+    cases.ARTEFACT: say("a fault of the artefact"),
 }
 NOISE_WORDS: Mapping[str, Text] = {
-    OWN: say("the job's own"),
-    WHITE: say("white"),
-    SET_UP: say("with set-up offsets"),
-    AXIS: say("one axis three times noisier"),
-    GROWING: say("growing with length"),
-    SLOWLY: say("with slow noise in time"),
-    WALKING: say("walking at random in time"),
-    TAILS: say("heavy tails"),
-    RESOLUTION: say("coarse display"),
+    cases.OWN: say("the job's own"),
+    cases.WHITE: say("white"),
+    cases.SET_UP: say("with set-up offsets"),
+    cases.AXIS: say("one axis three times noisier"),
+    cases.GROWING: say("growing with length"),
+    cases.SLOWLY: say("with slow noise in time"),
+    cases.WALKING: say("walking at random in time"),
+    cases.TAILS: say("heavy tails"),
+    cases.RESOLUTION: say("coarse display"),
 }
 FAULT_WORDS: Mapping[str, Text] = {
     "length": say("a wrong certified length"),
@@ -71,14 +42,18 @@ FAULT_WORDS: Mapping[str, Text] = {
     "warming": say("warming from one set-up to the next"),
 }
 INTERVAL_WORDS: Mapping[str, Text] = {
-    STATED: say("of effects that were found"),
-    NAMED: say("of what the job names, nothing hidden"),
-    NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
-    NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
-    NAMED_MISSED: say("of what the job names, something hidden not found"),
+    judgement.STATED: say("of effects that were found"),
+    judgement.NAMED: say("of what the job names, nothing hidden"),
+    judgement.NAMED_BESIDE: say("of what the job names, all that is hidden found and told apart"),
+    judgement.NAMED_GROUPED: say("of what the job names, something found only as one of a group"),
+    judgement.NAMED_MISSED: say("of what the job names, something hidden not found"),
 }
-ANSWER_WORDS: Mapping[str, Text] = {**VERDICT_WORDS, REFUSED: say("no answer")}
-STANDING_WORDS: Mapping[str, Text] = {MET: say("shown"), OPEN: say("too few cases to decide"), MISSED: say("missed")}
+ANSWER_WORDS: Mapping[str, Text] = {**VERDICT_WORDS, judgement.REFUSED: say("no answer")}
+STANDING_WORDS: Mapping[str, Text] = {
+    judgement.MET: say("shown"),
+    OPEN: say("too few cases to decide"),
+    MISSED: say("missed"),
+}
 
 
 def percent(rate: Rate) -> Text:

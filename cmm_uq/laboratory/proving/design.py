@@ -15,28 +15,8 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.laboratory.proving.cases import (
-    ARTEFACT,
-    AXIS,
-    CYCLE,
-    GROWING,
-    NOTHING,
-    ONE,
-    OUTSIDE,
-    OWN,
-    RESOLUTION,
-    SET_UP,
-    SLOWLY,
-    STRONGEST,
-    TAILS,
-    TWO,
-    WALKING,
-    WEAKEST,
-    WHITE,
-    Case,
-    HiddenEffect,
-    UnknownCause,
-)
+from cmm_uq.laboratory.proving import cases
+from cmm_uq.laboratory.proving.cases import Case, HiddenEffect, UnknownCause
 from cmm_uq.laboratory.proving.sensitivity import ALLOWED, Sensitivity, possible_effects, remaining_length, white_of
 from cmm_uq.laboratory.proving.unknown_causes import (
     FUNCTIONS,
@@ -93,9 +73,20 @@ class Design:
     def noises(self) -> tuple[str, ...]:
         """Kinds of noise that these set-ups could show, in the order of cases: every other one the job's own."""
         possible = noise_of(self.model, values=self.values).possible
-        asked = ((SET_UP, PLACING), (AXIS, AXIS_NOISE), (GROWING, GROWTH), (SLOWLY, SLOW), (WALKING, SLOW))
-        kinds = (WHITE, *(kind for kind, component in asked if component in possible), TAILS, RESOLUTION)
-        return tuple(each for kind in kinds for each in (OWN, kind))
+        asked = (
+            (cases.SET_UP, PLACING),
+            (cases.AXIS, AXIS_NOISE),
+            (cases.GROWING, GROWTH),
+            (cases.SLOWLY, SLOW),
+            (cases.WALKING, SLOW),
+        )
+        kinds = (
+            cases.WHITE,
+            *(kind for kind, component in asked if component in possible),
+            cases.TAILS,
+            cases.RESOLUTION,
+        )
+        return tuple(each for kind in kinds for each in (cases.OWN, kind))
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -105,7 +96,7 @@ class Design:
         return tuple(
             effect
             for effect in possible_effects(self.model)
-            if ALLOWED * reach[effect.name] >= WEAKEST and self._between(effect) is not None
+            if ALLOWED * reach[effect.name] >= cases.WEAKEST and self._between(effect) is not None
         )
 
     def _between(self, effect: Effect) -> list[tuple[float, float]] | None:
@@ -125,35 +116,35 @@ class Design:
         """The noise of a kind, as large as the job's own readings."""
         own, white = self.noise, white_of(self.noise)
         sigma = float(np.asarray(white.coordinate)[0])
-        if kind == AXIS:
+        if kind == cases.AXIS:
             worse = int(random.integers(3))
             x, y, z = (sigma * (_AXIS_TIMES if axis == worse else 1.0) for axis in range(3))
             return replace(white, coordinate=(x, y, z))
         time = self.model.artefact.points.columns.get("time_s", np.zeros(1))
         return {
-            OWN: own, WHITE: white, SET_UP: replace(white, placing=sigma),
-            GROWING: replace(white, growth=_GROWN_TIMES * sigma),
-            SLOWLY: replace(white, slow=sigma, slow_time_s=max(_SLOW_PART * float(np.ptp(time)), 1e-6)),
-            WALKING: replace(white, slow=_WALKED_TIMES * sigma, slow_time_s=inf),
-            TAILS: replace(white, tails=_DOF), RESOLUTION: replace(white, resolution=_STEP_TIMES * sigma),
+            cases.OWN: own, cases.WHITE: white, cases.SET_UP: replace(white, placing=sigma),
+            cases.GROWING: replace(white, growth=_GROWN_TIMES * sigma),
+            cases.SLOWLY: replace(white, slow=sigma, slow_time_s=max(_SLOW_PART * float(np.ptp(time)), 1e-6)),
+            cases.WALKING: replace(white, slow=_WALKED_TIMES * sigma, slow_time_s=inf),
+            cases.TAILS: replace(white, tails=_DOF), cases.RESOLUTION: replace(white, resolution=_STEP_TIMES * sigma),
         }[kind]  # fmt: skip
 
     def case(self, seed: int, number: int) -> Case:
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number, 0)))
-        cycle, place = divmod(number, len(CYCLE))
-        kind = CYCLE[place]
-        rank = cycle * CYCLE.count(kind) + CYCLE[:place].count(kind)
+        cycle, place = divmod(number, len(cases.CYCLE))
+        kind = cases.CYCLE[place]
+        rank = cycle * cases.CYCLE.count(kind) + cases.CYCLE[:place].count(kind)
         noise_kind = self.noises[rank % len(self.noises)]
         noise = self.noise_of_kind(noise_kind, random)
         case = Case(number, kind, noise_kind, noise, self._sizes(random))
         sight = self.sight(noise)
-        if kind in (OUTSIDE, ARTEFACT):
+        if kind in (cases.OUTSIDE, cases.ARTEFACT):
             stranger = self._stranger(sight, kind, random)
             if stranger is not None:
                 return replace(case, stranger=stranger)
-            kind = ONE
-        hidden = self._hidden(sight, 2 if kind == TWO else 1, seed, rank, random) if kind != NOTHING else ()
-        return replace(case, kind=(NOTHING, ONE, TWO)[len(hidden)], hidden=hidden)
+            kind = cases.ONE
+        hidden = self._hidden(sight, 2 if kind == cases.TWO else 1, seed, rank, random) if kind != cases.NOTHING else ()
+        return replace(case, kind=(cases.NOTHING, cases.ONE, cases.TWO)[len(hidden)], hidden=hidden)
 
     def _sizes(self, random: np.random.Generator) -> tuple[float, ...]:
         """True sizes: within the uncertainty of their certificate, or as estimated."""
@@ -190,10 +181,10 @@ class Design:
         for i, effect in enumerate(chosen):
             others = [column for j, column in enumerate(seen) if j != i]
             length = remaining_length(seen[i], np.column_stack(others)) if others else _length(seen[i])
-            most = min(STRONGEST, ALLOWED * length)
-            if most < WEAKEST:
+            most = min(cases.STRONGEST, ALLOWED * length)
+            if most < cases.WEAKEST:
                 return ()
-            strength = float(random.uniform(WEAKEST, most))
+            strength = float(random.uniform(cases.WEAKEST, most))
             prior = np.array([c.prior_sd for c in effect.coefficients])
             coefficients = strength / length * prior * ways[i] * random.choice([-1.0, 1.0])
             told = effect.to_reported(coefficients, np.array(shapes[i], dtype=np.float64))
@@ -204,9 +195,9 @@ class Design:
         """A cause outside the catalogue of which no single effect of it leaves too little to be seen."""
         faults = tuple(possible_faults(self.model))
         for _ in range(_ATTEMPTS):
-            what = str(random.choice(FUNCTIONS if kind == OUTSIDE else faults))
+            what = str(random.choice(FUNCTIONS if kind == cases.OUTSIDE else faults))
             found = self.stranger(sight, what, random)
-            if found is not None and found.left >= WEAKEST:
+            if found is not None and found.left >= cases.WEAKEST:
                 return found
         return None
 
@@ -222,7 +213,7 @@ class Design:
             number, frames = nodes(self.model.placed(self.values), self.model.artefact.points)
             drawn = random.standard_normal((int(number.max()) + 1, frames.shape[2]))
             errors = tuple(tuple(float(value) for value in row) for row in drawn)
-        strength = float(random.uniform(WEAKEST, STRONGEST))
+        strength = float(random.uniform(cases.WEAKEST, cases.STRONGEST))
         unit = UnknownCause(what, 1.0, strength, 0.0, "", form, errors)
         column = sight.seen(self.effect_of(unit).basis(self.model.artefact.points))[:, 0]
         length = _length(column)

@@ -89,7 +89,7 @@ def test_what_is_granted_is_as_good_as_what_a_certificate_leaves_open() -> None:
     given = Version(2, 0, 1.7)
     F = 1.7 * explanations[2].members[0].columns / c.noise_scale[:, None]
     other = replace(c, certified=F)
-    (alone, beside), (nothing, something) = c.log_evidence(given=[given]), other.log_evidence()
+    (alone, beside), (nothing, something) = c.log_evidence(conditions=[given]), other.log_evidence()
     assert alone == pytest.approx(nothing, abs=1e-8)
     assert np.delete(beside, 2) == pytest.approx(np.delete(something, 2), abs=1e-8)
 
