@@ -18,35 +18,23 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import MANY, Drawn, Raised, Repeated, one_by_one
 
-_STEP = 1e-3
-"""mm: of central differences, whose error is the square of step over radius."""
-
-_NEAR = 1e-2
-"""Of a feature's extent: how far points may be from those that it was prepared for."""
-
+_STEP = 1e-3  # mm: of central differences, whose error is the square of step over radius
+_NEAR = 1e-2  # of a feature's extent: how far points may be from those that it was prepared for
+# features that lie anywhere along their axis by their fit
 _SLIDING: tuple[FeatureKind, ...] = ("line", "circle", "cylinder", "cone")
-"""Features that lie anywhere along their axis by their fit."""
-
-VALUES = 8
-"""Numbers that a feature is told by: position (3), direction (3), diameter, half angle."""
+VALUES = 8  # numbers that a feature is told by: position (3), direction (3), diameter, half angle
 
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """A feature of N measurements, in the frame of the points.
+    """A feature of N measurements, in the frame of the points."""
 
-    Parameters
-    ----------
-    values : (N, 8) position, direction, diameter, half angle; zero where there is none.
-    form : (N,) form deviation, mm; (0,) where it was not asked for.
-    points : (N, n, 3) measured; (0, 0, 3) where they were not asked for.
-    members : of a common datum, each as what it fixes.
-    """
-
-    values: Floats
+    values: Floats  # (N, 8) position, direction, diameter, half angle; zero where there is none
+    # (N,) form deviation, mm; (0,) where it was not asked for
     form: Floats = field(default_factory=lambda: np.zeros(0))
+    # (N, n, 3) measured; (0, 0, 3) where they were not asked for
     points: Floats = field(default_factory=lambda: np.zeros((0, 0, 3)))
-    members: tuple[Features, ...] = ()
+    members: tuple[Features, ...] = ()  # of a common datum, each as what it fixes
 
     @property
     def position(self) -> Floats:
@@ -67,16 +55,8 @@ class Features:
 class ProbedFeature:
     """A feature to be associated many times.
 
-    Parameters
-    ----------
-    feature : of the plan.
-    points : (n, 3) its points as they are measured without any draw, mm.
-    association : how.
-    looked_at : the same feature at points that are near, whose preparation then serves for these too.
-
-    Raises
-    ------
-    CmmUqError : points that do not determine it.
+    ``points``: (n, 3) its points as they are measured without any draw, mm. ``association``: how. ``looked_at``: the same
+    feature at points that are near, whose preparation then serves for these too.
     """
 
     def __init__(
@@ -119,12 +99,7 @@ class ProbedFeature:
         return np.asarray(points @ self._plane.T) if self.feature.kind == "line" else points
 
     def of(self, displacements: Floats, *, with_points: bool = False) -> Features:
-        """Features of displacements (N, n, 3) from ``points``, mm, by the association itself; (N, n) along the normals.
-
-        Raises
-        ------
-        CmmUqError : displacements that are large against the feature.
-        """
+        """Features of displacements (N, n, 3) from ``points``, mm, by the association itself; (N, n) along the normals."""
         if displacements.ndim < self.points.ndim + 1:
             return self._of_raised(displacements, with_points=with_points)
         points = self.points + displacements if with_points else np.zeros((0, 0, 3))

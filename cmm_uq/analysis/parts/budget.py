@@ -26,43 +26,29 @@ from cmm_uq.analysis.parts.virtual import AtPose, Virtual, in_parts
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 
-DRAWS = 2**13
-"""Of each of the two samples; shares are then known to about one in a hundred."""
-
+DRAWS = 2**13  # of each of the two samples; shares are then known to about one in a hundred
 PLACE = "place on the table"
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """Shares of the variance of c characteristics.
+    """Shares of the variance of c characteristics."""
 
-    Attributes
-    ----------
-    characteristics : c names.
-    causes : g names; independent of each other.
-    first, total : (g, c) shares of the variance.
-    factors : f names of the machine's errors that its certificate states together.
-    within : (f, c) shares of each, by itself.
-    u : (c,) standard uncertainties in this sample, mm and rad.
-    """
-
-    characteristics: tuple[str, ...]
-    causes: tuple[str, ...]
+    characteristics: tuple[str, ...]  # c names
+    causes: tuple[str, ...]  # g names; independent of each other
+    # first, total: (g, c) shares of the variance
     first: Floats
     total: Floats
-    factors: tuple[str, ...]
-    within: Floats
-    u: Floats
+    factors: tuple[str, ...]  # f names of the machine's errors that its certificate states together
+    within: Floats  # (f, c) shares of each, by itself
+    u: Floats  # (c,) standard uncertainties in this sample, mm and rad
 
     def told(
         self, characteristic: str, named: Mapping[str, Text], least: float = 0.05
     ) -> tuple[tuple[str, float, Text], ...]:
         """What should be told beside a result, largest first: line or factor, its share, and why.
 
-        Parameters
-        ----------
-        named : by factor, why (:attr:`Virtual.named`).
-        least : share from which on it is told.
+        ``named``: by factor, why (:attr:`Virtual.named`).
         """
         column = self.characteristics.index(characteristic)
         shares = {line: self.share(line, column) for line in (*self.causes, *self.factors)}
@@ -149,28 +135,17 @@ def _within(causes: Sequence[Cause], drawn: Sequence[Floats], y: Floats) -> tupl
     return tuple(names), np.array(shares).reshape(len(names), y.shape[1])
 
 
-DISPLACED_DRAWS = 2_000
-"""A standard deviation is then known to two percent."""
-
-_BLOCK = 300_000
-"""Coordinates drawn at once."""
-
-_NEGLIGIBLE = 1e-9
-"""Of the largest, a singular value of rigid motions that points do not tell from others."""
+DISPLACED_DRAWS = 2_000  # A standard deviation is then known to two percent
+_BLOCK = 300_000  # coordinates drawn at once
+_NEGLIGIBLE = 1e-9  # of the largest, a singular value of rigid motions that points do not tell from others
 
 
 @dataclass(frozen=True, eq=False)
 class Displaced:
-    """Errors of points: indicated less true, in the frame of the part.
+    """Errors of points: indicated less true, in the frame of the part."""
 
-    Parameters
-    ----------
-    mean : (n, 3) mm.
-    covariance : (n, 3, 3) of each point, mm².
-    """
-
-    mean: Floats
-    covariance: Floats
+    mean: Floats  # (n, 3) mm
+    covariance: Floats  # (n, 3, 3) of each point, mm²
 
 
 def displaced(virtual: Virtual, draws: int = DISPLACED_DRAWS, seed: int = 0) -> Displaced:

@@ -38,23 +38,14 @@ from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.repeated import Repeated
 
-Key = tuple[str, Association]
-"""A feature by an association."""
-
+Key = tuple[str, Association]  # A feature by an association
+# cosine of the angle between two directions from which on they are meant to be parallel; its complement, at right angles
 _ALONG = 0.999
-"""Cosine of the angle between two directions from which on they are meant to be parallel; its complement, at right angles."""
-
-SECTION = 0.01
-"""mm: how far points of one section may lie apart along the datum's axis; of a plane, across it."""
-
-_COINCIDE = 1e-6
-"""mm and rad: a nominal distance or angle below which there is none."""
-
-_FEWEST_IN_SECTION = 3
-"""Points by which a section shows any runout beyond where the axis stands."""
-
+SECTION = 0.01  # mm: how far points of one section may lie apart along the datum's axis; of a plane, across it
+_COINCIDE = 1e-6  # mm and rad: a nominal distance or angle below which there is none
+_FEWEST_IN_SECTION = 3  # points by which a section shows any runout beyond where the axis stands
+# features whose axis is what a tolerance of orientation or location is of
 _ROUND: tuple[FeatureKind, ...] = ("line", "cylinder", "cone")
-"""Features whose axis is what a tolerance of orientation or location is of."""
 
 FORM_OF: Mapping[str, tuple[FeatureKind, ...]] = {
     "straightness": ("line",), "flatness": ("plane",), "roundness": ("circle",), "cylindricity": ("cylinder",),
@@ -65,36 +56,19 @@ FORM_OF: Mapping[str, tuple[FeatureKind, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Features and frames of N virtual measurements.
+    """Features and frames of N virtual measurements."""
 
-    Parameters
-    ----------
-    features : by name and association.
-    frames : of the part, by names of datums.
-    """
-
-    features: Mapping[Key, Features]
-    frames: Mapping[tuple[str, ...], Frame]
+    features: Mapping[Key, Features]  # by name and association
+    frames: Mapping[tuple[str, ...], Frame]  # of the part, by names of datums
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """How one characteristic follows from features.
-
-    Parameters
-    ----------
-    characteristic : that it is.
-    plan : in which it is.
-    nominal : values of its features, without errors, by name.
-
-    Raises
-    ------
-    CmmUqError : a characteristic that these features and datums do not have.
-    """
+    """How one characteristic follows from features."""
 
     characteristic: Characteristic
-    plan: Plan
-    nominal: Mapping[str, Features]
+    plan: Plan  # in which it is
+    nominal: Mapping[str, Features]  # values of its features, without errors, by name
 
     def __post_init__(self) -> None:
         _refuse(self.characteristic, self.plan)
@@ -181,12 +155,7 @@ class Evaluation:
         return tuple(rows for rows in np.split(order, ends) if len(rows) >= _FEWEST_IN_SECTION)
 
     def refuse_unfit(self) -> None:
-        """Refuse what only the nominal points show.
-
-        Raises
-        ------
-        CmmUqError : no section of a circular runout has three points.
-        """
+        """Refuse what only the nominal points show."""
         if self.characteristic.what in RUNOUTS and not self.sections:
             raise CmmUqError(f"no section of {self.feature.name!r} has {_FEWEST_IN_SECTION} points",
                              where=f"characteristic {self.characteristic.name!r}",

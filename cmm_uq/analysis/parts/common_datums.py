@@ -19,36 +19,19 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
 _ROUNDS = 100
-
-_SETTLED = 1e-11
-"""Of the extent of the points: a step below which the least squares are reached."""
-
-_UNSEEN = 1e-6
-"""Singular value, of the largest, below which the points do not see a motion."""
-
-_KEPT = 1e-3
-"""By how much a motion that is not seen may move a datum, of what the points as a whole would move."""
-
-_BLOCK = 50_000
-"""Points worked on together, so that their derivatives take some tens of megabytes."""
-
-_THREE = 3
-"""Numbers of a shift; as many follow of a rotation."""
-
+_SETTLED = 1e-11  # of the extent of the points: a step below which the least squares are reached
+_UNSEEN = 1e-6  # singular value, of the largest, below which the points do not see a motion
+_KEPT = 1e-3  # by how much a motion that is not seen may move a datum, of what the points as a whole would move
+_BLOCK = 50_000  # points worked on together, so that their derivatives take some tens of megabytes
+_THREE = 3  # numbers of a shift; as many follow of a rotation
 _Surface = Callable[[Feature, Floats], tuple[Floats, Floats]]
 
 
 class ProbedCommon(ProbedFeature):
     """A common datum to be associated many times; its values are shift and rotation vector of the whole.
 
-    Parameters
-    ----------
-    feature : of the plan, with members.
-    points : (n, 3) points of all members as they are measured without any draw, mm.
-
-    Raises
-    ------
-    CmmUqError : members that say no common place, or whose points do not settle.
+    ``feature``: of the plan, with members. ``points``: (n, 3) points of all members as they are measured without any draw,
+    mm.
     """
 
     def __init__(self, feature: Feature, points: Floats) -> None:
@@ -67,7 +50,6 @@ class ProbedCommon(ProbedFeature):
         self._inverse = self._inverse_at(self._seen(points[None], *self._start)[1][0])
 
     def of(self, displacements: Floats, *, with_points: bool = False) -> Features:
-        """See :meth:`ProbedFeature.of`."""
         return self._features(self._motion(displacements))
 
     @cached_property
@@ -86,7 +68,6 @@ class ProbedCommon(ProbedFeature):
 
     @property
     def undisturbed(self) -> Features:
-        """See :attr:`ProbedFeature.undisturbed`."""
         return self._features(self.base[None])
 
     def _motion(self, displacements: Floats) -> Floats:

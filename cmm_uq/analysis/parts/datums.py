@@ -18,35 +18,24 @@ from cmm_uq.analysis.parts.plan import Feature, FeatureKind, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
+# sine of the angle between two datums below which the second says nothing of the rotation about the first, some 6°
 _ACROSS = 0.1
-"""Sine of the angle between two datums below which the second says nothing of the rotation about the first, some 6°."""
-
+# length of what a datum fixes, seen in the directions that are still free, below which it fixes none of them
 _FREE = 1e-6
-"""Length of what a datum fixes, seen in the directions that are still free, below which it fixes none of them."""
-
-_SETTLED = 1e-11
-"""mm and rad."""
-
+_SETTLED = 1e-11  # mm and rad
 _ROUNDS = 20
-
+# datums whose direction is measured; of a circle it is nominal
 _TURNING: tuple[FeatureKind, ...] = ("line", "plane", "cylinder", "cone")
-"""Datums whose direction is measured; of a circle it is nominal."""
-
+# datums that fix translation across their direction
 _AXES: tuple[FeatureKind, ...] = ("line", "circle", "cylinder", "cone")
-"""Datums that fix translation across their direction."""
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """From measured coordinates to those of the part: x → (x − origin) · turn + nominal origin.
+    """From measured coordinates to those of the part: x → (x − origin) · turn + nominal origin."""
 
-    Parameters
-    ----------
-    turn : (N, 3, 3).
-    origin, to : (N, 3) measured, and (3,) nominal place of a point that the datums fix, mm.
-    """
-
-    turn: Floats
+    turn: Floats  # (N, 3, 3)
+    # origin, to: (N, 3) measured, and (3,) nominal place of a point that the datums fix, mm
     origin: Floats
     to: Floats
 
@@ -60,8 +49,7 @@ class Frame:
         return np.asarray(np.einsum("n...i,nij->n...j", directions, self.turn))
 
 
-BEST_FIT = ("(best fit)",)
-"""In place of names of datums: the frame by best fit."""
+BEST_FIT = ("(best fit)",)  # in place of names of datums: the frame by best fit
 
 
 class BestFit:
@@ -70,13 +58,7 @@ class BestFit:
     Distances are those from the tangent plane of each nominal point, which a shift t along a surface of radius R leaves by
     t²/(2R): a nanometre for 5 µm along 12 mm.
 
-    Parameters
-    ----------
-    points, normals : (n, 3) nominal.
-
-    Raises
-    ------
-    CmmUqError : points that leave the part free to move.
+    ``points, normals``: (n, 3) nominal.
     """
 
     def __init__(self, points: Floats, normals: Floats) -> None:
@@ -117,14 +99,8 @@ class BestFit:
 class DatumSystem:
     """Datums in order, and what they fix.
 
-    Parameters
-    ----------
-    features : of the datums, in order; a common datum stands for its members, which it moves as one.
-    nominal : each without any error, which says how the frame is made.
-
-    Raises
-    ------
-    CmmUqError : they do not fix the frame.
+    ``features``: of the datums, in order; a common datum stands for its members, which it moves as one. ``nominal``: each
+    without any error, which says how the frame is made.
     """
 
     def __init__(self, features: Sequence[Feature], nominal: Sequence[Features]) -> None:

@@ -22,33 +22,20 @@ from cmm_uq.analysis.parts.plan import FORMS, Feature, Plan
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.association import Association
 
-Known = dict[tuple[str, Association, bytes], ProbedFeature]
-"""Features by name, association and points."""
-
-EXACT: Association = "least_squares"
-"""The association whose values have a derivative everywhere."""
-
-_WORTH = 3
-"""A block of a third as many draws as a table has rows is worth following the whole table once."""
-
-Coefficients = Sequence[Drawn | None]
-"""(N, K) of each cause; ``None`` of one that does not act."""
+Known = dict[tuple[str, Association, bytes], ProbedFeature]  # features by name, association and points
+EXACT: Association = "least_squares"  # the association whose values have a derivative everywhere
+_WORTH = 3  # A block of a third as many draws as a table has rows is worth following the whole table once
+Coefficients = Sequence[Drawn | None]  # (N, K) of each cause; ``None`` of one that does not act
 
 
 @dataclass(frozen=True, eq=False)
 class Movement:
-    """What N draws of causes move, beyond the base of an :class:`Evaluator`.
+    """What N draws of causes move, beyond the base of an :class:`Evaluator`."""
 
-    Parameters
-    ----------
-    change : (N, …) of what is taken to first order.
-    points : by feature that is taken on its points, (N, m, 3) of these, mm; (N, m) along their normals.
-    whole : (N, n, 3) of all points for an exact best fit, or none.
-    """
-
-    change: Floats
+    change: Floats  # (N, …) of what is taken to first order
+    # by feature that is taken on its points, (N, m, 3) of these, mm; (N, m) along their normals
     points: Mapping[str, Floats]
-    whole: Floats | None = None
+    whole: Floats | None = None  # (N, n, 3) of all points for an exact best fit, or none
 
     def plus(self, other: Movement) -> Movement:
         """With another; one of a single row moves all."""
@@ -74,17 +61,9 @@ class Movement:
 class Evaluator:
     """Characteristics of a plan as functions of the coefficients of its causes.
 
-    Parameters
-    ----------
-    plan : with nominal points.
-    base : (n, 3) displacements without any draw, mm.
-    causes : that move the points besides; ``None`` for one that does not.
-    known : features that were looked at before, to be looked up and added to: they are the same wherever the part lies.
-    along : names of features whose points are moved along their normals alone.
-
-    Raises
-    ------
-    CmmUqError : points that do not determine a feature, datums that do not fix the frame, characteristics that do not exist.
+    ``plan``: with nominal points. ``base``: (n, 3) displacements without any draw, mm. ``causes``: that move the points
+    besides; ``None`` for one that does not. ``known``: features that were looked at before, to be looked up and added to:
+    they are the same wherever the part lies. ``along``: names of features whose points are moved along their normals alone.
     """
 
     def __init__(
@@ -160,12 +139,7 @@ class Evaluator:
         return list(dict.fromkeys(name for name, how in self.keys if exact or not self.to_first_order((name, how))))
 
     def __call__(self, coefficients: Coefficients, *, exact: bool = False) -> Floats:
-        """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none.
-
-        Parameters
-        ----------
-        exact : all features on their points, none to first order.
-        """
+        """Characteristics (N, c), mm and rad, for coefficients (N, K) of each cause; one row where there is none."""
         return self.of(self.movement(coefficients, exact=exact), exact=exact)
 
     def of(self, movement: Movement, *, exact: bool = False, only: int | None = None) -> Floats:

@@ -72,13 +72,7 @@ def family_of(line: str) -> str:
 
 
 def line_in_words(line: str, effects: Mapping[str, Text]) -> Text:
-    """A line of the budget: a cause, or one factor of it.
-
-    Parameters
-    ----------
-    line : as the budget names it.
-    effects : the machine's errors in words, by name.
-    """
+    """A line of the budget: a cause, or one factor of it."""
     if line in _FACTORS:
         return _FACTORS[line]
     for begin, words in _NAMED.items():

@@ -11,23 +11,15 @@ from cmm_uq.analysis.parts.plan import Feature
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.frame import frame_about
 
-_STEPS = 48
-"""Of a circle."""
-
-_ALONG = 1e-6
-"""Sine of the angle to the view below which an axis is seen end on."""
-
-_FLAT = 1e-9
-"""Of the size of a set of points, below which it has no second direction."""
+_STEPS = 48  # of a circle
+_ALONG = 1e-6  # sine of the angle to the view below which an axis is seen end on
+_FLAT = 1e-9  # of the size of a set of points, below which it has no second direction
 
 
 def outline(feature: Feature, view: Floats) -> list[Floats]:
     """Polylines (m, 3) of a nominal feature as far as it is probed; none of a point.
 
-    Parameters
-    ----------
-    feature : with its points.
-    view : (3,) direction along which one looks.
+    ``view``: (3,) direction along which one looks.
     """
     points, nominal = feature.points, feature.nominal
     if nominal.direction is None:

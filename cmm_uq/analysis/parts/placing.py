@@ -20,26 +20,15 @@ OWN_COLUMNS = tuple(
 )
 """Columns that follow from how a point is probed."""
 
-_SIDEWAYS = 1e-6
-"""Component of a normal below which an axis does not move into the surface."""
+_SIDEWAYS = 1e-6  # component of a normal below which an axis does not move into the surface
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A place on the table: coordinates of the machine = rotation · those of the part + translation.
+    """A place on the table: coordinates of the machine = rotation · those of the part + translation."""
 
-    Parameters
-    ----------
-    rotation : (3, 3), proper.
-    translation_mm : (3,) where the part's origin lies.
-
-    Raises
-    ------
-    CmmUqError : the matrix is no rotation.
-    """
-
-    rotation: Floats = field(default_factory=lambda: np.eye(3))
-    translation_mm: Floats = field(default_factory=lambda: np.zeros(3))
+    rotation: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3), proper
+    translation_mm: Floats = field(default_factory=lambda: np.zeros(3))  # (3,) where the part's origin lies
 
     def __post_init__(self) -> None:
         off = np.abs(self.rotation @ self.rotation.T - np.eye(3)).max()
@@ -64,10 +53,7 @@ class Pose:
 def around(pose: Pose, u_translation_mm: Floats, u_angles_rad: Floats, count: int, seed: int = 0) -> tuple[Pose, ...]:
     """So many places where a part may lie that is put near one: normal in all six.
 
-    Parameters
-    ----------
-    u_translation_mm : (3,) standard deviations.
-    u_angles_rad : (3,) of small rotations about the axes of the machine.
+    ``u_translation_mm``: (3,) standard deviations. ``u_angles_rad``: (3,) of small rotations about the axes of the machine.
     """
     from scipy.spatial.transform import Rotation
 
@@ -83,7 +69,6 @@ class WithStyli(Machine):
     """A machine whose probe has an offset, point by point in the columns ``tip_x_mm``, ``tip_y_mm``, ``tip_z_mm``."""
 
     def readings(self, xyz: Floats, columns: Mapping[str, Floats]) -> Floats:
-        """See :meth:`Machine.readings`: of the ram's reference point, which stands where the tip is not."""
         return super().readings(xyz - np.column_stack([columns[f"tip_{axis}_mm"] for axis in AXES]), columns)
 
     @classmethod
@@ -96,13 +81,7 @@ class WithStyli(Machine):
 def placed(plan: Plan, pose: Pose, machine: Machine, columns: Mapping[str, Floats | float] | None = None) -> Points:
     """The plan's points as the machine stands at them: the centres of the tip, with their normals, travel, tips and times.
 
-    Parameters
-    ----------
-    columns : further columns of effects, by name, (n,) or a number for all: temperatures.
-
-    Raises
-    ------
-    CmmUqError : an axis would have to go beyond its travel.
+    ``columns``: further columns of effects, by name, (n,) or a number for all: temperatures.
     """
     radii = 0.5 * np.array([stylus.diameter_mm for stylus in plan.styli])[plan.stylus_of]
     n = len(radii)

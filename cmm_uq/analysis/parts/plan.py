@@ -18,55 +18,40 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.association import ASSOCIATIONS, Association
 
 FeatureKind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
-FEWEST: dict[FeatureKind, int] = {
-    "point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6,
-}  # fmt: skip
+FEWEST: dict[FeatureKind, int] = {"point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6}
 """Points that determine a feature."""
 
+# features with a direction: along a line or an axis, normal to a plane or to that of a circle
 DIRECTED: tuple[FeatureKind, ...] = ("line", "plane", "circle", "cylinder", "cone")
-"""Features with a direction: along a line or an axis, normal to a plane or to that of a circle."""
-
-SIZED: tuple[FeatureKind, ...] = ("circle", "sphere", "cylinder")
-"""Features with a diameter."""
-
+SIZED: tuple[FeatureKind, ...] = ("circle", "sphere", "cylinder")  # features with a diameter
 SIZES = ("size",)
 FORMS = ("straightness", "flatness", "roundness", "cylindricity", "sphericity")
 RELATIONS = ("distance", "angle")
 ORIENTATIONS = ("parallelism", "perpendicularity", "angularity")
 LOCATIONS = ("position", "coaxiality", "x", "y", "z")
 RUNOUTS = ("circular_runout", "total_runout")
+# kinds of characteristic; see :mod:`cmm_uq.analysis.parts.characteristics` for what each means.
 WHATS = (*SIZES, *FORMS, *RELATIONS, *ORIENTATIONS, *LOCATIONS, *RUNOUTS)
-"""Kinds of characteristic; see :mod:`cmm_uq.analysis.parts.characteristics` for what each means."""
-
+# those of them that are widths of a zone, which is never negative
 ZONES = (*FORMS, *ORIENTATIONS, "position", "coaxiality", *RUNOUTS)
-"""Those of them that are widths of a zone, which is never negative."""
-
-_UNIT = 1e-6
-"""By how much the length of a unit vector may differ from one."""
+_UNIT = 1e-6  # by how much the length of a unit vector may differ from one
 
 
 @dataclass(frozen=True, eq=False)
 class Stylus:
-    """A stylus as it is used, with what its qualification left uncertain, as standard uncertainties.
+    """A stylus as it is used, with what its qualification left uncertain, as standard uncertainties."""
 
-    Parameters
-    ----------
-    name : as features name it.
-    offset_mm : (3,) centre of the tip from the ram's reference point, machine axes: x, y, z.
-    diameter_mm : of the tip.
-    u_diameter_um : of the effective diameter.
-    u_offset_um : (3,) of the tip's offset against the tip to which the others are referred; zero of that tip itself.
-    lobing_um : standard deviation of the pre-travel over directions of probing, once size and offset are taken out of it.
-    qualified_at_mm : (3,) coordinates of the machine where the reference sphere stood: what the machine's errors do there they
-        do not do to the part again. ``None`` where that is not known.
-    """
-
-    name: str
+    name: str  # as features name it
+    # (3,) centre of the tip from the ram's reference point, machine axes: x, y, z
     offset_mm: Floats = field(default_factory=lambda: np.zeros(3))
-    diameter_mm: float = 0.0
-    u_diameter_um: float = 0.0
+    diameter_mm: float = 0.0  # of the tip
+    u_diameter_um: float = 0.0  # of the effective diameter
+    # (3,) of the tip's offset against the tip to which the others are referred; zero of that tip itself
     u_offset_um: Floats = field(default_factory=lambda: np.zeros(3))
+    # standard deviation of the pre-travel over directions of probing, once size and offset are taken out of it
     lobing_um: float = 0.0
+    # (3,) coordinates of the machine where the reference sphere stood: what the machine's errors do there they do not do to
+    # the part again. ``None`` where that is not known.
     qualified_at_mm: Floats | None = None
 
 
@@ -166,36 +151,24 @@ def as_datum(one: Feature) -> Feature:
 
 @dataclass(frozen=True, eq=False)
 class CommonDatum:
-    """A datum on several features, which are associated at once (ISO 5459): ``A-B`` of a drawing.
+    """A datum on several features, which are associated at once (ISO 5459): ``A-B`` of a drawing."""
 
-    Parameters
-    ----------
-    name : as characteristics and alignment name it.
-    features : names of its members; points, planes, circles, spheres, cylinders or cones.
-    kind : what the whole is as a datum: ``line`` where all members lie on one axis, ``plane`` where all are parallel faces;
-        else ``point``, which aligns a part and is the datum of nothing else.
-    nominal : a point of it, and its direction, which a ``point`` has not.
-    """
-
-    name: str
-    features: tuple[str, ...]
+    name: str  # as characteristics and alignment name it
+    features: tuple[str, ...]  # names of its members; points, planes, circles, spheres, cylinders or cones
+    # what the whole is as a datum: ``line`` where all members lie on one axis, ``plane`` where all are parallel faces; else
+    # ``point``, which aligns a part and is the datum of nothing else
     kind: FeatureKind
-    nominal: Nominal
+    nominal: Nominal  # a point of it, and its direction, which a ``point`` has not
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """How the coordinates of the part follow from measured points.
+    """How the coordinates of the part follow from measured points."""
 
-    Parameters
-    ----------
-    datums : names of features in order of precedence: each fixes of rotation and translation what those before it left free
-        (ISO 5459), so that measured and nominal datums coincide in that.
-    best_fit : by least squares of the distances of all points from the nominal surfaces instead.
-    """
-
+    # names of features in order of precedence: each fixes of rotation and translation what those before it left free (ISO
+    # 5459), so that measured and nominal datums coincide in that
     datums: tuple[str, ...] = ()
-    best_fit: bool = False
+    best_fit: bool = False  # by least squares of the distances of all points from the nominal surfaces instead
 
 
 @dataclass(frozen=True)
@@ -310,12 +283,7 @@ class Plan:
         return next((datum.features for datum in self.common if datum.name == name), (name,))
 
     def feature(self, name: str) -> Feature:
-        """A feature by its name, or a common datum as one.
-
-        Raises
-        ------
-        CmmUqError : there is none.
-        """
+        """A feature by its name, or a common datum as one."""
         for datum in self.common:
             if datum.name == name:
                 parts = tuple(self.feature(each) for each in datum.features)

@@ -27,31 +27,23 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import associate
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated
 
-FEWEST = 500
-"""Draws that are possible, from which on a probability is taken from them alone."""
+FEWEST = 500  # draws that are possible, from which on a probability is taken from them alone
 
 
 @dataclass(frozen=True)
 class Stated:
-    """One characteristic.
-
-    Parameters
-    ----------
-    name : of it.
-    value : mm or rad, less the mean error, of a zone the median one, and zero at least; ``None`` where nothing was measured.
-    error : mean of the errors: by how much such a measurement is off on average, mm or rad.
-    u : standard uncertainty, mm or rad.
-    interval : shortest coverage interval of the value, of a zone the unified one; where nothing was measured the shortest of
-        the error, with the opposite sign.
-    k : half of the shortest interval of the errors over u; of a zone half of its own interval where that is more, and so much
-        that U reaches to the end of an interval that begins at zero.
-    """
+    """One characteristic."""
 
     name: str
+    # mm or rad, less the mean error, of a zone the median one, and zero at least; ``None`` where nothing was measured
     value: float | None
-    error: float
-    u: float
+    error: float  # mean of the errors: by how much such a measurement is off on average, mm or rad
+    u: float  # standard uncertainty, mm or rad
+    # shortest coverage interval of the value, of a zone the unified one; where nothing was measured the shortest of the
+    # error, with the opposite sign
     interval: tuple[float, float]
+    # half of the shortest interval of the errors over u; of a zone half of its own interval where that is more, and so much
+    # that U reaches to the end of an interval that begins at zero
     k: float
 
     @property
@@ -108,12 +100,7 @@ def possible_interval(true: Floats, coverage: float) -> tuple[float, float]:
 
 
 def evaluated(plan: Plan, points: Floats) -> Floats:
-    """Characteristics (c,) of measured points (n, 3) in the frame of the part, mm, in the order of the plan's.
-
-    Raises
-    ------
-    CmmUqError : points of another number, or so far from their nominal places that they are not those.
-    """
+    """Characteristics (c,) of measured points (n, 3) in the frame of the part, mm, in the order of the plan's."""
     if points.shape != plan.points.shape:
         raise CmmUqError(f"{len(points)} points were measured, the plan has {len(plan.points)}", where="the recording",
                          fix="Measure each point of the plan once")  # fmt: skip
@@ -123,15 +110,10 @@ def evaluated(plan: Plan, points: Floats) -> Floats:
 def conforming(plan: Plan, errors: Floats, measured: Floats) -> tuple[Floats, float]:
     """Probabilities that the true values lie within the limits of the drawing, given that no zone is negative.
 
-    Parameters
-    ----------
-    errors : (N, c) of virtual measurements.
-    measured : (c,) values.
+    ``errors``: (N, c) of virtual measurements. ``measured``: (c,) values.
 
-    Returns
-    -------
-    each : (c,) of every characteristic; ``nan`` where it has no limits.
-    together : of all that have some at once; ``nan`` where none has.
+    Returns ``each``: (c,) of every characteristic; ``nan`` where it has no limits. ``together``: of all that have some at
+    once; ``nan`` where none has.
     """
     true, zones = measured - errors, never_negative(plan)
     scarce = zones & (np.mean(true >= 0, axis=0) < SCARCE)

@@ -26,8 +26,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.part.probed import Probed, probed, whole_surface
 from cmm_uq.jobs.part.tables import StylusFacts
 
-PLACES = 16
-"""Places of the part that are drawn where it does not lie in the same one each time."""
+PLACES = 16  # places of the part that are drawn where it does not lie in the same one each time
 
 
 def plan_of(job: PartJob) -> Plan:
@@ -45,15 +44,12 @@ def plan_of(job: PartJob) -> Plan:
     return Plan(
         features,
         tuple(_characteristic(one) for one in facts.characteristic),
-        tuple(
-            _stylus(one)
-            for one in facts.stylus
-        ),
+        tuple(_stylus(one) for one in facts.stylus),
         Alignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
         rows.astype(np.int64),
         times,
         _common(job),
-    )  # fmt: skip
+    )
 
 
 def _common(job: PartJob) -> tuple[CommonDatum, ...]:
@@ -70,12 +66,7 @@ def _common(job: PartJob) -> tuple[CommonDatum, ...]:
 
 
 def refuse_unfit(job: PartJob) -> None:
-    """Refuse what a virtual measurement of the job would refuse of its plan.
-
-    Raises
-    ------
-    CmmUqError : points that do not determine a feature, datums that do not fix a frame.
-    """
+    """Refuse what a virtual measurement of the job would refuse of its plan."""
     plan, path = plan_of(job), job.folder / "job.toml"
     try:
         nominal = characteristics_of(plan, plan.points)
@@ -91,12 +82,7 @@ def refuse_unfit(job: PartJob) -> None:
 
 
 def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
-    """Refuse a part that the axes do not reach everywhere, in any of the places where it may lie.
-
-    Raises
-    ------
-    CmmUqError : a point of it is beyond the travel.
-    """
+    """Refuse a part that the axes do not reach everywhere, in any of the places where it may lie."""
     plan = plan_of(job)
     for pose in poses_of(job, PLACES, machine):
         try:
@@ -106,14 +92,7 @@ def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
 
 
 def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> Circumstances:
-    """How and where the part is measured.
-
-    Parameters
-    ----------
-    machine : as its certificate states it.
-    plan : of the job.
-    places : where the part may lie, if it does not lie in the same place each time.
-    """
+    """How and where the part is measured."""
     return Circumstances(
         machine, poses_of(job, places, machine.machine), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
         (*clamping_of(job, plan), *operators_of(job, plan)),
@@ -121,14 +100,7 @@ def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: in
 
 
 def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[Pose, ...]:
-    """Where the part lies: the one place that is stated, or so many where it may lie.
-
-    Parameters
-    ----------
-    count : of places, where they are not the same each time.
-    machine : in the middle of whose travel it lies where the job does not say where.
-
-    """
+    """Where the part lies: the one place that is stated, or so many where it may lie."""
     given = job.facts.placing
     pose = Pose(rotation(given), origin_of(job, machine))
     if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
@@ -196,12 +168,7 @@ def operators_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
 
 
 def doubled(job: PartJob) -> PartJob:
-    """The job with twice the points in every feature that is probed by a pattern, and nothing measured.
-
-    Raises
-    ------
-    CmmUqError : no feature is, or one has so many points that twice as many change nothing.
-    """
+    """The job with twice the points in every feature that is probed by a pattern, and nothing measured."""
     if any(len(one.points) >= LARGE for one in job.features):
         raise CmmUqError("has a feature of thousands of points", where=str(job.folder / "job.toml"),
                          fix="More of them change nothing")  # fmt: skip

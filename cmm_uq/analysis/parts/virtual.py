@@ -33,42 +33,23 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 
-CHECKED = 200
-"""Draws that are looked at exactly, beside first order."""
-
-FEWEST = 100_000
-"""Virtual measurements, after which u is known to a quarter of a percent."""
-
-ROUNDING = 1e-9
-"""mm and rad: a spread below which is none."""
-
-THREADED = 2_000
-"""Draws of a block that are worth a thread."""
-
-AGREES = 0.01
-"""Of u, by which first order may be off before all is taken exactly: what u is good for."""
-
+CHECKED = 200  # draws that are looked at exactly, beside first order
+FEWEST = 100_000  # virtual measurements, after which u is known to a quarter of a percent
+ROUNDING = 1e-9  # mm and rad: a spread below which is none
+THREADED = 2_000  # draws of a block that are worth a thread
+AGREES = 0.01  # of u, by which first order may be off before all is taken exactly: what u is good for
+# draws by which the measurement is turned round; u and ends of intervals of zones are then known to a hundredth of u
 PILOT = 10_000
-"""Draws by which the measurement is turned round; u and ends of intervals of zones are then known to a hundredth of u."""
-
-_BLOCK = 400_000
-"""Points of the pilot drawn at once."""
-
+_BLOCK = 400_000  # points of the pilot drawn at once
+# points of virtual measurements that are drawn at once: 50 MB for each cause that moves each coordinate on its own
 _AT_ONCE = 2_000_000
-"""Points of virtual measurements that are drawn at once: 50 MB for each cause that moves each coordinate on its own."""
-
+# the same of a plan of thousands of points, of which a block of few draws is large enough to be quick
 _AT_ONCE_OF_MANY = 500_000
-"""The same of a plan of thousands of points, of which a block of few draws is large enough to be quick."""
-
+# points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed
 _KEPT = 1_600_000
-"""Points of the whole pilot up to which its blocks are drawn once and kept, 40 MB; else they are drawn again when needed."""
-
-_PILOT_SEED = 20_101
-"""Of these, in every place alike, so that places are compared by the same."""
-
-
+_PILOT_SEED = 20_101  # of these, in every place alike, so that places are compared by the same
+# movements of a block of the pilot, and what adds to its characteristics, the same each time
 _PilotBlock = Callable[[], tuple[Movement, Floats]]
-"""Movements of a block of the pilot, and what adds to its characteristics, the same each time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,23 +81,10 @@ class Circumstances:
 class AtPose:
     """Virtual measurements of a part in one place.
 
-    Parameters
-    ----------
-    plan : of the measurement.
-    given : its circumstances.
-    pose : the place.
-    known : features that were looked at in another place (:class:`Evaluator`).
-    pilot : draws by which the measurement of what is never negative is turned round; fewer, a quarter at least, of a plan of
-        thousands of points.
-
-    Attributes
-    ----------
-    base : (n, 3) by how much points are displaced without any draw, mm.
-    still : (c,) characteristics of the part: as measured, less ``base``, or of the nominal one.
-
-    Raises
-    ------
-    CmmUqError : see :class:`Evaluator`, and an axis beyond its travel.
+    ``given``: its circumstances. ``pose``: the place. ``known``: features that were looked at in another place
+    (:class:`Evaluator`). ``pilot``: draws by which the measurement of what is never negative is turned round; fewer, a
+    quarter at least, of a plan of thousands of points. ``base``: (n, 3) by how much points are displaced without any draw,
+    mm. ``still``: (c,) characteristics of the part: as measured, less ``base``, or of the nominal one.
     """
 
     def __init__(
@@ -191,10 +159,8 @@ class AtPose:
         which follows from f(q + d) by turning the measurement round (``inverse``). Without measured
         points, and with a form that is drawn on whole surfaces, all errs by what is measured less what is true.
 
-        Parameters
-        ----------
-        inferred : whether measurements are turned round; else what is never negative errs as all else does, which takes less
-            time and compares places as well.
+        ``inferred``: whether measurements are turned round; else what is never negative errs as all else does, which takes
+        less time and compares places as well.
         """
         found = self.read(coefficients, exact=exact)
         true = self.still if self.true is None else self.true(coefficients, exact=exact)
@@ -328,9 +294,7 @@ class Virtual:
     off : (c,) by how much first order is off in the first place, of the standard deviation.
     """
 
-    def __init__(
-        self, plan: Plan, given: Circumstances, known: Known | None = None, pilot: int = PILOT
-    ) -> None:  # fmt: skip
+    def __init__(self, plan: Plan, given: Circumstances, known: Known | None = None, pilot: int = PILOT) -> None:
         self.plan = plan
         self.known: Known = {} if known is None else known
         self.places = [AtPose(plan, given, pose, self.known, pilot) for pose in given.poses]

@@ -18,39 +18,24 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say, signed
 from cmm_uq.base.points import Floats
 
-DRAWS = 10_000
-"""Of each way; u is then known to 0.7 %."""
-
-_LOOKED_AT = 1000
-"""Draws by which places on the table are compared."""
-
-_PILOT = 2_000
-"""Of those by which a measurement is turned round, the same for every way."""
-
+DRAWS = 10_000  # of each way; u is then known to 0.7 %.
+_LOOKED_AT = 1000  # draws by which places on the table are compared
+_PILOT = 2_000  # of those by which a measurement is turned round, the same for every way
+# causes that another set-up draws again; machine, styli, temperatures and the part stay what they are
 ANEW = (NOISE, OPERATOR, FIXTURE)
-"""Causes that another set-up draws again; machine, styli, temperatures and the part stay what they are."""
-
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-
+# the plan with twice the points in every feature, and its circumstances
 Doubled = Callable[[], tuple[Plan, Circumstances]]
-"""The plan with twice the points in every feature, and its circumstances."""
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """A way to measure, and what comes of it.
+    """A way to measure, and what comes of it."""
 
-    Attributes
-    ----------
-    name : of the way.
-    u : (c,) standard uncertainties, mm and rad.
-    draws : that they are from.
-    """
-
-    name: Text
-    u: Floats
-    draws: int
+    name: Text  # of the way
+    u: Floats  # (c,) standard uncertainties, mm and rad
+    draws: int  # that they are from
 
     def known(self, *, inferred: bool) -> float:
         """Relative standard deviation of u; of a zone that is inferred from measured points with that of the pilot.
@@ -93,11 +78,6 @@ def ways(
     """The measurement as it is planned first, then what changes it, each alone.
 
     Ways that the travel of the machine does not allow are left out.
-
-    Parameters
-    ----------
-    doubled : gives the plan with twice the points; without it that way is left out.
-    planned : the measurement as it is planned, where it is there already.
     """
     first = Virtual(plan, given) if planned is None else planned
     found = [Way(say("as planned"), spread(first, draws, seed), draws)]

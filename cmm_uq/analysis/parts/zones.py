@@ -40,28 +40,21 @@ from cmm_uq.analysis.parts.plan import Feature, Plan
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.root import root
 
+# true widths at which measurements are drawn, closer together near the least one, where fewest draws are possible; squares of
+# their quantiles are nearly quadratic between them
 NODES = 11
-"""True widths at which measurements are drawn, closer together near the least one, where fewest draws are possible; squares of
-their quantiles are nearly quadratic between them."""
-
+# of the trial parts, one in so many stands for each width: few enough to be as wide, enough for every direction of errors
 _NEAR = 8
-"""Of the trial parts, one in so many stands for each width: few enough to be as wide, enough for every direction of errors."""
-
 _QUANTILES = ndtr(np.linspace(-3.1, 3.1, 249))
 _FINE = 600
-_ENDS = 24
-"""Quantiles at each end by which the line is laid that goes on beyond it."""
+_ENDS = 24  # quantiles at each end by which the line is laid that goes on beyond it
 
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """A decreasing map from what is measured of the part as it was measured, with errors once more, to true widths.
+    """A decreasing map from what is measured of the part as it was measured, with errors once more, to true widths."""
 
-    Parameters
-    ----------
-    measured, true : (k,) mm or rad, along which it is linear, and beyond.
-    """
-
+    # measured, true: (k,) mm or rad, along which it is linear, and beyond
     measured: Floats
     true: Floats
 
@@ -83,10 +76,7 @@ def nodes_of(found: float, perfect: Floats) -> Floats:
 
     A zone is a seminorm of the deviations: errors change it by no more than their own zone.
 
-    Parameters
-    ----------
-    found : the width that was measured.
-    perfect : (n,) what a perfect part would be measured as, g(0).
+    ``perfect``: (n,) what a perfect part would be measured as, g(0).
     """
     beyond = float(np.abs(np.quantile(perfect, _QUANTILES[[0, -1]])).max())
     least = max(0.0, found - beyond)
@@ -98,9 +88,7 @@ def alike(widths: Floats, width: float) -> Ints:
 
     They are made less of, and so stay parts; only the widest are made more of.
 
-    Parameters
-    ----------
-    widths : (n,) of trial parts' zones.
+    ``widths``: (n,) of trial parts' zones.
     """
     order = np.argsort(widths)
     some = max(1, len(widths) // _NEAR)
@@ -111,13 +99,8 @@ def alike(widths: Floats, width: float) -> Ints:
 def inverse(found: float, again: Floats, perfect: Floats, true: Floats, measured: Floats) -> Inverse:
     """The map by which errors of a measurement become draws of what is true.
 
-    Parameters
-    ----------
-    found : the width that was measured.
-    again : (n,) what the part as measured would be measured as, with n draws of errors.
-    perfect : (n,) the same of a perfect part.
-    true : (m,) θ of :func:`nodes_of`.
-    measured : (m, n) the same of these.
+    ``again``: (n,) what the part as measured would be measured as, with n draws of errors. ``perfect``: (n,) the same of a
+    perfect part. ``true``: (m,) θ of :func:`nodes_of`. ``measured``: (m, n) the same of these.
     """
     from scipy.interpolate import CubicSpline  # takes longer to import than parts without a zone have left to do
 
@@ -145,10 +128,8 @@ def _square(values: Floats) -> Floats:
 def tails(negative: float, coverage: float) -> tuple[float, float]:
     """Shares of all draws below the lower end and above the upper end; a lower end among the negative ones is zero.
 
-    Parameters
-    ----------
-    negative : share of the draws that are negative: of a normal quantity, measured x standard deviations from zero, Φ(−x).
-    coverage : of the interval, less than one.
+    ``negative``: share of the draws that are negative: of a normal quantity, measured x standard deviations from zero,
+    Φ(−x).
     """
     missed = 1 - coverage
     upper = min(0.5 * missed, missed * (1 - negative))
@@ -176,18 +157,14 @@ def _least(mean: float, most: float) -> float:
     return symmetric if symmetric >= 0 else (mean**2 - (most - mean) ** 2) / (2 * mean)
 
 
-_FREE = 1e-9
-"""Of the largest, a singular value of motions that points do not tell from others."""
+_FREE = 1e-9  # of the largest, a singular value of motions that points do not tell from others
 
 
 def trial_parts(errors: Movement, perfect: Movement, plan: Plan, *, form: bool) -> Movement:
     """(N, …) what the part may be, from what it was measured as.
 
-    Parameters
-    ----------
-    errors : (N, …) draws.
-    perfect : (1, …) from the part as measured to the nominal one.
-    form : whether a form is asked of it.
+    ``errors``: (N, …) draws. ``perfect``: (1, …) from the part as measured to the nominal one. ``form``: whether a form is
+    asked of it.
     """
     less = errors.times(-1.0)
     return less if form else less.plus(_seen_form(errors, perfect, plan))

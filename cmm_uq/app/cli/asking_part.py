@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from cmm_uq.app.commands.parts.new import Answers
 
 Value = TypeVar("Value")
-
 _BEST_FIT = "best fit"
 _ANSWERS = {"y": True, "yes": True, "n": False, "no": False}
 

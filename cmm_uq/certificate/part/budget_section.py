@@ -17,17 +17,11 @@ from cmm_uq.certificate.part.figures import Figures, by_margin, critical, figure
 from cmm_uq.certificate.part.measurement import PartFound, Unseen
 from cmm_uq.certificate.part.plots import shares_plots
 
-DETAILED = 10
-"""Characteristics whose budgets are listed line by line: those of least margin."""
-
+DETAILED = 10  # characteristics whose budgets are listed line by line: those of least margin
+# lines of a budget that are listed at most, the share from which on, and that from which on a factor of one is
 _LINES, _LEAST, _FACTOR = 6, 0.01, 0.05
-"""Lines of a budget that are listed at most, the share from which on, and that from which on a factor of one is."""
-
-_WAYS = 6
-"""Characteristics for which every way is shown."""
-
-_GAIN = 0.02
-"""Of u, below which a way is no gain."""
+_WAYS = 6  # characteristics for which every way is shown
+_GAIN = 0.02  # of u, below which a way is no gain
 
 
 def line_words(line: str) -> Text:
@@ -219,7 +213,7 @@ def ways_section(found: PartFound) -> Section:
     columns = (
         Column(say("Way"), numeric=False),
         *(Column(say("u of No. {number}", number=one.number), one.scale.small) for one in shown),
-    )  # fmt: skip
+    )
     rows = tuple((say("{way:capital}", way=way.name), *(one.small(float(way.u[one.place])) for one in shown))
                  for way in found.ways)  # fmt: skip
     known = number(100 * found.ways[-1].known(inferred=False), ".1g")
@@ -232,9 +226,7 @@ def ways_section(found: PartFound) -> Section:
     if len(shown) < len(found.stated):
         notes.append(_chosen(shown))
     told = [Paragraph(words)] if (words := best_words(critical(found))) else []
-    return Section(
-        say("What would reduce it"), (*told, Table(say("Ways to measure"), columns, rows, tuple(notes)))
-    )  # fmt: skip
+    return Section(say("What would reduce it"), (*told, Table(say("Ways to measure"), columns, rows, tuple(notes))))
 
 
 def best_words(one: Figures) -> Text:

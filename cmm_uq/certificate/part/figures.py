@@ -27,16 +27,12 @@ from cmm_uq.maths.uncertainty.rounding import rounded, significant
 
 @dataclass(frozen=True)
 class Scale:
-    """Units in which a value and its uncertainty are printed.
+    """Units in which a value and its uncertainty are printed."""
 
-    Parameters
-    ----------
-    value, small : units of values and limits, and of uncertainties.
-    per_value, per_small : one of each in the units inside, mm or rad.
-    """
-
+    # value, small: units of values and limits, and of uncertainties
     value: Unit
     small: Unit
+    # per_value, per_small: one of each in the units inside, mm or rad
     per_value: float
     per_small: float
 
@@ -50,7 +46,6 @@ class Printed:
 
     @property
     def scale(self) -> Scale:
-        """Its units."""
         raise NotImplementedError
 
     @property
@@ -108,15 +103,9 @@ class Printed:
 
 @dataclass(frozen=True, eq=False)
 class Figures(Printed):
-    """One characteristic in figures.
+    """One characteristic in figures."""
 
-    Parameters
-    ----------
-    place : among those of the part, from 0.
-    found : of the part.
-    """
-
-    place: int
+    place: int  # among those of the part, from 0
     found: PartFound
 
     @property
@@ -131,7 +120,6 @@ class Figures(Printed):
 
     @cached_property
     def scale(self) -> Scale:
-        """Its units."""
         return ANGLES if self.angular else LENGTHS
 
     @property
@@ -188,7 +176,6 @@ class Figures(Printed):
 
     @property
     def interval(self) -> Text:
-        """See :meth:`Printed.interval_of`."""
         return self.interval_of(self.stated.interval, measured=self.stated.value is not None)
 
     @property

@@ -25,174 +25,106 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.verdicts import gravest
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated
 
+# what states the machine: a certificate with its inputs inside, the figures and draws alone, or a job that was analysed
 Source = Literal["certificate", "results", "job"]
-"""What states the machine: a certificate with its inputs inside, the figures and draws alone, or a job that was analysed."""
-
-MATTERS = 0.05
-"""Share of a variance from which on what nobody saw is told by name."""
+MATTERS = 0.05  # share of a variance from which on what nobody saw is told by name
 
 
 @dataclass(frozen=True)
 class Checked:
-    """What the verification of the machine's certificate did, or could not do.
+    """What the verification of the machine's certificate did, or could not do."""
 
-    Parameters
-    ----------
-    what : in words.
-    count : of things compared; 0 of what was left.
-    why : it was left; empty where it was done.
-    """
-
-    what: str
-    count: int = 0
-    why: str = ""
+    what: str  # in words
+    count: int = 0  # of things compared; 0 of what was left
+    why: str = ""  # it was left; empty where it was done
 
 
 @dataclass(frozen=True)
 class Standing:
-    """The machine's certificate on the day of the measurement.
+    """The machine's certificate on the day of the measurement."""
 
-    Parameters
-    ----------
-    source : what states the machine.
-    files : that were read, as the job names them; the folder of a job that was analysed.
-    number, laboratory : of the certificate; empty where it does not say.
-    machine, serial : that it is of.
-    origin : of the calibration's recording: ``measured``, ``simulated``, ``compensated``.
-    date : of the calibration.
-    age : of it on the day of the part's measurement.
-    valid_until : last day on which it holds; ``None`` where neither it nor the job says so.
-    verdict : of the verification; ``ANALYSED`` of a job.
-    checked : what was verified, then what was not.
-    again : whether everything was computed again.
-    trusted : whether signatures were held to trusted certificates.
-    draft : whether nobody has issued it.
-    given_recording : whether the machine's errors were drawn given the recording of its calibration.
-    path : how they were drawn, in a sentence.
-    drift : what is reckoned with of changes since the calibration, in a sentence.
-    temperature_c : of the calibration; ``None`` where it does not say.
-    inputs_sha256 : of the calibration, by name.
-    changes : root mean square change of each reported parameter since the calibration, in its unit, as records let expect;
-        ``None`` of one where they do not say, and as a whole without records.
-    """
-
-    source: Source
-    files: tuple[str, ...]
+    source: Source  # what states the machine
+    files: tuple[str, ...]  # that were read, as the job names them; the folder of a job that was analysed
+    # number, laboratory: of the certificate; empty where it does not say
     number: str
     laboratory: str
+    # machine, serial: that it is of
     machine: str
     serial: str
-    origin: str
+    origin: str  # of the calibration's recording: ``measured``, ``simulated``, ``compensated``
     date: dt.date
-    age: dt.timedelta
-    valid_until: dt.date | None
-    verdict: str
-    checked: tuple[Checked, ...]
-    again: bool
-    trusted: bool
-    draft: bool
-    given_recording: bool
-    path: Text
-    drift: Text
-    temperature_c: float | None = None
-    inputs_sha256: Mapping[str, str] = field(default_factory=dict)
+    age: dt.timedelta  # of it on the day of the part's measurement
+    valid_until: dt.date | None  # last day on which it holds; ``None`` where neither it nor the job says so
+    verdict: str  # of the verification; ``ANALYSED`` of a job
+    checked: tuple[Checked, ...]  # what was verified, then what was not
+    again: bool  # whether everything was computed again
+    trusted: bool  # whether signatures were held to trusted certificates
+    draft: bool  # whether nobody has issued it
+    given_recording: bool  # whether the machine's errors were drawn given the recording of its calibration
+    path: Text  # how they were drawn, in a sentence
+    drift: Text  # what is reckoned with of changes since the calibration, in a sentence
+    temperature_c: float | None = None  # of the calibration; ``None`` where it does not say
+    inputs_sha256: Mapping[str, str] = field(default_factory=dict)  # of the calibration, by name
+    # root mean square change of each reported parameter since the calibration, in its unit, as records let expect; ``None``
+    # of one where they do not say, and as a whole without records
     changes: Mapping[str, float | None] | None = None
 
 
 @dataclass(frozen=True)
 class Unseen:
-    """An error that the calibration left free or did not see, and how much of a characteristic's variance it makes.
-
-    Parameters
-    ----------
-    characteristic : name of it.
-    line : of the budget.
-    effect : name of the effect; empty where it is none of a machine.
-    title : in words.
-    share : of the variance, 0 to 1.
-    why : nobody knows it better.
-    """
+    """An error that the calibration left free or did not see, and how much of a characteristic's variance it makes."""
 
     characteristic: str
-    line: str
-    effect: str
-    title: Text
-    share: float
-    why: Text
+    line: str  # of the budget
+    effect: str  # name of the effect; empty where it is none of a machine
+    title: Text  # in words
+    share: float  # of the variance, 0 to 1
+    why: Text  # nobody knows it better
 
 
 @dataclass(frozen=True)
 class Further:
-    """What to measure on the machine, so that what is unseen would be seen.
+    """What to measure on the machine, so that what is unseen would be seen."""
 
-    Parameters
-    ----------
-    effects : names of those that it is for, of the largest share first.
-    setups : how many set-ups of the artefact; 0 where none of it would help.
-    text : in a sentence.
-    command : line that plans it; empty where there is none.
-    file : of the set-ups, to be filled in; empty where there are none.
-    missed : names of those that no set-up of the artefact would show.
-    """
-
-    effects: tuple[str, ...]
-    setups: int
-    text: Text
-    command: str = ""
-    file: str = ""
-    missed: tuple[str, ...] = ()
+    effects: tuple[str, ...]  # names of those that it is for, of the largest share first
+    setups: int  # how many set-ups of the artefact; 0 where none of it would help
+    text: Text  # in a sentence
+    command: str = ""  # line that plans it; empty where there is none
+    file: str = ""  # of the set-ups, to be filled in; empty where there are none
+    missed: tuple[str, ...] = ()  # names of those that no set-up of the artefact would show
 
 
 @dataclass(frozen=True, eq=False)
 class PartFound:
-    """A part's measurement, with its uncertainty and what follows.
-
-    Parameters
-    ----------
-    job : that was read.
-    plan, given : geometry, and circumstances with the machine's state.
-    virtual, simulated : virtual measurements, and what they say of the errors.
-    stated : of each characteristic, in the order of the plan; mm and rad.
-    measured : (c,) values of the measured points, before their mean error is taken off; ``None`` where nothing was measured.
-    budget : shares by cause.
-    unseen : what the calibration left free or did not see, by characteristic in the order of the plan, largest first.
-    further : what to measure on the machine for that.
-    judged : by characteristic; ``None`` where the drawing has no limits.
-    together : probability that all limits are kept at once; ``None`` without measured points or limits.
-    ways : as planned, then what would change u.
-    displaced : contact points.
-    origin_mm : where the part's origin lies in coordinates of the machine, or about which place it does.
-    standing : the machine's certificate.
-    methods : other methods on this part beside this one; ``None`` where the job has none.
-    digits : of u that were asked for; ``None`` where the number of draws was.
-    seed : of everything random.
-    asked : virtual measurements that were asked for, of which ``digits`` may need more.
-    files : that come with the page, by name.
-    warnings : what the reader must know before using a figure.
-    """
+    """A part's measurement, with its uncertainty and what follows."""
 
     job: PartJob
+    # plan, given: geometry, and circumstances with the machine's state
     plan: Plan
     given: Circumstances
+    # virtual, simulated: virtual measurements, and what they say of the errors
     virtual: Virtual
     simulated: Simulated
-    stated: tuple[Stated, ...]
+    stated: tuple[Stated, ...]  # of each characteristic, in the order of the plan; mm and rad
+    # (c,) values of the measured points, before their mean error is taken off; ``None`` where nothing was measured
     measured: Floats | None
-    budget: Budget
+    budget: Budget  # shares by cause
+    # what the calibration left free or did not see, by characteristic in the order of the plan, largest first
     unseen: tuple[Unseen, ...]
-    further: Further | None
-    judged: tuple[LimitDecision | None, ...]
-    together: float | None
-    ways: tuple[Way, ...]
-    displaced: Displaced
+    further: Further | None  # what to measure on the machine for that
+    judged: tuple[LimitDecision | None, ...]  # by characteristic; ``None`` where the drawing has no limits
+    together: float | None  # probability that all limits are kept at once; ``None`` without measured points or limits
+    ways: tuple[Way, ...]  # as planned, then what would change u
+    displaced: Displaced  # contact points
+    # where the part's origin lies in coordinates of the machine, or about which place it does
     origin_mm: tuple[float, float, float]
-    standing: Standing
-    methods: Comparison | None = None
-    digits: int | None = None
-    seed: int = 0
-    asked: int = 0
-    warnings: tuple[Text, ...] = ()
-    files: Mapping[str, bytes] = field(default_factory=dict)
+    standing: Standing  # the machine's certificate
+    methods: Comparison | None = None  # other methods on this part beside this one; ``None`` where the job has none
+    digits: int | None = None  # of u that were asked for; ``None`` where the number of draws was
+    seed: int = 0  # of everything random
+    asked: int = 0  # virtual measurements that were asked for, of which ``digits`` may need more
+    warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure
+    files: Mapping[str, bytes] = field(default_factory=dict)  # that come with the page, by name
 
     @property
     def characteristics(self) -> list[CharacteristicFacts]:

@@ -18,11 +18,9 @@ from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.maths.uncertainty.budget import Line
 from cmm_uq.maths.uncertainty.rounding import figure, rounded, significant
 
-_NOTHING = 5e-4
-"""Share of a variance that is printed as none."""
-
+_NOTHING = 5e-4  # share of a variance that is printed as none
+# characteristics for which is told why methods differ, and whose budgets are listed: those that differ most
 EXPLAINED = 6
-"""Characteristics for which is told why methods differ, and whose budgets are listed: those that differ most."""
 
 FOLLOWED: Mapping[Method, Text] = {
     "calibrated_part": say(
@@ -115,11 +113,11 @@ def _figures(own: Sequence[Compared], *, angle: bool) -> Table:
             name = say("{method:capital}", method=METHODS[stated.method])
             rows.append((Verbatim(one.name), name, value, significant(stated.u / per_small),
                          significant(stated.U / per_small), apart))  # fmt: skip
-    notes = (
-        say("Eₙ: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
-            "methods contradict each other. Values that come from the same measured points have most of their error in "
-            "common, so that theirs is small."),
-    )  # fmt: skip
+    notes = say(
+        "Eₙ: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
+        "methods contradict each other. Values that come from the same measured points have most of their error in "
+        "common, so that theirs is small."
+    )
     return Table(say("Angles by each method") if angle else say("Lengths by each method"), columns, tuple(rows), notes)
 
 
@@ -238,8 +236,6 @@ def _figure(one: Figure) -> dict[str, Any]:
 def _compared(one: Compared) -> dict[str, Any]:
     return {
         "name": one.name,
-        "normalised_errors": [
-            {"one": pair.one, "other": pair.other, "E_n": pair.normalised} for pair in one.pairs
-        ],
+        "normalised_errors": [{"one": pair.one, "other": pair.other, "E_n": pair.normalised} for pair in one.pairs],
         "why": [str.__str__(text) for text in one.why],
-    }  # fmt: skip
+    }

@@ -79,10 +79,7 @@ def overview_of(found: PartFound) -> Overview:
 def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
     """Whether the part conforms.
 
-    Parameters
-    ----------
-    outcomes : of the characteristics that were decided on.
-    measured : whether anything was.
+    ``measured``: whether anything was.
     """
     outcome = gravest(outcomes)
     if not outcomes:
@@ -231,12 +228,7 @@ PLANNED = say("Measurement uncertainty")
 
 
 def part_document(found: PartFound) -> Document:
-    """Its page.
-
-    Parameters
-    ----------
-    found : all that it says.
-    """
+    """Its page."""
     facts = found.job.facts
     measured = found.measured is not None
     lacking = lacking_of(found)

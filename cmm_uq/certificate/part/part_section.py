@@ -17,8 +17,7 @@ from cmm_uq.certificate.part.measurement import PartFound
 from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
 from cmm_uq.maths.uncertainty.rounding import nominal
 
-_SHORT = 8
-"""Letters up to which features are lettered in pictures by their names, else by their numbers."""
+_SHORT = 8  # letters up to which features are lettered in pictures by their names, else by their numbers
 
 
 def lettered_names(plan: Plan) -> list[Text]:
@@ -52,7 +51,6 @@ def part_section(found: PartFound) -> Section:
 
 
 _UM = unit("µm")
-
 _FEATURES = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
 
 

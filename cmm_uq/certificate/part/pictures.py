@@ -27,19 +27,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_NORMAL, _STEM = 0.05, 0.22
-"""Of the largest span: how long a normal is drawn, and a stylus at most."""
+_NORMAL, _STEM = 0.05, 0.22  # of the largest span: how long a normal is drawn, and a stylus at most
 
 
 def part_picture(plan: Plan, pose: Pose, names: Sequence[Text]) -> Plot:
-    """Four views of the part with all of its points.
-
-    Parameters
-    ----------
-    plan : of the measurement.
-    pose : in which the styli reach it.
-    names : of the features, as the pictures letter them.
-    """
+    """Four views of the part with all of its points."""
     points, normals = plan.points, plan.normals
     largest = span_of(plan)
     tips, roots = _stems(plan, pose, largest)
@@ -87,15 +79,10 @@ def _stems(plan: Plan, pose: Pose, largest: float) -> tuple[Floats, Floats]:
     return np.array(tips), np.array(roots)
 
 
-_LONGEST = 0.13
-"""Of the largest span, the largest error as it is drawn."""
-
+_LONGEST = 0.13  # of the largest span, the largest error as it is drawn
 _STEPS = 20
-_SEEN = 0.02
-"""Of the longest, an arrow that can be seen as one."""
-
-MOST = 150
-"""Ellipses in one view: more run into each other."""
+_SEEN = 0.02  # of the longest, an arrow that can be seen as one
+MOST = 150  # ellipses in one view: more run into each other
 
 
 def errors_picture(plan: Plan, errors: Displaced) -> Plot:

@@ -39,36 +39,23 @@ from cmm_uq.certificate.plots.style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FARTHEST = 0.45
-"""Of the distance of the limits, how far the picture goes beyond either."""
-
-_TIMES = 2.0
-"""A single limit stands so many intervals from where its picture ends, or as far as the value needs."""
-
-A_PAGE = 40
-"""Rows of one picture."""
+_FARTHEST = 0.45  # of the distance of the limits, how far the picture goes beyond either
+_TIMES = 2.0  # A single limit stands so many intervals from where its picture ends, or as far as the value needs
+A_PAGE = 40  # rows of one picture
 
 
 @dataclass(frozen=True)
 class Margin:
-    """One characteristic.
-
-    Parameters
-    ----------
-    name : of it.
-    value : measured, in any unit; the middle of what is allowed where nothing was measured.
-    interval : of the value, same unit.
-    lower, upper : limits, same unit; ``None`` where there is none. At least one is there.
-    outcome : of the decision; ``None`` where nothing was measured.
-    accepted : least and largest value that the rule accepts; ``None`` where it accepts none or is not known.
-    """
+    """One characteristic."""
 
     name: Text
-    value: float
-    interval: tuple[float, float]
+    value: float  # measured, in any unit; the middle of what is allowed where nothing was measured
+    interval: tuple[float, float]  # of the value, same unit
+    # lower, upper: limits, same unit; ``None`` where there is none. At least one is there.
     lower: float | None
     upper: float | None
-    outcome: Outcome | None
+    outcome: Outcome | None  # of the decision; ``None`` where nothing was measured
+    # least and largest value that the rule accepts; ``None`` where it accepts none or is not known
     accepted: tuple[float | None, float | None] | None = None
 
     @property
@@ -104,12 +91,7 @@ def _number(place: int, count: int) -> tuple[int, int] | None:
 
 
 def margin_plot(rows: Sequence[Margin], part: tuple[int, int] | None = None) -> Plot:
-    """One picture.
-
-    Parameters
-    ----------
-    part : which of how many, where there are several.
-    """
+    """One picture."""
     height = 17.0 + 5.2 * len(rows)
     measured = any(row.outcome is not None for row in rows)
     with house_style():
@@ -181,24 +163,18 @@ def _interval(ax: Axes, place: int, row: Margin) -> None:
                     bbox={"facecolor": "white", "alpha": 0.8, "lw": 0, "pad": 0.5})  # fmt: skip
 
 
+# neighbours differ in lightness, so that they can be told apart without colour
 _SHADES = ("#0b5c7a", "#86b1c2", "#a84e08", "#e0b48a", "#5a666e", "#c3ccd0", "#3f86a0", "#cc7f3c")
-"""Neighbours differ in lightness, so that they can be told apart without colour."""
-
 _DARK = ("#0b5c7a", "#a84e08", "#5a666e")
-_LEAST = 0.07
-"""Share from which on a figure has room in its part."""
-
+_LEAST = 0.07  # share from which on a figure has room in its part
 _LEFT_MM, _RIGHT_MM, _ROW_MM = 58.0, 2.5, 5.2
 
 
 def shares_plots(names: Sequence[Text], causes: Sequence[Text], shares: Floats) -> list[Plot]:
     """The bars in order, forty a picture.
 
-    Parameters
-    ----------
-    names : (c,) of the characteristics.
-    causes : (g,) in words.
-    shares : (g, c) of each, which add up to 1, or to 0 of one that has no uncertainty.
+    ``names``: (c,) of the characteristics. ``causes``: (g,) in words. ``shares``: (g, c) of each, which add up to 1, or to 0
+    of one that has no uncertainty.
     """
     starts = range(0, len(names), A_PAGE)
     return [_bars(names[i : i + A_PAGE], causes, shares[:, i : i + A_PAGE]) for i in starts]
@@ -258,19 +234,14 @@ def _legend_lines(causes: Sequence[Text]) -> list[list[tuple[int, float]]]:
 
 
 _SIDE_MM, _LEAST_MM = 5.0, 2.2
-LEAST = 0.1
-"""Correlation from which on there is a dot."""
-
+LEAST = 0.1  # correlation from which on there is a dot
 _CLASSES = 5
 
 
 def correlation_plot(numbers: Sequence[Text], correlation: Floats) -> Plot:
     """The lower half of the matrix.
 
-    Parameters
-    ----------
-    numbers : (c,) short names of the characteristics, two at least.
-    correlation : (c, c).
+    ``numbers``: (c,) short names of the characteristics, two at least. ``correlation``: (c, c).
     """
     count = len(numbers)
     values = finite("correlation", correlation, (count, count))

@@ -174,8 +174,7 @@ def _plain(text: Text) -> str:
     return str.__str__(text)
 
 
-OWN = "its `unit`"
-"""Unit of values of a characteristic: the one that stands beside them, mm or °."""
+OWN = "its `unit`"  # unit of values of a characteristic: the one that stands beside them, mm or °
 
 PART_RESULTS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {

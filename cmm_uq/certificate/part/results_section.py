@@ -12,8 +12,7 @@ from cmm_uq.certificate.part.measurement import PartFound
 from cmm_uq.certificate.part.plots import Margin, correlation_plot, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 
-FEW = 8
-"""Characteristics up to which their correlations are a table."""
+FEW = 8  # characteristics up to which their correlations are a table
 
 
 def results_section(found: PartFound) -> Section:

@@ -25,33 +25,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = (say("x / mm"), say("y / mm"), say("z / mm"))
-
+# mm: beside the left panels, right of the others, above, between the rows besides what stands under each, between columns
 _LEFT, _RIGHT, _TOP, _GAP, _UNDER, _BETWEEN = 13.0, 2.0, 5.0, 8.0, 9.5, 14.0
-"""mm: beside the left panels, right of the others, above, between the rows besides what stands under each, between columns."""
-
-_HIGHEST = 118.0
-"""mm that both rows may take together."""
-
+_HIGHEST = 118.0  # mm that both rows may take together
+# least span of a part that is drawn, mm, and of a panel, of the largest span: its axis must find room
 _SMALLEST, _NARROWEST = 10.0, 0.16
-"""Least span of a part that is drawn, mm, and of a panel, of the largest span: its axis must find room."""
-
 _OUTLINE = "#a9b4ba"
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One of them.
+    """One of them."""
 
-    Parameters
-    ----------
-    name : of the view, above its panel.
-    matrix : (2, 3) from the part to the panel.
-    axes : numbers of the axes that it shows along x and y; none of the oblique one.
-    """
-
-    name: Text
-    matrix: Floats
-    axes: tuple[int, int] | None
+    name: Text  # of the view, above its panel
+    matrix: Floats  # (2, 3) from the part to the panel
+    axes: tuple[int, int] | None  # numbers of the axes that it shows along x and y; none of the oblique one
 
     @property
     def along(self) -> Floats:
@@ -78,11 +66,7 @@ VIEWS = (ABOVE, OBLIQUE, FRONT, SIDE)
 def panels(points: Floats, room: float, note_mm: float) -> tuple[Figure, list[tuple[View, Axes]]]:
     """A figure with the four views.
 
-    Parameters
-    ----------
-    points : (n, 3) all that is to be seen.
-    room : beside these on every side, of the largest span.
-    note_mm : room for a line of explanation under the panels.
+    ``points``: (n, 3) all that is to be seen.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
@@ -145,19 +129,13 @@ def segments(ax: Axes, start: Floats, end: Floats, colour: str, width: float, zo
     ax.plot(across, up, lw=width, color=colour, solid_capstyle="round", zorder=zorder)
 
 
+# mm from its anchor where a label is tried, in this order
 _PLACES = ((0, 1.6), (1.6, 0), (0, -1.6), (-1.6, 0), (1.3, 1.3), (-1.3, 1.3), (1.3, -1.3), (-1.3, -1.3), (0, 0))
-"""mm from its anchor where a label is tried, in this order."""
-
 _LETTER_MM = 2.7
 
 
 def label(ax: Axes, anchors: Floats, names: Sequence[Text], across_mm: float) -> list[Text]:
-    """Names beside their anchors (n, 2), those that find room; which they are.
-
-    Parameters
-    ----------
-    across_mm : width of the panel on paper.
-    """
+    """Names beside their anchors (n, 2), those that find room; which they are."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     scale, taken, found = across_mm / (x1 - x0), list[tuple[float, float, float, float]](), list[Text]()
     wide, high = across_mm, scale * (y1 - y0)

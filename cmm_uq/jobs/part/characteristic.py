@@ -17,38 +17,26 @@ What = Literal[
 ]  # fmt: skip
 
 AXIAL: tuple[Kind, ...] = ("line", "cylinder", "cone")
+# kinds whose direction is measured; that of a circle is nominal
 TURNED: tuple[Kind, ...] = ("line", "plane", "cylinder", "cone")
-"""Kinds whose direction is measured; that of a circle is nominal."""
-
 DIRECTED: tuple[Kind, ...] = ("line", "plane", "circle", "cylinder", "cone")
 EVERY: tuple[Kind, ...] = ("point", "line", "plane", "circle", "sphere", "cylinder", "cone")
 PLACED: tuple[Kind, ...] = ("point", "circle", "sphere", "cylinder", "cone")
-
 Feature = Annotated[str, Field(min_length=1, max_length=100)]
 
 
 @dataclass(frozen=True)
 class Asks:
-    """What a characteristic is of.
+    """What a characteristic is of."""
 
-    Parameters
-    ----------
-    kinds : of features that it may be of.
-    features : how many of them.
-    datum_kinds : of datums that it may have; none where it has no datums.
-    datums : how many of them at least.
-    limits : how the drawing limits it: by a ``zone``, by ``lengths`` or by ``angles``.
-    framed : whether it needs the alignment where it has no datums of its own.
-    alone : kinds of features of which it may be with one of them only.
-    """
-
-    kinds: tuple[Kind, ...]
-    features: int = 1
-    datum_kinds: tuple[Kind, ...] = ()
-    datums: int = 0
+    kinds: tuple[Kind, ...]  # of features that it may be of
+    features: int = 1  # how many of them
+    datum_kinds: tuple[Kind, ...] = ()  # of datums that it may have; none where it has no datums
+    datums: int = 0  # how many of them at least
+    # how the drawing limits it: by a ``zone``, by ``lengths`` or by ``angles``
     limits: Literal["zone", "lengths", "angles"] = "zone"
-    framed: bool = False
-    alone: tuple[Kind, ...] = ()
+    framed: bool = False  # whether it needs the alignment where it has no datums of its own
+    alone: tuple[Kind, ...] = ()  # kinds of features of which it may be with one of them only
 
 
 ASKS: Mapping[What, Asks] = {

@@ -38,11 +38,9 @@ def readings(feature: Probed, stylus: StylusFacts, facts: PartFile) -> Floats:
     return np.asarray(placed - stylus.offset_mm + np.array(facts.machine_state.origin_mm))
 
 
+# of a nominal orientation: what is off by more than a degree is another orientation than the drawing's
 _NEARLY = np.sin(np.radians(1.0))
-"""Of a nominal orientation: what is off by more than a degree is another orientation than the drawing's."""
-
-_FAR = 0.1
-"""Share of a nominal size by which the middle of its limits may lie beside it, for fits."""
+_FAR = 0.1  # share of a nominal size by which the middle of its limits may lie beside it, for fits
 
 
 def check_names(facts: PartFile, places: Places, wrong: Gathered) -> None:
@@ -101,12 +99,7 @@ def _datums(names: Sequence[str], known: Sequence[str], where: str, wrong: Gathe
 
 
 def check_plan(facts: PartFile, features: Mapping[str, Probed], places: Places, wrong: Gathered) -> None:
-    """Gather what the tables say against each other; all names lead somewhere.
-
-    Parameters
-    ----------
-    features : by name.
-    """
+    """Gather what the tables say against each other; all names lead somewhere."""
     for check in (_tips, _common_faces, _alignment, _characteristics, _travel):
         for error in check(facts, features, places):
             wrong.add(error)
@@ -183,12 +176,7 @@ def _characteristics(facts: PartFile, features: Mapping[str, Probed], places: Pl
 
 
 def unfit(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:
-    """What keeps a characteristic from being evaluated: the problem, the key, and what mends it.
-
-    Parameters
-    ----------
-    features : by name; all of its own are there.
-    """
+    """What keeps a characteristic from being evaluated: the problem, the key, and what mends it."""
     checks: tuple[_Check, ...] = (_of_its_kinds, _association, _nominal_orientation, _limits_of_the_value, _whole_frame)
     return next((found for check in checks if (found := check(one, features))), None)
 
@@ -248,8 +236,7 @@ def _nominal_orientation(one: CharacteristicFacts, features: Mapping[str, Probed
             'Mend a direction, or ask for "angularity"')  # fmt: skip
 
 
-_NORMAL = ("plane",)
-"""Kinds whose direction is across what they are; a circle is told by its axis."""
+_NORMAL = ("plane",)  # kinds whose direction is across what they are; a circle is told by its axis
 
 
 def _limits_of_the_value(one: CharacteristicFacts, features: Mapping[str, Probed]) -> tuple[str, str, str] | None:

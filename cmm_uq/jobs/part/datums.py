@@ -19,13 +19,8 @@ from cmm_uq.jobs.part.feature import Kind
 from cmm_uq.jobs.part.probed import Probed
 
 BETWEEN = "-"
-
-_APART_MM = 0.01
-"""From one axis: what lies farther from it by its nominal lies on another."""
-
-_ACROSS = 1e-3
-"""Sine of the angle below which two directions are one, a twentieth of a degree."""
-
+_APART_MM = 0.01  # from one axis: what lies farther from it by its nominal lies on another
+_ACROSS = 1e-3  # sine of the angle below which two directions are one, a twentieth of a degree
 _AXIAL: tuple[Kind, ...] = ("circle", "cylinder", "cone")
 _FACES: tuple[Kind, ...] = ("plane", "point")
 
@@ -33,14 +28,7 @@ _FACES: tuple[Kind, ...] = ("plane", "point")
 def members(name: str, known: Collection[str]) -> tuple[str, ...]:
     """Names of the features that a datum is on: one, or those between the hyphens.
 
-    Parameters
-    ----------
-    name : of the datum, as ``A`` or ``A-B``. A feature that has a hyphen in its own name is found by its whole name.
-    known : names of features.
-
-    Raises
-    ------
-    CmmUqError : there is none of that name, or the name says it in two ways, or a feature twice.
+    ``name``: of the datum, as ``A`` or ``A-B``. A feature that has a hyphen in its own name is found by its whole name.
     """
     if name in known:
         return (name,)
@@ -94,17 +82,12 @@ def as_one(features: Sequence[Probed]) -> tuple[Kind, Floats, Floats | None]:
     return "point", points.mean(axis=0), None
 
 
+# singular value below which a motion counts as free: datums that lean by less than a twentieth of a degree are one
 _FREE = 1e-3
-"""Singular value below which a motion counts as free: datums that lean by less than a twentieth of a degree are one."""
 
 
 def freedoms(datums: Sequence[tuple[Probed, ...]]) -> tuple[str, ...]:
-    """What the datums leave free, in words; nothing where they fix the frame.
-
-    Parameters
-    ----------
-    datums : in order, each the features that it is on: several of a common datum.
-    """
+    """What the datums leave free, in words; nothing where they fix the frame."""
     every = [one for datum in datums for one in datum]
     centre, size = _about(every)
     fixed = [_fixed(one, centre, size, alone=len(datum) == 1) for datum in datums for one in datum]

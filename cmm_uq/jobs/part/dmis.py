@@ -57,8 +57,8 @@ KINDS = {
     "SPHERE": "sphere",
     "CYLNDR": "cylinder",
 }
+# that a feature has at least: its place, its direction, its diameter
 NUMBERS = {"point": 6, "line": 9, "plane": 6, "circle": 7, "sphere": 4, "cylinder": 7}
-"""That a feature has at least: its place, its direction, its diameter."""
 
 PASSED = (
     "DMISMN", "DMISMD", "DISPLY", "FILNAM", "PRCOMP", "SNSET", "SNSMNT", "OPEN", "CLOSE", "GOTO", "MODE", "TEXT", "SAVE",
@@ -82,24 +82,11 @@ _REFUSED: Mapping[str, str] = {
 }  # fmt: skip
 """Words that change what a tolerance means, refused in words of their own."""
 
-_PLAIN = ("RFS", "2D", "3D")
-"""Words that leave a tolerance as it is, or say what its feature says already."""
+_PLAIN = ("RFS", "2D", "3D")  # words that leave a tolerance as it is, or say what its feature says already
 
 
 def toleranced(words: list[str], feature: Facts, millimetres: float, datums: Mapping[str, str]) -> Facts:
-    """Keys of the characteristic that a tolerance is of a feature, but its name.
-
-    Parameters
-    ----------
-    words : of the tolerance.
-    feature : that it was given to, as its table.
-    millimetres : in the program's unit of length.
-    datums : names of features that are read, by the labels of datums.
-
-    Raises
-    ------
-    NotUnderstoodError : it is none that is read.
-    """
+    """Keys of the characteristic that a tolerance is of a feature, but its name."""
     sort = words[0].upper() if words else ""
     if sort not in _TOLERANCES:
         raise NotUnderstoodError(_REFUSED.get(sort) or f"is a tolerance {sort or 'of no kind'}, which is not read")
@@ -141,23 +128,12 @@ def _datum(label: str, datums: Mapping[str, str]) -> str:
 
 
 PROGRAM = "DMIS program"
-
 _LABELLED = re.compile(r"^(?P<of>\w+)\s*\((?P<name>[^)]*)\)\s*=\s*(?P<major>\w+)\s*/\s*(?P<rest>.*)$")
 _PLAIN_of_drawing_dmis = re.compile(r"^(?P<major>\w+)\s*(?:/\s*(?P<rest>.*))?$")
 
 
 def drawing_of_dmis(content: bytes, where: str) -> Drawing:
-    """A DMIS program.
-
-    Parameters
-    ----------
-    content : of the file.
-    where : its path, for messages.
-
-    Raises
-    ------
-    CmmUqError : it is damaged, in units or frames that are not understood, or branches.
-    """
+    """A DMIS program."""
     text, _ = decoded(content, where, None)
     return _Program(where).read([
         (line, statement.partition("$$")[0].strip()) for line, statement in statements(report_lines(text, where), where)
@@ -182,7 +158,6 @@ class _Program:
         self.scanned: set[str] = set()
 
     def read(self, said: list[tuple[int, str]]) -> Drawing:
-        """See :func:`drawing_of_dmis`."""
         for line, statement in said:
             if statement:
                 self._one(line, statement)

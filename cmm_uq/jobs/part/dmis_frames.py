@@ -13,41 +13,25 @@ import numpy as np
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.jobs.part.drawing import NotUnderstoodError
 
-Nominals = Mapping[str, Mapping[str, Any]]
-"""Features that were defined, by name, in the frame of the part."""
-
+Nominals = Mapping[str, Mapping[str, Any]]  # features that were defined, by name, in the frame of the part
 _REFERRED = re.compile(r"^(\w+)\s*\(([^)]*)\)$")
 _SPLIT = re.compile(r",(?![^(]*\))")
-_NONE = 1e-6
-"""Length below which a vector has no direction."""
-
-_DIGITS = 9
-"""Decimals of a place, mm: a picometre."""
+_NONE = 1e-6  # length below which a vector has no direction
+_DIGITS = 9  # decimals of a place, mm: a picometre
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The frame in which a program speaks, in that of the part.
+    """The frame in which a program speaks, in that of the part."""
 
-    Parameters
-    ----------
-    axes : (3, 3) unit vectors, a row each.
-    origin : (3,) mm.
-    millimetres, degrees : in the program's units of length and angle.
-    """
-
-    axes: Floats = field(default_factory=lambda: np.eye(3))
-    origin: Floats = field(default_factory=lambda: np.zeros(3))
+    axes: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) unit vectors, a row each
+    origin: Floats = field(default_factory=lambda: np.zeros(3))  # (3,) mm
+    # millimetres, degrees: in the program's units of length and angle
     millimetres: float = 1.0
     degrees: float = 1.0
 
     def place(self, number: list[float]) -> list[float]:
-        """A place that the program gives, in the frame of the part, mm.
-
-        Raises
-        ------
-        NotUnderstoodError : it has fewer than three coordinates.
-        """
+        """A place that the program gives, in the frame of the part, mm."""
         if len(number) < 3:
             raise NotUnderstoodError("has fewer than three coordinates")
         found = self.origin + self.millimetres * np.array(number) @ self.axes
@@ -58,17 +42,7 @@ class Frame:
         return [float(value) for value in np.round(np.array(number) @ self.axes, _DIGITS) + 0.0]
 
     def changed(self, major: str, words: list[str], nominal: Nominals, datum: str) -> Frame:
-        """The frame after ``D(…)=MAJOR/WORDS``.
-
-        Parameters
-        ----------
-        nominal : features that were defined.
-        datum : feature of the first word, where that is a datum.
-
-        Raises
-        ------
-        NotUnderstoodError : the change is none that is read; what of it, to follow the words "a frame".
-        """
+        """The frame after ``D(…)=MAJOR/WORDS``."""
         if major == "DATSET":
             return self._set(words, nominal, datum)
         if major == "TRANS":
@@ -150,12 +124,7 @@ def reference(word: str) -> tuple[str, str]:
 
 
 def numbers_of(words: list[str]) -> list[float]:
-    """Numbers.
-
-    Raises
-    ------
-    NotUnderstoodError : one is none, or no finite one.
-    """
+    """Numbers."""
     try:
         found = [float(word) for word in words]
     except ValueError:

@@ -22,16 +22,9 @@ from cmm_uq.jobs.part.feature import FeatureFacts
 from cmm_uq.jobs.part.probed import Probed, probed
 
 Facts = dict[str, Any]
-
-_DIGITS = 9
-"""Decimals of a limit: a picometre, which the sum of a size and a deviation keeps."""
-
-_TOLD = 3
-"""Reasons that are told where nothing is left."""
-
-ALL = "*"
-"""In place of names: everything that is not understood."""
-
+_DIGITS = 9  # decimals of a limit: a picometre, which the sum of a size and a deviation keeps
+_TOLD = 3  # reasons that are told where nothing is left
+ALL = "*"  # in place of names: everything that is not understood
 KEY = "[part] not_measured"
 
 
@@ -41,53 +34,31 @@ class NotUnderstoodError(Exception):
 
 @dataclass(frozen=True)
 class Unknown:
-    """Something that is not understood.
+    """Something that is not understood."""
 
-    Parameters
-    ----------
-    name : of the feature or characteristic, or of the statement.
-    why : what of it is not understood, to follow its name.
-    where : file and line.
-    """
-
-    name: str
-    why: str
-    where: str
+    name: str  # of the feature or characteristic, or of the statement
+    why: str  # what of it is not understood, to follow its name
+    where: str  # file and line
 
 
 @dataclass
 class Drawing:
-    """What was read.
+    """What was read."""
 
-    Parameters
-    ----------
-    program : format that it was read from.
-    features, characteristics, styli : tables, in order.
-    datums : names of features, of the alignment.
-    unknown : what was not understood.
-    open_keys : by the name of a feature, keys that the file leaves open, whose values are examples.
-    """
-
-    program: str
+    program: str  # format that it was read from
+    # features, characteristics, styli: tables, in order
     features: list[Facts] = field(default_factory=list)
     characteristics: list[Facts] = field(default_factory=list)
     styli: list[Facts] = field(default_factory=list)
-    datums: list[str] = field(default_factory=list)
-    unknown: list[Unknown] = field(default_factory=list)
+    datums: list[str] = field(default_factory=list)  # names of features, of the alignment
+    unknown: list[Unknown] = field(default_factory=list)  # what was not understood
+    # by the name of a feature, keys that the file leaves open, whose values are examples
     open_keys: dict[str, list[str]] = field(default_factory=dict)
 
     def settled(self, without: Sequence[str], where: str) -> list[str]:
         """Names of what is left out knowingly.
 
-        Parameters
-        ----------
-        without : names that may be left out, or :data:`ALL`.
-        where : file, for messages.
-
-        Raises
-        ------
-        CmmUqError : something is not understood and may not be left out, or a name is of nothing that is there; or nothing is
-            left to be measured.
+        ``without``: names that may be left out, or :data:`ALL`.
         """
         wrong = Gathered()
         for one in self.unknown:
@@ -135,40 +106,24 @@ def limits(what: str, low: float, high: float) -> Facts:
 
 
 def refuse_other_kind(what: What, kind: str) -> None:
-    """Refuse a characteristic of a feature that has none of the kind.
-
-    Raises
-    ------
-    NotUnderstoodError : it has none.
-    """
+    """Refuse a characteristic of a feature that has none of the kind."""
     if kind not in ASKS[what].kinds:
         raise NotUnderstoodError(f"is a {what} of a {kind}, which is not read")
 
 
 def usual_strategy(kind: str, count: int | None = None) -> Facts:
-    """How a feature is probed where its plan does not say it.
-
-    Parameters
-    ----------
-    kind : of feature.
-    count : of its points, where that is said.
-    """
+    """How a feature is probed where its plan does not say it."""
     if kind == "cylinder" and not count:
         return {"pattern": "sections", "sections": 3, "points": 8}
     return {"pattern": "points", "points": count or _USUAL[kind]}
 
 
+# points where nothing is said; 25 of a sphere as in ISO 10360-5
 _USUAL: Mapping[str, int] = {"line": 5, "plane": 12, "circle": 12, "sphere": 25, "cylinder": 24, "cone": 24}
-"""Points where nothing is said; 25 of a sphere as in ISO 10360-5."""
 
 
 def probed_of(given: Mapping[str, Any]) -> Probed:
-    """A feature's table with its contact points.
-
-    Raises
-    ------
-    CmmUqError : the readers of a job refuse it.
-    """
+    """A feature's table with its contact points."""
     where = f"feature {given['name']!r}"
     try:
         facts = FeatureFacts.model_validate(dict(given))
@@ -178,12 +133,7 @@ def probed_of(given: Mapping[str, Any]) -> Probed:
 
 
 def set_aside_unsound(drawing: Drawing, where: str) -> None:
-    """Move features and characteristics that the readers of a job would refuse to what is not understood.
-
-    Parameters
-    ----------
-    where : file, for messages.
-    """
+    """Move features and characteristics that the readers of a job would refuse to what is not understood."""
     features: dict[str, Probed] = {}
     for given in list(drawing.features):
         try:

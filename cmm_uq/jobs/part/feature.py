@@ -22,8 +22,7 @@ from cmm_uq.base.files.limits import INPUTS, LISTED
 from cmm_uq.base.files.table import Length, Table, Triple, Uncertainty
 
 _COUNT = re.compile(r"[1-9][0-9]{0,3}")
-FEWEST_UNDULATIONS = 2
-"""One undulation per revolution is a shift, none a change of size."""
+FEWEST_UNDULATIONS = 2  # one undulation per revolution is a shift, none a change of size
 
 
 class FormFacts(Table):
@@ -65,7 +64,6 @@ TWO_POINT = "is a two-point size (LP), which is not modelled: sizes are those of
 PROJECTED = "has a projected tolerance zone, which is not modelled"
 SYMMETRY = "is a symmetry: the median plane of two faces is not modelled"
 FREE_STATE = "is toleranced in the free state, and how a part bends is not modelled"
-
 _INSTEAD = "leave it out, and name it in [part] not_measured"
 
 _WORDS: Mapping[str, str] = {
@@ -97,12 +95,7 @@ def material_condition(datum: str) -> str:
 
 
 def refuse_not_modelled(table: Any) -> Any:
-    """The table as it is; for a validator that runs before any other.
-
-    Raises
-    ------
-    ValueError : a key, or what it says, is not modelled.
-    """
+    """The table as it is; for a validator that runs before any other."""
     for key in _KEYS.keys() & (table.keys() if isinstance(table, Mapping) else set()):
         value = table[key]
         told = _KEYS[key] if value is not False else None
@@ -119,9 +112,7 @@ Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
 Pattern = Literal["points", "grid", "sections", "lines", "circles", "spiral"]
 
-FEWEST: Mapping[Kind, int] = {
-    "point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6,
-}  # fmt: skip
+FEWEST: Mapping[Kind, int] = {"point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6}
 """Points that determine a feature."""
 
 PATTERNS: Mapping[Kind, tuple[Pattern, ...]] = {
@@ -131,11 +122,10 @@ PATTERNS: Mapping[Kind, tuple[Pattern, ...]] = {
 }  # fmt: skip
 """Of each kind, the first of which is its usual one."""
 
+# kinds with a diameter, whose material lies inside of it or around it
 ROUND: tuple[Kind, ...] = ("circle", "sphere", "cylinder", "cone")
-"""Kinds with a diameter, whose material lies inside of it or around it."""
-
+# kinds that are nothing without a direction: that in which a point is probed is against its normal
 DIRECTED: tuple[Kind, ...] = ("point", "line", "plane", "circle", "cylinder", "cone")
-"""Kinds that are nothing without a direction: that in which a point is probed is against its normal."""
 
 ASSOCIATIONS: Mapping[Kind, tuple[Association, ...]] = {
     "point": ("least_squares",), "line": ("least_squares", "minimum_zone", "tangent"),
@@ -168,9 +158,7 @@ _ONLY: Mapping[str, Callable[[Kind, Pattern], bool]] = {
 
 Count = Annotated[int, Field(ge=1, le=LISTED.most)]
 Angle = Annotated[float, Field(ge=-360, le=360)]
-
-NONE_OF_LENGTH = 1e-9
-"""Length of a vector below which it has no direction."""
+NONE_OF_LENGTH = 1e-9  # length of a vector below which it has no direction
 
 
 def _a_direction(vector: list[float] | None) -> list[float] | None:

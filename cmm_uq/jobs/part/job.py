@@ -38,26 +38,16 @@ POSTERIOR = "posterior.npz"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PartJob:
-    """A part's job as read, with the bytes of every file it was read from.
+    """A part's job as read, with the bytes of every file it was read from."""
 
-    Parameters
-    ----------
-    folder : where it lies; the empty path for a job that lies in no folder yet.
-    facts : job.toml.
-    features : with their contact points, in the order of the job.
-    inputs : contents of each input by its path inside the folder.
-    measured : (n, 3) measured points in the order of the features' points, mm; ``None`` where nothing is measured.
-    stated_by : names of those of the inputs that state the machine.
-    others : recordings of other methods.
-    """
-
-    folder: Path
-    facts: PartFile
-    features: tuple[Probed, ...]
-    inputs: Mapping[str, bytes]
+    folder: Path  # where it lies; the empty path for a job that lies in no folder yet
+    facts: PartFile  # job.toml.
+    features: tuple[Probed, ...]  # with their contact points, in the order of the job
+    inputs: Mapping[str, bytes]  # contents of each input by its path inside the folder
+    # (n, 3) measured points in the order of the features' points, mm; ``None`` where nothing is measured
     measured: Floats | None = None
-    stated_by: tuple[str, ...] = ()
-    others: OtherReadings = field(default_factory=OtherReadings)
+    stated_by: tuple[str, ...] = ()  # names of those of the inputs that state the machine
+    others: OtherReadings = field(default_factory=OtherReadings)  # recordings of other methods
 
     @property
     def machine_files(self) -> Mapping[str, bytes]:
@@ -76,14 +66,7 @@ def is_part(content: bytes) -> bool:
 def read_part(folder: Path, *, machine: bool = True) -> PartJob:
     """Read and check a part's job.
 
-    Parameters
-    ----------
-    folder : the job folder, or its job.toml.
-    machine : whether the files that state the machine must be there.
-
-    Raises
-    ------
-    CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
+    ``machine``: whether the files that state the machine must be there.
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
@@ -91,16 +74,7 @@ def read_part(folder: Path, *, machine: bool = True) -> PartJob:
 
 
 def part_of(files: Mapping[str, bytes], *, machine: bool = True) -> PartJob:
-    """Read and check a part's job that lies in no folder yet; see :func:`read_part`.
-
-    Parameters
-    ----------
-    files : contents of job.toml and of all that it names, by name.
-
-    Raises
-    ------
-    CmmUqError : see :func:`read_part`.
-    """
+    """Read and check a part's job that lies in no folder yet; see :func:`read_part`."""
     return _read(InMemory(files), machine=machine)
 
 

@@ -19,8 +19,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.feature import FEWEST, ROUND, FeatureFacts, Kind, Pattern, Strategy
 
-_GOLDEN = np.pi * (3 - np.sqrt(5))
-"""rad: by which a Fibonacci lattice turns from point to point."""
+_GOLDEN = np.pi * (3 - np.sqrt(5))  # rad: by which a Fibonacci lattice turns from point to point
 
 
 def radius_of(facts: FeatureFacts, height: Floats) -> Floats:
@@ -189,44 +188,25 @@ PATTERNS_OF: Mapping[tuple[Kind, Pattern], Callable[[FeatureFacts, Strategy], Fl
 """By kind and pattern, (n, 3) mm."""
 
 
+# from the nominal surface: a contact point farther away from it belongs to another surface, or is a mistake
 OFF_MM = 0.1
-"""From the nominal surface: a contact point farther away from it belongs to another surface, or is a mistake."""
-
-_ACROSS = 1e-3
-"""Sine of the angle below which two directions are one, a twentieth of a degree."""
-
-_TOGETHER_MM = 1e-6
-"""Below which two contact points are one."""
+_ACROSS = 1e-3  # sine of the angle below which two directions are one, a twentieth of a degree
+_TOGETHER_MM = 1e-6  # below which two contact points are one
 
 
 @dataclass(frozen=True, eq=False)
 class Probed:
-    """A feature with the points at which it is probed.
+    """A feature with the points at which it is probed."""
 
-    Parameters
-    ----------
-    facts : what the job says of it.
-    points, normals : (n, 3) nominal contact points, mm, and unit vectors out of the material, in the frame of the part.
-    direction : (3,) unit vector; ``None`` of a sphere and a point, which have none of their own.
-    """
-
-    facts: FeatureFacts
+    facts: FeatureFacts  # what the job says of it
+    # points, normals: (n, 3) nominal contact points, mm, and unit vectors out of the material, in the frame of the part
     points: Floats
     normals: Floats
-    direction: Floats | None
+    direction: Floats | None  # (3,) unit vector; ``None`` of a sphere and a point, which have none of their own
 
 
 def probed(facts: FeatureFacts, where: str) -> Probed:
-    """A feature with its contact points.
-
-    Parameters
-    ----------
-    where : file and table, for messages.
-
-    Raises
-    ------
-    CmmUqError : too few points, or points that are one, lie off the nominal surface or beyond the tip of a cone.
-    """
+    """A feature with its contact points."""
     frame = _Frame.of(facts, where)
     if facts.kind == "point":
         local = np.zeros((1, 3))
@@ -248,13 +228,7 @@ def probed(facts: FeatureFacts, where: str) -> Probed:
 def whole_surface(facts: FeatureFacts, count: int) -> Probed | None:
     """A feature probed evenly from end to end, so closely that it stands for its surface.
 
-    Parameters
-    ----------
-    count : of points.
-
-    Returns
-    -------
-    ``None`` where its extent is not said, or it has none.
+    Returns ``None`` where its extent is not said, or it has none.
     """
     sized = {
         "line": facts.length_mm, "plane": facts.diameter_mm or (facts.length_mm and facts.width_mm), "circle": 1, "sphere": 1,
@@ -277,20 +251,13 @@ class _Frame:
 
     @classmethod
     def of(cls, facts: FeatureFacts, where: str) -> _Frame:
-        """See above.
-
-        Raises
-        ------
-        CmmUqError : two directions that ought to be across each other are one.
-        """
         w = _unit(facts.direction or [0.0, 0.0, 1.0])
         key = "normal" if facts.kind == "line" else "along"
         given = facts.normal if facts.kind == "line" else facts.along
         across = np.eye(3)[int(np.argmin(np.round(np.abs(w), 6)))] if given is None else _unit(given)
         across = across - (across @ w) * w
         if np.linalg.norm(across) < _ACROSS:
-            raise CmmUqError(f"{key} lies along the direction", where=where,
-                             fix=f"Give {key} across it, as [x, y, z]")  # fmt: skip
+            raise CmmUqError(f"{key} lies along the direction", where=where, fix=f"Give {key} across it, as [x, y, z]")
         u = _unit(across)
         if facts.kind == "line":
             return cls(np.array([np.cross(u, w), u, w]))

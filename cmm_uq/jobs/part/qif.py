@@ -42,7 +42,6 @@ from cmm_uq.jobs.part.qif_elements import (
 )
 
 PROGRAM = "QIF plan"
-
 _KINDS = ("Point", "Line", "Plane", "Circle", "Sphere", "Cylinder", "Cone")
 _WHATS: Mapping[str, What] = {
     "Diameter": "size", "SphericalDiameter": "size", "Straightness": "straightness", "Flatness": "flatness",
@@ -58,26 +57,13 @@ _ASSOCIATIONS = {
 
 
 def drawing_of_qif(content: bytes, where: str) -> Drawing:
-    """A QIF plan.
-
-    Parameters
-    ----------
-    content : of the file.
-    where : its path, for messages.
-
-    Raises
-    ------
-    CmmUqError : it is damaged, or does not say its units.
-    """
+    """A QIF plan."""
     return _Document(root_of(content, where), where).drawing()
 
 
-_LENGTH_MM = 20.0
-"""Of a plane or line whose length is not said: an example."""
-
-
+_LENGTH_MM = 20.0  # of a plane or line whose length is not said: an example
+# ends of the names of elements that a plan or a model is made of; statistics, rules and resources have none
 _FEATURES = ("FeatureItem", "FeatureNominal")
-"""Ends of the names of elements that a plan or a model is made of; statistics, rules and resources have none."""
 
 
 class _Document:

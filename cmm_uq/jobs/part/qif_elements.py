@@ -18,12 +18,7 @@ from cmm_uq.jobs.part.feature import FREE_STATE, LINE_PROFILE, POINT_PROFILE, PR
 
 
 def number_of(text: str) -> float:
-    """A number.
-
-    Raises
-    ------
-    NotUnderstoodError : it is none.
-    """
+    """A number."""
     try:
         return float(text)
     except ValueError:
@@ -36,12 +31,7 @@ def inside(element: Element, name: str) -> Element | None:
 
 
 def referred(element: Element, name: str, by_id: Mapping[str, Element]) -> Element:
-    """The element to which another refers by a number.
-
-    Raises
-    ------
-    NotUnderstoodError : there is none.
-    """
+    """The element to which another refers by a number."""
     found = by_id.get(child(element, name))
     if found is None:
         raise NotUnderstoodError(f"refers by {name} to nothing that is there")
@@ -54,24 +44,14 @@ def numbers_in(element: Element | None) -> list[str]:
 
 
 def direction(text: str, place: str) -> list[float]:
-    """A direction or a normal.
-
-    Raises
-    ------
-    NotUnderstoodError : it is not said.
-    """
+    """A direction or a normal."""
     if not text:
         raise NotUnderstoodError("does not say its direction or normal")
     return [number_of(word) for word in three(text, place)]
 
 
 def is_inner(definition: Element) -> bool:
-    """Whether a feature is a hole.
-
-    Raises
-    ------
-    NotUnderstoodError : it does not say.
-    """
+    """Whether a feature is a hole."""
     said = child(definition, "InternalExternal")
     if said not in ("INTERNAL", "EXTERNAL"):
         raise NotUnderstoodError("does not say whether it is a hole or a shaft")
@@ -85,14 +65,7 @@ _LINEAR, _ANGULAR = "LinearUnit", "AngularUnit"
 class QifUnits:
     """What a number of a document is in mm and degrees.
 
-    Parameters
-    ----------
-    root : of the document.
-    where : its path, for messages.
-
-    Raises
-    ------
-    CmmUqError : it does not say its unit of length, or one that is not known.
+    ``root``: of the document.
     """
 
     def __init__(self, root: Element, where: str) -> None:
@@ -117,12 +90,7 @@ class QifUnits:
         self._pmi_degrees = math.degrees(own["PMIAngularUnit"]) if "PMIAngularUnit" in own else self._degrees
 
     def mm(self, element: Element, *, pmi: bool = False) -> float:
-        """A length.
-
-        Raises
-        ------
-        NotUnderstoodError : it is no number, or in a unit that is not known.
-        """
+        """A length."""
         return number_of(_text(element)) * self._scale(element, pmi=pmi)
 
     def degrees(self, element: Element, *, pmi: bool = False) -> float:
@@ -176,19 +144,7 @@ def is_plain(condition: str) -> bool:
 def datums_of(
     frame: Element | None, by_id: Mapping[str, Element], of_nominal: Mapping[str, str], features: Sequence[Facts]
 ) -> list[str]:
-    """Names of the features of a datum reference frame, in order of precedence; of a common datum with hyphens between them.
-
-    Parameters
-    ----------
-    frame : the DatumReferenceFrame.
-    by_id : elements of the document.
-    of_nominal : names of features that are read, by the number of their nominal.
-    features : that are read.
-
-    Raises
-    ------
-    NotUnderstoodError : a datum is none that is read.
-    """
+    """Names of the features of a datum reference frame, in order of precedence; hyphens between those of a common one."""
     listed = (
         [] if frame is None else [each for group in frame for each in (group if local(group) == "Datums" else (group,))]
     )
@@ -243,29 +199,24 @@ _NAMED: Mapping[str, str] = {
     "FreeState": FREE_STATE,
     "ProjectedToleranceZone": PROJECTED,
     "ProjectedToleranceZoneValue": PROJECTED,
-    "TangentPlane": "is of a tangent plane: give its feature association = \"tangent\" by hand",
+    "TangentPlane": 'is of a tangent plane: give its feature association = "tangent" by hand',
     "SecondCompositeSegmentPositionDefinition": "is a composite tolerance of several segments, which is not read",
     "UnequallyDisposedZone": "has an unequally disposed zone, which is not modelled",
     "DirectionalZoneLimit": "has a zone of one direction, which is not read",
     "FeatureZoneIds": "is of a restricted zone of its feature, which is not read",
-}  # fmt: skip
+}
 
 SORTS: Mapping[str, str] = {
     "PointProfile": POINT_PROFILE,
     "LineProfile": LINE_PROFILE,
     "SurfaceProfile": SURFACE_PROFILE,
     "SurfaceProfileNonUniform": SURFACE_PROFILE,
-}  # fmt: skip
+}
 """Kinds of characteristics that are refused in words of their own, by the beginning of the element's name."""
 
 
 def refuse_besides(element: Element) -> None:
-    """Refuse what a definition or a nominal of a characteristic says besides what is read of it.
-
-    Raises
-    ------
-    NotUnderstoodError : it does, what.
-    """
+    """Refuse what a definition or a nominal of a characteristic says besides what is read of it."""
     for inner in element:
         name, said = local(inner), "".join(inner.itertext()).strip()
         if name in _READ or said == "false":
@@ -275,24 +226,14 @@ def refuse_besides(element: Element) -> None:
 
 
 def refuse_condition(definition: Element) -> None:
-    """Refuse a tolerance that holds at maximum or least material.
-
-    Raises
-    ------
-    NotUnderstoodError : it does.
-    """
+    """Refuse a tolerance that holds at maximum or least material."""
     condition = child(definition, "MaterialCondition")
     if not is_plain(condition):
         raise NotUnderstoodError(f"holds at {condition.lower()} material condition, which is not modelled")
 
 
 def refuse_zone(definition: Element, what: What, *, about_an_axis: bool) -> None:
-    """Refuse a tolerance zone of another shape than the usual one.
-
-    Raises
-    ------
-    NotUnderstoodError : it is.
-    """
+    """Refuse a tolerance zone of another shape than the usual one."""
     zone = inside(definition, "ZoneShape")
     shape = "" if zone is None or not len(zone) else local(zone[0])
     usual: tuple[str, ...] = ("DiametricalZone",) if about_an_axis else ("PlanarZone",)

@@ -15,30 +15,16 @@ from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.tables import CalibratedPartFacts, OrientationsFacts, PartFile, Places
 
 COLUMNS = ("feature", "point", "x_mm", "y_mm", "z_mm")
-FAR_MM = 5.0
-"""From the nominal contact point: a measured one farther away is in another frame, unit or order."""
+FAR_MM = 5.0  # from the nominal contact point: a measured one farther away is in another frame, unit or order
 
-_IN_UNITS = {
-    1 / 25.4: "in inches", 1e-3: "in metres", 25.4: "taken for inches once too often", 1e3: "in µm",
-}  # fmt: skip
+_IN_UNITS = {1 / 25.4: "in inches", 1e-3: "in metres", 25.4: "taken for inches once too often", 1e3: "in µm"}
 """By what the factor of points in another unit to those in mm is; a scale that is off by a hundredth is another matter."""
 
 _FIX = "Save it as CSV in UTF-8, with commas between the columns"
 
 
 def measured_points(content: bytes, where: str, features: Sequence[Probed]) -> Floats:
-    """(n, 3) measured points in the order of the plan's, mm.
-
-    Parameters
-    ----------
-    content : of the file.
-    where : its name, for messages.
-    features : of the plan, in order.
-
-    Raises
-    ------
-    CmmUqError : a column is missing, a cell is no number, a point is missing, unknown, there twice or far from its nominal.
-    """
+    """(n, 3) measured points in the order of the plan's, mm."""
     cells = cells_of(content, where, _FIX)
     for name in COLUMNS:
         if name not in cells.header:
@@ -65,12 +51,7 @@ def _column(cells: Cells, i: int, where: str) -> Floats:
 def in_order(
     names: Sequence[str], point: Floats, xyz: Floats, cells: Cells, where: str, features: Sequence[Probed]
 ) -> Floats:
-    """(n, 3) points in the order of the plan's, of rows that name feature and point.
-
-    Raises
-    ------
-    CmmUqError : see :func:`measured_points`.
-    """
+    """(n, 3) points in the order of the plan's, of rows that name feature and point."""
     known = {one.facts.name: one for one in features}
     rows: dict[tuple[str, int], int] = {}
     wrong = Gathered()
@@ -119,27 +100,17 @@ def _refuse_another_unit(
 
 
 _VALUES = ("value_mm", "value_deg")
-_LARGEST = 1_000_000
-"""Number of a cycle, orientation or repeat."""
-
-ReadFile = Callable[[str], tuple[bytes, str]]
-"""Bytes of a file that the job names, and its name in messages."""
+_LARGEST = 1_000_000  # number of a cycle, orientation or repeat
+ReadFile = Callable[[str], tuple[bytes, str]]  # bytes of a file that the job names, and its name in messages
 
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """A part measured n times: by values of characteristics or by points.
+    """A part measured n times: by values of characteristics or by points."""
 
-    Parameters
-    ----------
-    group : (n,) number of the cycle or orientation of each.
-    values : by characteristic, (n,) mm or rad; empty where points were recorded.
-    points : (n, p, 3) in the order of the plan's; ``None`` where values were recorded.
-    """
-
-    group: Ints
-    values: Mapping[str, Floats]
-    points: Floats | None = None
+    group: Ints  # (n,) number of the cycle or orientation of each
+    values: Mapping[str, Floats]  # by characteristic, (n,) mm or rad; empty where points were recorded
+    points: Floats | None = None  # (n, p, 3) in the order of the plan's; ``None`` where values were recorded
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,12 +134,7 @@ class OtherReadings:
 def other_readings(
     facts: PartFile, features: Sequence[Probed], places: Places, read: ReadFile, wrong: Gathered
 ) -> OtherReadings:
-    """Read and check the recordings that ``[by_calibrated_part]`` and ``[by_orientations]`` name; what is wrong is gathered.
-
-    Parameters
-    ----------
-    read : gives the file of a name.
-    """
+    """Read and check the recordings that ``[by_calibrated_part]`` and ``[by_orientations]`` name; problems are gathered."""
     calibrated = orientations = length = None
     tips: dict[str, Read] = {}
     if (one := facts.by_calibrated_part) is not None:
@@ -229,9 +195,7 @@ def _repeats(
 ) -> Repeats:
     """Values or points by cycle or orientation.
 
-    Parameters
-    ----------
-    needed : characteristics whose values must be there; ``None`` takes those that are.
+    ``needed``: characteristics whose values must be there; ``None`` takes those that are.
     """
     cells = _cells(content, where)
     if "feature" in cells.header:
@@ -315,8 +279,7 @@ def _standard(content: bytes, where: str, column: str, calibrated: float) -> Rea
     return found
 
 
-_FAR = 0.01
-"""Share of a standard's size beyond which a reading is of another one, or in another unit."""
+_FAR = 0.01  # share of a standard's size beyond which a reading is of another one, or in another unit
 
 
 def _refuse_unequal(one: Repeats | Read, where: str) -> None:

@@ -20,9 +20,7 @@ from cmm_uq.jobs.tables.identification import Identification, Laboratory
 from cmm_uq.jobs.tables.machine import Travel, check_carriages
 from cmm_uq.jobs.tables.origin import MEASURED, Origin
 
-Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]
-"""A coefficient of expansion, 1/K: steel has 11.5e-6."""
-
+Expansion = Annotated[float, Field(ge=-1e-4, le=1e-3)]  # A coefficient of expansion, 1/K: steel has 11.5e-6.
 SmallExpansion = Annotated[float, Field(ge=0, le=1e-4)]
 Kelvins = Annotated[float, Field(ge=0, le=100)]
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
@@ -366,25 +364,15 @@ class PartFile(Table):
 
 @dataclass(frozen=True)
 class Places:
-    """The keys of a job.toml.
-
-    Parameters
-    ----------
-    path : of the file.
-    text : that it holds.
-    """
+    """The keys of a job.toml."""
 
     path: Path
-    text: str
+    text: str  # that it holds
 
     def of(self, table: str, key: str = "", number: int | None = None) -> str:
         """A key as messages name it: file, line, table and key.
 
-        Parameters
-        ----------
-        table : its name.
-        key : in it.
-        number : of the table, from 0, where there are several.
+        ``number``: of the table, from 0, where there are several.
         """
         line = line_of([table, *([] if number is None else [str(number)]), *([key] if key else [])], self.text)
         head = f"[{table}]" if number is None else f"[[{table}]] {number + 1}"

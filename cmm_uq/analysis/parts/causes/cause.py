@@ -30,16 +30,10 @@ from cmm_uq.base.points import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Coefficients (N, K) that are rows of a table: what follows from them linearly needs following once a row of it.
+    """Coefficients (N, K) that are rows of a table: what follows from them linearly needs following once a row of it."""
 
-    Parameters
-    ----------
-    table : (M, K).
-    rows : (N,) of it.
-    """
-
-    table: Floats
-    rows: Ints
+    table: Floats  # (M, K)
+    rows: Ints  # (N,) of it
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -48,42 +42,22 @@ class Rows:
         return np.asarray(self.table[self.rows], dtype=dtype)
 
 
-Drawn = Floats | Rows
-"""Coefficients (N, K)."""
-
-Draw = Callable[[np.random.Generator, int], Drawn]
-"""Coefficients of so many draws."""
-
-_NOTHING = 1e-12
-"""Part of the largest variance below which a component of a random field is rounding."""
-
-
-_UNSEEN_MM = 1e-11
-"""Root mean square displacement for one unit of a coefficient below which a component is left out."""
-
-_FACTORED = 64
-"""Coefficients up to which no components are looked for."""
-
-_ROUNDING = 1e-15
-"""Of the largest, a square of components that is rounding."""
+Drawn = Floats | Rows  # coefficients (N, K)
+Draw = Callable[[np.random.Generator, int], Drawn]  # coefficients of so many draws
+_NOTHING = 1e-12  # part of the largest variance below which a component of a random field is rounding
+_UNSEEN_MM = 1e-11  # root mean square displacement for one unit of a coefficient below which a component is left out
+_FACTORED = 64  # coefficients up to which no components are looked for
+_ROUNDING = 1e-15  # of the largest, a square of components that is rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Cause(ABC):
-    """What moves points in proportion to coefficients.
+    """What moves points in proportion to coefficients."""
 
-    Parameters
-    ----------
-    name : of the cause: ``machine``, ``stylus``, ….
-    factors : K names in the budget, one a coefficient; those that share a name are one line of it.
-    draw : of the coefficients, together.
-    named : by factor, why it should be told beside the result.
-    """
-
-    name: str
-    factors: tuple[str, ...]
-    draw: Draw
-    named: Mapping[str, Text] = field(default_factory=dict)
+    name: str  # of the cause: ``machine``, ``stylus``, …
+    factors: tuple[str, ...]  # K names in the budget, one a coefficient; those that share a name are one line of it
+    draw: Draw  # of the coefficients, together
+    named: Mapping[str, Text] = field(default_factory=dict)  # by factor, why it should be told beside the result
 
     @abstractmethod
     def through(self, derivative: Floats) -> Floats:
@@ -100,29 +74,21 @@ class Cause(ABC):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Common(Cause):
-    """What points have in common.
+    """What points have in common."""
 
-    Parameters
-    ----------
-    basis : (K, n, 3) displacements of the points for one unit of each coefficient, mm.
-    """
-
-    basis: Floats
+    basis: Floats  # (K, n, 3) displacements of the points for one unit of each coefficient, mm
     _raising: dict[tuple[int, int], tuple[Floats, Floats]] = field(default_factory=dict, init=False)
 
     def through(self, derivative: Floats) -> Floats:
-        """See :meth:`Cause.through`."""
         K, n, _ = self.basis.shape
         return np.asarray(self.basis.reshape(K, 3 * n) @ derivative.reshape(len(derivative), 3 * n).T)
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
-        """See :meth:`Cause.moved`."""
         part = self.basis[:, rows]
         K, m, _ = part.shape
         return np.asarray((coefficients @ part.reshape(K, 3 * m)).reshape(len(coefficients), m, 3))
 
     def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
-        """See :meth:`Cause.raised`."""
         key = rows.start, rows.stop
         if key not in self._raising:
             self._raising[key] = _few(np.einsum("kmi,mi->km", self.basis[:, rows], normals))
@@ -134,17 +100,12 @@ class Common(Cause):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scatter(Cause):
-    """What moves each coordinate of each point on its own: a coefficient a coordinate, in standard deviations.
+    """What moves each coordinate of each point on its own: a coefficient a coordinate, in standard deviations."""
 
-    Parameters
-    ----------
-    size : (n, 3) standard deviations along three axes, mm.
-    turn : (3, 3) unit vectors of these axes in the frame of the part, a row each.
-    scale : draws (N, 3) of a factor on the size along each axis, common to all points; none where it is one.
-    """
-
-    size: Floats
+    size: Floats  # (n, 3) standard deviations along three axes, mm
+    # (3, 3) unit vectors of these axes in the frame of the part, a row each
     turn: Floats = field(default_factory=lambda: np.eye(3))
+    # draws (N, 3) of a factor on the size along each axis, common to all points; none where it is one
     scale: Draw | None = None
 
     @classmethod
@@ -161,11 +122,9 @@ class Scatter(Cause):
         return cls(name=name, factors=(factor,) * size.size, draw=draw, size=size, turn=axes, scale=scale)
 
     def through(self, derivative: Floats) -> Floats:
-        """See :meth:`Cause.through`."""
         return np.asarray(((derivative @ self.turn.T) * self.size).reshape(len(derivative), self.size.size).T)
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
-        """See :meth:`Cause.moved`."""
         along = coefficients.reshape(len(coefficients), -1, 3)[:, rows] * self.size[rows]
         return np.asarray(along @ self.turn)
 
@@ -201,23 +160,15 @@ def field_along(name: str, factor: str, kernel: Floats, along: Floats) -> Common
     return Common(name=name, factors=(factor,) * len(shapes), draw=draw, basis=shapes[:, :, None] * along)
 
 
-MANY = 1000
-"""Points up to which the eigenvectors of the whole covariance are quickly found."""
-
-_LEFT = 1e-8
-"""Of the largest variance that may be left of a point's: a ten-thousandth of a standard deviation."""
-
-Covariance = Callable[[slice], Floats]
-"""Covariance (m, n) of some points with all n."""
+MANY = 1000  # points up to which the eigenvectors of the whole covariance are quickly found
+_LEFT = 1e-8  # of the largest variance that may be left of a point's: a ten-thousandth of a standard deviation
+Covariance = Callable[[slice], Floats]  # covariance (m, n) of some points with all n
 
 
 def field_components(covariance: Covariance, variances: Floats) -> Floats:
     """(K, n) of a random field on n points: times independent standard normal numbers they add up to it.
 
-    Parameters
-    ----------
-    covariance : of some points with all.
-    variances : (n,) of each point.
+    ``variances``: (n,) of each point.
     """
     n = len(variances)
     if n <= MANY:

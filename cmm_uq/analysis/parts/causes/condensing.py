@@ -18,38 +18,28 @@ from cmm_uq.analysis.parts.causes.form import Rough
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.points import Floats, Ints
 
-LARGE = 1000
-"""Points of a feature from which on its points are not drawn one coordinate after the other."""
+LARGE = 1000  # points of a feature from which on its points are not drawn one coordinate after the other
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Condensed(Cause):
-    """A cause that moves each point on its own along a axes, by fewer coefficients.
+    """A cause that moves each point on its own along a axes, by fewer coefficients."""
 
-    Parameters
-    ----------
-    vectors : (a, n, 3) displacements of each point for one standard deviation along each axis, mm.
-    whole : (w,) rows of points that are moved along every axis: a coefficient an axis, of one point after the other.
-    single : (s,) rows of points that are moved along their normals: then a coefficient each.
-    normals : (n, 3) of all points.
-    sums : (a, r, p) changes of what follows to first order from all other points: then r coefficients an axis.
-    """
-
-    vectors: Floats
+    vectors: Floats  # (a, n, 3) displacements of each point for one standard deviation along each axis, mm
+    # (w,) rows of points that are moved along every axis: a coefficient an axis, of one point after the other
     whole: Ints
-    single: Ints
-    normals: Floats
-    sums: Floats
+    single: Ints  # (s,) rows of points that are moved along their normals: then a coefficient each
+    normals: Floats  # (n, 3) of all points
+    sums: Floats  # (a, r, p) changes of what follows to first order from all other points: then r coefficients an axis
 
     def through(self, derivative: Floats) -> Floats:
-        """See :meth:`Cause.through`."""
         p = len(derivative)
         along = np.einsum("pwi,awi->wap", derivative[:, self.whole], self.vectors[:, self.whole])
         normal = np.einsum("psi,si->sp", derivative[:, self.single], self.normals[self.single])
         axes, r = self.sums.shape[:2]
-        return np.concatenate([
-            along.reshape(axes * len(self.whole), p), self._sizes[:, None] * normal, self.sums.reshape(axes * r, p),
-        ])  # fmt: skip
+        return np.concatenate(
+            [along.reshape(axes * len(self.whole), p), self._sizes[:, None] * normal, self.sums.reshape(axes * r, p)]
+        )
 
     @cached_property
     def _sizes(self) -> Floats:
@@ -58,7 +48,6 @@ class Condensed(Cause):
         return np.asarray(np.sqrt(np.sum(each**2, axis=0)))
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
-        """See :meth:`Cause.moved`; of points that only sums are drawn of, none."""
         start, stop, _ = rows.indices(len(self.normals))
         a, w = len(self.vectors), len(self.whole)
         found = np.zeros((len(coefficients), stop - start, 3))
@@ -71,7 +60,6 @@ class Condensed(Cause):
         return found
 
     def raised(self, coefficients: Floats, rows: slice, normals: Floats) -> Floats:
-        """See :meth:`Cause.raised`; of points that are moved along their normals."""
         raised, which = self._of_single(coefficients, rows)
         if len(which) == len(normals):
             return raised
@@ -88,15 +76,10 @@ class Condensed(Cause):
         return coefficients[:, skipped + first : skipped + last] * self._sizes[first:last], self.single[first:last]
 
 
-def condensed(
-    cause: Cause, plan: Plan, on_points: Collection[str], derivative: Floats
-) -> Cause:  # fmt: skip
+def condensed(cause: Cause, plan: Plan, on_points: Collection[str], derivative: Floats) -> Cause:
     """A cause by fewer coefficients, where it moves each point of a large feature on its own; else itself.
 
-    Parameters
-    ----------
-    on_points : names of the features whose points are asked for.
-    derivative : (p, n, 3) of all that follows to first order.
+    ``derivative``: (p, n, 3) of all that follows to first order.
     """
     scale: Draw | None = None
     vectors = np.zeros((1, *plan.points.shape))

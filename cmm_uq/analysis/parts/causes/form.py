@@ -23,27 +23,16 @@ FORM = "form"
 
 @dataclass(frozen=True, eq=False)
 class Form:
-    """What is known of a feature's form, along its normals.
-
-    Parameters
-    ----------
-    feature : its name.
-    harmonics_um : by undulations per revolution about the feature's axis, 2 and more, the standard deviation of each; its
-        phase is any.
-    field_um, correlation_mm : standard deviation of a normal random field on the surface, and the distance over which its
-        correlation falls to exp(−½).
-    roughness_um : standard deviation of each point on its own.
-
-    Raises
-    ------
-    CmmUqError : a field without the distance over which it is correlated, or harmonics without an axis.
-    """
+    """What is known of a feature's form, along its normals."""
 
     feature: str
+    # by undulations per revolution about the feature's axis, 2 and more, the standard deviation of each; its phase is any
     harmonics_um: tuple[tuple[int, float], ...] = ()
+    # field_um, correlation_mm: standard deviation of a normal random field on the surface, and the distance over which its
+    # correlation falls to exp(−½)
     field_um: float = 0.0
     correlation_mm: float = 0.0
-    roughness_um: float = 0.0
+    roughness_um: float = 0.0  # standard deviation of each point on its own
 
     def __post_init__(self) -> None:
         if self.field_um and not self.correlation_mm > 0:
@@ -73,10 +62,8 @@ class Form:
 def forms(known: tuple[Form, ...], plan: Plan) -> tuple[list[Cause], list[Cause | None]]:
     """Form of the points that are probed, and of whole surfaces: the same wherever the part lies, and so looked up.
 
-    Returns
-    -------
-    causes : of the plan's points.
-    whole : as many, with the same coefficients, of the points of :func:`whole_surfaces`; ``None`` for roughness.
+    Returns ``causes``: of the plan's points. ``whole``: as many, with the same coefficients, of the points of
+    :func:`whole_surfaces`; ``None`` for roughness.
     """
     causes, whole = list[Cause](), list[Cause | None]()
     true = whole_surfaces(plan)
@@ -107,25 +94,16 @@ def whole_surfaces(plan: Plan) -> Plan:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rough(Cause):
-    """What moves each point of a feature on its own along its normal, in standard deviations.
+    """What moves each point of a feature on its own along its normal, in standard deviations."""
 
-    Parameters
-    ----------
-    along : (m, 3) displacements of its points for one unit of each coefficient, mm.
-    rows : of these among the plan's points.
-    count : of the plan's points.
-    """
-
-    along: Floats
-    rows: slice
-    count: int
+    along: Floats  # (m, 3) displacements of its points for one unit of each coefficient, mm
+    rows: slice  # of these among the plan's points
+    count: int  # of the plan's points
 
     def through(self, derivative: Floats) -> Floats:
-        """See :meth:`Cause.through`."""
         return np.asarray(np.einsum("pmi,mi->mp", derivative[:, self.rows], self.along))
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
-        """See :meth:`Cause.moved`."""
         start, stop, _ = rows.indices(self.count)
         found = np.zeros((len(coefficients), stop - start, 3))
         first, last = max(start, self.rows.start), min(stop, self.rows.stop)

@@ -16,10 +16,8 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.superposition import About, Superposition
 
 MACHINE, NOISE = "machine", "noise"
-
+# mm: the last step towards where the machine indicates; what is left is smaller by what errors change over a millimetre
 _SETTLED = 1e-7
-"""mm: the last step towards where the machine indicates; what is left is smaller by what errors change over a millimetre."""
-
 _ROUNDS = 12
 
 
@@ -27,10 +25,6 @@ def mean_errors(state: MachineState, qualified: Qualified, pose: Pose, measured:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
     Solves indicated + e(indicated) = true for the mean of what is known, and adds what the machine corrects.
-
-    Parameters
-    ----------
-    measured : see :func:`modelled`.
     """
     if np.array_equal(state.corrects, state.mean):
         return _mean_periodic(state, qualified, pose, measured)
@@ -100,10 +94,8 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Fl
 
     The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
 
-    Parameters
-    ----------
-    measured : (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
-        says the phase of a short period.
+    ``measured``: (n, 3) by how much points were measured beside the plan's, in the frame of the part: what scales read there
+    says the phase of a short period.
     """
     about = _about(state, qualified)
     given = any(isinstance(effect, GivenPeriod) for effect in state.effects)
@@ -169,10 +161,7 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
 def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1, first: int = 0) -> list[Cause]:
     """Noise of readings, what a set-up adds to each point, what grows with distance, and slow noise where times are known.
 
-    Parameters
-    ----------
-    repeats : of each point, of whose readings the mean is taken; they share the set-up and the moment.
-    first : row of the point that is probed first, from which distances are.
+    ``repeats``: of each point, of whose readings the mean is taken; they share the set-up and the moment.
     """
     stated, n, found = state.noise, len(points), list[Cause]()
     usual = stated.usual_mm

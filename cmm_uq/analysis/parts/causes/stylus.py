@@ -29,9 +29,8 @@ from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 
 STYLUS = "stylus"
-
+# by which pre-travel varies with direction: two and three lobes of triggering and bending, up to six of a tip's form
 DEGREES = (2, 3, 4, 5, 6)
-"""By which pre-travel varies with direction: two and three lobes of triggering and bending, up to six of a tip's form."""
 
 
 def styli(plan: Plan, pose: Pose) -> list[Cause]:
@@ -68,11 +67,9 @@ def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> Common:
     return Common(name=STYLUS, factors=factors, draw=draw, basis=shapes[:, :, None] * plan.normals)
 
 
-SPHERE_MM = 25.0
-"""Diameter of the reference sphere; errors hardly change over it."""
-
+SPHERE_MM = 25.0  # diameter of the reference sphere; errors hardly change over it
+# height above the equator, points, and the first one's angle, in degrees
 _LATITUDES = ((90.0, 1, 0.0), (67.5, 4, 0.0), (45.0, 8, 22.5), (22.5, 4, 45.0), (0.0, 8, 0.0))
-"""Height above the equator, points, and the first one's angle, in degrees."""
 
 
 def directions() -> Floats:
@@ -87,20 +84,12 @@ def directions() -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Qualified:
-    """A part and the reference sphere, measured by the same tips.
+    """A part and the reference sphere, measured by the same tips."""
 
-    Parameters
-    ----------
-    part : the points of the part.
-    sphere : those of the sphere, for each stylus whose place of qualification is known, one after the other.
-    styli : (s,) which styli these are.
-    of : (n,) stylus of each point of the part.
-    """
-
-    part: Points
-    sphere: Points
-    styli: Ints
-    of: Ints
+    part: Points  # the points of the part
+    sphere: Points  # those of the sphere, for each stylus whose place of qualification is known, one after the other
+    styli: Ints  # (s,) which styli these are
+    of: Ints  # (n,) stylus of each point of the part
 
     @classmethod
     def on(cls, plan: Plan, part: Points, machine: Machine) -> Qualified:

@@ -34,12 +34,7 @@ FIXTURE = "fixture"
 
 
 def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> Common:
-    """A part that has shifted and turned evenly by the end of its measurement.
-
-    Parameters
-    ----------
-    u_shift_um, u_turn_arcsec : standard uncertainty of the whole movement, along and about each axis.
-    """
+    """A part that has shifted and turned evenly by the end of its measurement."""
     about = plan.points - plan.points.mean(axis=0)
     done = elapsed(plan)[:, None]
     shifts = [MICROMETRE * done * axis for axis in np.eye(3)]
@@ -66,22 +61,17 @@ TEMPERATURE = "temperature"
 
 @dataclass(frozen=True)
 class Expansion:
-    """A body that expands, and what is known of it.
+    """A body that expands, and what is known of it."""
 
-    Parameters
-    ----------
-    cte_per_k, u_cte_per_k : coefficient of thermal expansion, and its standard uncertainty.
-    temperature_c, u_temperature_k : as measured, and its standard uncertainty.
-    corrected : whether results are reduced to 20 °C with these.
-    known_at_c : temperature at which its size is known: 20 °C; of scales that of the machine's calibration, where the errors
-        that it found are those of then.
-    """
-
+    # cte_per_k, u_cte_per_k: coefficient of thermal expansion, and its standard uncertainty
     cte_per_k: float = 0.0
     u_cte_per_k: float = 0.0
+    # temperature_c, u_temperature_k: as measured, and its standard uncertainty
     temperature_c: float = REFERENCE_TEMPERATURE
     u_temperature_k: float = 0.0
-    corrected: bool = True
+    corrected: bool = True  # whether results are reduced to 20 °C with these
+    # temperature at which its size is known: 20 °C; of scales that of the machine's calibration, where the errors that it
+    # found are those of then
     known_at_c: float = REFERENCE_TEMPERATURE
 
     @property
@@ -107,23 +97,18 @@ class Expansion:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """Temperatures at the measurement of a part.
+    """Temperatures at the measurement of a part."""
 
-    Parameters
-    ----------
-    part : the part.
-    scales : of x, y, z, of one material: what is not known of their coefficient is common to them. Without uncertainty by
-        default, as it is right where the machine's certificate models their expansion.
-    u_gradient_k_per_m : (3,) standard uncertainty of the temperature's gradient in the part along the axes of the machine.
-    u_drift_k : standard uncertainty of how much the part, and each scale, has warmed from the first point to the last, evenly
-        in the order of probing.
-    columns : temperatures by their columns, for effects of the machine that need some.
-    """
-
-    part: Expansion = Expansion()
+    part: Expansion = Expansion()  # the part
+    # of x, y, z, of one material: what is not known of their coefficient is common to them. Without uncertainty by default,
+    # as it is right where the machine's certificate models their expansion.
     scales: tuple[Expansion, Expansion, Expansion] = (Expansion(), Expansion(), Expansion())
+    # (3,) standard uncertainty of the temperature's gradient in the part along the axes of the machine
     u_gradient_k_per_m: Floats = field(default_factory=lambda: np.zeros(3))
+    # standard uncertainty of how much the part, and each scale, has warmed from the first point to the last, evenly in the
+    # order of probing
     u_drift_k: float = 0.0
+    # temperatures by their columns, for effects of the machine that need some
     columns: dict[str, float] = field(default_factory=dict)
 
     def since(self, calibrated_c: float | None) -> Surroundings:
@@ -197,36 +182,22 @@ OPERATOR = "operator"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Beside(Cause):
-    """What changes characteristics and moves no point.
+    """What changes characteristics and moves no point."""
 
-    Parameters
-    ----------
-    adds : (K, c) change of each characteristic for one unit of each coefficient, mm or rad.
-    count : of the plan's points.
-    """
-
-    adds: Floats
-    count: int
+    adds: Floats  # (K, c) change of each characteristic for one unit of each coefficient, mm or rad
+    count: int  # of the plan's points
 
     def through(self, derivative: Floats) -> Floats:
-        """See :meth:`Cause.through`."""
         return np.zeros((len(self.factors), len(derivative)))
 
     def moved(self, coefficients: Floats, rows: slice) -> Floats:
-        """See :meth:`Cause.moved`."""
         return np.zeros((len(coefficients), len(range(*rows.indices(self.count))), 3))
 
 
 def reproducibility(plan: Plan, u: Mapping[str, float]) -> Beside:
     """A standard uncertainty of some characteristics, each on its own.
 
-    Parameters
-    ----------
-    u : by name of the characteristic, mm or rad.
-
-    Raises
-    ------
-    CmmUqError : there is no such characteristic.
+    ``u``: by name of the characteristic, mm or rad.
     """
     names = [one.name for one in plan.characteristics]
     for name in u:

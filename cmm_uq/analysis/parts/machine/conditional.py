@@ -48,7 +48,6 @@ class AtEach(Effect):
         self.name, self.along_motion = effect.name, effect.along_motion
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`; (n, 3, n)."""
         found = np.zeros((len(points), 3, len(points)))
         each = np.arange(len(points))
         found[each, "xyz".index(str(self.along_motion)), each] = 1.0
@@ -61,17 +60,11 @@ def shown(model: MeasurementModel, effect: Effect) -> Floats:
     return model.seen(model.columns(AtEach(effect), (), about), about)
 
 
+# of the scatter of the residuals: what a combination of errors adds to the observations below which they do not show it
 _UNSEEN = 0.01
-"""Of the scatter of the residuals: what a combination of errors adds to the observations below which they do not show it."""
-
-_MOST = 400
-"""Combinations, those that the recording sees best; what others say is left to their prior."""
-
-_SMALLEST = 1e-6
-"""mm: the smallest noise that is sampled."""
-
-_ROWS = 1000
-"""Draws at once."""
+_MOST = 400  # combinations, those that the recording sees best; what others say is left to their prior
+_SMALLEST = 1e-6  # mm: the smallest noise that is sampled
+_ROWS = 1000  # draws at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,23 +79,15 @@ class _Given:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What the recording shows of an error that was left out.
+    """What the recording shows of an error that was left out."""
 
-    Attributes
-    ----------
-    effect : linear; of a periodic one the sum of its trials.
-    sd : (j,) of its coefficients beforehand: what physics allows, since the recording itself says how large it may be.
-    columns : (m, j) mm of the observations for these, without what a placing reaches, which shows nothing.
-    covariance : (m, m) mm² beforehand.
-    periodic : the effect itself where it is periodic, else ``None``.
-    readings, impulse : (p,) mm where its scale stood; (m, p) of the observations for a millimetre of error at each.
-    """
-
-    effect: Effect
+    effect: Effect  # linear; of a periodic one the sum of its trials
+    # (j,) of its coefficients beforehand: what physics allows, since the recording itself says how large it may be
     sd: Floats
-    columns: Floats
-    covariance: Floats
-    periodic: PeriodicScale | None
+    columns: Floats  # (m, j) mm of the observations for these, without what a placing reaches, which shows nothing
+    covariance: Floats  # (m, m) mm² beforehand
+    periodic: PeriodicScale | None  # the effect itself where it is periodic, else ``None``
+    # readings, impulse: (p,) mm where its scale stood; (m, p) of the observations for a millimetre of error at each
     readings: Floats
     impulse: Floats
 
@@ -122,9 +107,7 @@ class _Shown:
     def given(self, into: Floats) -> _Given:
         """The effect with the recording.
 
-        Parameters
-        ----------
-        into : (m, r) whose transpose takes observations, mm, to combinations.
+        ``into``: (m, r) whose transpose takes observations, mm, to combinations.
         """
         seen = into.T @ self.columns
         if self.periodic is None:
@@ -143,26 +126,16 @@ def _left(own: LinearModel, columns: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """The linear model of a calibration with what it left out.
+    """The linear model of a calibration with what it left out."""
 
-    Attributes
-    ----------
-    linear : of the calibration's unknowns, then of combinations of what it left out, standard normal beforehand.
-    estimate : least squares of the calibration, where these are zero.
-    which : places of what takes part in what was left out.
-    effects : those, linear.
-    sd : (f,) of their coefficients beforehand, zero of what a recording says of an error with a period.
-    seen : (r, f) combinations that the recording sees, of the coefficients over their standard deviations.
-    gain : (r, f) what a combination that is larger by one says of each coefficient.
-    """
-
+    # of the calibration's unknowns, then of combinations of what it left out, standard normal beforehand
     linear: LinearModel
-    estimate: LeastSquares
-    which: tuple[int, ...]
-    effects: tuple[Effect, ...]
-    sd: Floats
-    seen: Floats
-    gain: Floats
+    estimate: LeastSquares  # least squares of the calibration, where these are zero
+    which: tuple[int, ...]  # places of what takes part in what was left out
+    effects: tuple[Effect, ...]  # those, linear
+    sd: Floats  # (f,) of their coefficients beforehand, zero of what a recording says of an error with a period
+    seen: Floats  # (r, f) combinations that the recording sees, of the coefficients over their standard deviations
+    gain: Floats  # (r, f) what a combination that is larger by one says of each coefficient
 
     @classmethod
     def of(cls, model: MeasurementModel, further: Sequence[Unmodelled]) -> Together:
@@ -190,12 +163,7 @@ class Together:
         )  # fmt: skip
 
     def white(self, sigma_mm: float) -> tuple[Floats, Floats]:
-        """Mean (u,) of the linear model's unknowns, and R (u, u) of their covariance RᵀR, for a white noise that is known.
-
-        Raises
-        ------
-        CmmUqError : the recording leaves even the sizes of the artefact open.
-        """
+        """Mean (u,) of the linear model's unknowns, and R (u, u) of their covariance RᵀR, for a white noise that is known."""
         rows, given = self.linear.priors
         scale = np.array([unknown.scale for unknown in self.linear.unknowns])
         whitened = np.vstack([self.linear.reduced.design / sigma_mm, rows]) * scale
@@ -241,14 +209,7 @@ def open_size() -> CmmUqError:
 
 
 def stated_noise(model: MeasurementModel, components: Components, sizes: Sizes) -> StatedNoise:
-    """Noise of a coordinate for each of N sizes; what the display rounds off is part of a reading.
-
-    Parameters
-    ----------
-    model : of the calibration.
-    components : of its noise.
-    sizes : as sampled.
-    """
+    """Noise of a coordinate for each of N sizes; what the display rounds off is part of a reading."""
     lengths = growing_lengths(model, model.placed(model.estimate().about))[model.used]
     duration = _duration(model)
     with np.errstate(divide="ignore"):
@@ -271,9 +232,8 @@ def _duration(model: MeasurementModel) -> float:
 
 
 DRAWS = 10_000
-
+# ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out
 _UNTOLD = 100.0
-"""Ratio of the 95 % to the 5 % quantile of the noise from which on the recording does not tell it from errors left out."""
 
 
 def joint_posterior(
@@ -281,20 +241,10 @@ def joint_posterior(
 ) -> tuple[tuple[int, ...], Floats, Floats]:
     """Normal posterior of a calibration's errors and of errors that it did not model, for a white noise that is known.
 
-    Parameters
-    ----------
-    model : of the calibration.
-    further : what it did not model; what needs columns that were not recorded is left out.
-    sigma_mm : standard deviation of one recorded coordinate.
+    ``further``: what it did not model; what needs columns that were not recorded is left out.
 
-    Returns
-    -------
-    which : places in ``further`` of those that take part.
-    mean, covariance : (k,) and (k, k) of the coefficients of the model's effects, then of those.
-
-    Raises
-    ------
-    CmmUqError : the recording leaves even the sizes of the artefact open.
+    Returns ``which``: places in ``further`` of those that take part. ``mean, covariance``: (k,) and (k, k) of the
+    coefficients of the model's effects, then of those.
     """
     whole = Together.of(model, further)
     mean, root = whole.white(sigma_mm)
@@ -322,16 +272,10 @@ def given_recording(
 ) -> MachineState:
     """The state of a machine with all of its errors drawn together, given the recording of its calibration.
 
-    Parameters
-    ----------
-    state : as its certificate states it, its effects in the model's order; the model may have others, as of its artefact. How
-        much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
-    model : of the calibration, without the observations that its certificate set aside.
-    sigma_mm : standard deviation of one recorded coordinate, where the noise is known and white; else it is sampled.
-
-    Raises
-    ------
-    CmmUqError : the recording leaves even the sizes of the artefact open.
+    ``state``: as its certificate states it, its effects in the model's order; the model may have others, as of its artefact.
+    How much the calibration bounds an error that it did not model is of no matter here: its recording says that again.
+    ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
+    of one recorded coordinate, where the noise is known and white; else it is sampled.
     """
     whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
     if sigma_mm is not None:

@@ -24,14 +24,9 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.drives import PeriodicScale
 from cmm_uq.machine.physics.effect import Effect, Parameter
 
-_SAME = 1e-6
-"""Of the shortest period: a distance over which nothing changes."""
-
-_LOOKED_AT = 61
-"""Readings."""
-
-TRIED = 64
-"""Periods: correlations of errors at two places are then off by less than a tenth in the root mean square."""
+_SAME = 1e-6  # of the shortest period: a distance over which nothing changes
+_LOOKED_AT = 61  # readings
+TRIED = 64  # periods: correlations of errors at two places are then off by less than a tenth in the root mean square
 
 
 class EveryPeriod(Effect):
@@ -51,7 +46,6 @@ class EveryPeriod(Effect):
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`: of one trial after the other."""
         return np.concatenate([self.of.basis(points, each) for each in self.at], axis=2)
 
 
@@ -61,11 +55,8 @@ class GivenPeriod(Effect):
     A draw f of the sum beforehand is conditioned at any reading x by f(x) + k(x, X)·B·w, w what combinations were found to be
     less what they are by that draw and all others (conditioning by kriging: Chilès, Delfiner 2012, 7.3).
 
-    Parameters
-    ----------
-    effect : periodic.
-    readings : (p,) X, where the scale stood at the points of the recording, mm.
-    into : (p, r) B, 1/mm.
+    ``effect``: periodic. ``readings``: (p,) X, where the scale stood at the points of the recording, mm. ``into``: (p, r) B,
+    1/mm.
     """
 
     def __init__(self, effect: PeriodicScale, readings: Floats, into: Floats) -> None:
@@ -77,7 +68,6 @@ class GivenPeriod(Effect):
         self.coefficients = (*self.sum.coefficients, *said)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         found = np.zeros((len(points), 3, len(self.coefficients)))
         found[:, "xyz".index(self.axis)] = self.at(points.readings[self.axis])
         return found

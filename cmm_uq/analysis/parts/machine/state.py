@@ -33,36 +33,22 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.physics.catalogue import effects, every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
-POWER_QUANTILE = 1.6449
-"""Of a normal error one in ten, in size, is larger than so many standard deviations."""
-
+POWER_QUANTILE = 1.6449  # of a normal error one in ten, in size, is larger than so many standard deviations
+# mechanisms that are no error of the machine on its own; those of the stylus are drawn from its qualification
 OTHERWISE = ("artefact", "probe")
-"""Mechanisms that are no error of the machine on its own; those of the stylus are drawn from its qualification."""
-
-_SURROUNDINGS = "temp_"
-"""What begins the columns of effects that the temperatures of the part's measurement drive."""
-
-_TIMES = 200
-"""Draws of a slow wander of which its covariance is the mean."""
-
-FREE = 0.5
-"""Share of the prior in a posterior standard deviation from which on the calibration left an error free."""
+_SURROUNDINGS = "temp_"  # what begins the columns of effects that the temperatures of the part's measurement drive
+_TIMES = 200  # draws of a slow wander of which its covariance is the mean
+FREE = 0.5  # share of the prior in a posterior standard deviation from which on the calibration left an error free
 
 
 @dataclass(frozen=True, eq=False)
 class Unmodelled:
-    """An error that the calibration did not model.
-
-    Parameters
-    ----------
-    effect : that it is.
-    sd : (k,) standard deviations of its coefficients, in their units.
-    detected : size of its (first) reported parameter that the calibration would have found; ``None`` where it would not have,
-        or does not say.
-    """
+    """An error that the calibration did not model."""
 
     effect: Effect
-    sd: Floats
+    sd: Floats  # (k,) standard deviations of its coefficients, in their units
+    # size of its (first) reported parameter that the calibration would have found; ``None`` where it would not have, or does
+    # not say
     detected: float | None = None
 
     @property
@@ -204,12 +190,7 @@ def of_machine(effect: Effect) -> bool:
 
 
 def coefficients_of(effects: Iterable[Effect], reported: Mapping[str, Floats]) -> Floats:
-    """Coefficients (M, k) of effects from draws (M,) of their reported parameters by ``effect.parameter``.
-
-    Raises
-    ------
-    CmmUqError : a parameter is missing, or an effect has a nonlinear one.
-    """
+    """Coefficients (M, k) of effects from draws (M,) of their reported parameters by ``effect.parameter``."""
     columns: list[Floats] = []
     for effect in effects:
         if effect.shape:
@@ -229,11 +210,8 @@ def coefficients_of(effects: Iterable[Effect], reported: Mapping[str, Floats]) -
 def unmodelled_errors(modelled: Iterable[str], detected: Mapping[str, float | None]) -> tuple[Unmodelled, ...]:
     """Common errors of a machine that its calibration did not model.
 
-    Parameters
-    ----------
-    modelled : names of the effects that it did.
-    detected : by effect, the smallest size of its (first) parameter that its recording would have shown; ``None`` for none.
-        An effect that is not there needs what was not recorded, so that nothing was seen of it.
+    ``detected``: by effect, the smallest size of its (first) parameter that its recording would have shown; ``None`` for
+    none. An effect that is not there needs what was not recorded, so that nothing was seen of it.
     """
     known, found = set(modelled), []
     for effect in every().values():
@@ -279,17 +257,8 @@ def machine_stated(
 ) -> MachineState:
     """The machine as a certificate states it.
 
-    Parameters
-    ----------
-    results : the data of ``results.json``.
-    draws : (M,) of its posterior, by name.
-    machine : its chain, travel and origin.
-    corrected : whether it corrects what was found.
-    unmodelled : whether errors that the calibration did not model are drawn too.
-
-    Raises
-    ------
-    CmmUqError : results of another kind, or draws that do not belong to them.
+    ``results``: the data of ``results.json``. ``draws``: (M,) of its posterior, by name. ``corrected``: whether it corrects
+    what was found. ``unmodelled``: whether errors that the calibration did not model are drawn too.
     """
     if "estimates" not in results or "identifiability" not in results:
         raise CmmUqError(
@@ -320,19 +289,16 @@ def machine_stated(
     )
 
 
+# root mean square change of a reported parameter (``scale_x.ppm``), in its unit, by so many days after the calibration;
+# ``None`` where nothing is known of it.
 Change = Callable[[str, float], float | None]
-"""Root mean square change of a reported parameter (``scale_x.ppm``), in its unit, by so many days after the calibration;
-``None`` where nothing is known of it."""
 
 
 def aged(state: MachineState, on: date, change: Change | None = None) -> MachineState:
     """The state of a machine on a day.
 
-    Parameters
-    ----------
-    state : as its certificate states it. Errors that it did not model are drawn as large as they may be on any day.
-    on : day of the part's measurement.
-    change : by the records; ``None`` where there are none.
+    ``state``: as its certificate states it. Errors that it did not model are drawn as large as they may be on any day.
+    ``change``: by the records; ``None`` where there are none.
     """
     days = 0 if state.calibrated is None else abs((on - state.calibrated).days)
     sizes, unknown = list[Floats](), list[str]()

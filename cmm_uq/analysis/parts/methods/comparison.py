@@ -16,14 +16,9 @@ from cmm_uq.base.messages import Text, Verbatim, listed, number, say
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.maths.uncertainty.rounding import significant
 
-MATTERS = 0.05
-"""Share of the variance from which on a cause is told by name."""
-
-CHANCE = 0.05
-"""Probability at which a scatter counts as another than the one that is expected."""
-
-NEAR = 3.0
-"""Scatters below which a zone counts as nearly nothing."""
+MATTERS = 0.05  # share of the variance from which on a cause is told by name
+CHANCE = 0.05  # probability at which a scatter counts as another than the one that is expected
+NEAR = 3.0  # scatters below which a zone counts as nearly nothing
 
 METHODS: Mapping[Method, Text] = {
     "virtual": say("the virtual measurements"), "calibrated_part": say("the calibrated part"),
@@ -32,14 +27,7 @@ METHODS: Mapping[Method, Text] = {
 
 
 def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMethod]) -> Comparison | None:
-    """Other methods beside the virtual measurement; ``None`` where there are none.
-
-    Parameters
-    ----------
-    stated : by virtual measurements, in the order of the plan.
-    shares : of its variance by cause.
-    methods : the others.
-    """
+    """Other methods beside the virtual measurement; ``None`` where there are none."""
     if not methods:
         return None
     found = []

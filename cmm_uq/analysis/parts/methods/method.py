@@ -38,52 +38,35 @@ from cmm_uq.maths.uncertainty.analysis_of_variance import OneWay, one_way
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
 from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS, use_by_calibrated_workpiece
 
+# virtual measurements; a calibrated part measured again and again; the part itself in several orientations
 Method = Literal["virtual", "calibrated_part", "orientations"]
-"""Virtual measurements; a calibrated part measured again and again; the part itself in several orientations."""
-
+# how a method takes hold of a cause: *drawn* from what is known of it; as scatter, because it *varied* between repeats; in
+# the *systematic* error that was found; *corrected* by a standard, with the standard's uncertainty; *stated* from
+# descriptions; or *unseen*
 Seen = Literal["drawn", "varied", "systematic", "corrected", "stated", "unseen"]
-"""How a method takes hold of a cause: *drawn* from what is known of it; as scatter, because it *varied* between repeats; in
-the *systematic* error that was found; *corrected* by a standard, with the standard's uncertainty; *stated* from descriptions;
-or *unseen*."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """What a method asks of its test.
+    """What a method asks of its test."""
 
-    Parameters
-    ----------
-    text : of what is asked, in words.
-    met : whether it is met; ``None`` where the job does not say.
-    """
-
-    text: Text
-    met: bool | None
+    text: Text  # of what is asked, in words
+    met: bool | None  # whether it is met; ``None`` where the job does not say
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """One characteristic by one method, mm or rad.
+    """One characteristic by one method, mm or rad."""
 
-    Parameters
-    ----------
-    name : of the characteristic.
-    budget : of the method, with its k.
-    value : of the part; ``None`` where the part was not measured.
-    systematic : error that the method found and takes off; ``None`` where it looks for none.
-    corrected : whether it is taken off; where not, its size is added to U.
-    single : standard uncertainty of one measurement in one orientation, where ``budget`` is of the mean of all.
-    zone : whether it is the width of a zone, which errors make larger on average where it is small.
-    scatter, scatter_dof : standard deviation of one measurement among the repeats, and its degrees of freedom.
-    """
-
-    name: str
-    budget: Budget
-    value: float | None
-    systematic: float | None = None
-    corrected: bool = True
+    name: str  # of the characteristic
+    budget: Budget  # of the method, with its k
+    value: float | None  # of the part; ``None`` where the part was not measured
+    systematic: float | None = None  # error that the method found and takes off; ``None`` where it looks for none
+    corrected: bool = True  # whether it is taken off; where not, its size is added to U
+    # standard uncertainty of one measurement in one orientation, where ``budget`` is of the mean of all
     single: float | None = None
-    zone: bool = False
+    zone: bool = False  # whether it is the width of a zone, which errors make larger on average where it is small
+    # scatter, scatter_dof: standard deviation of one measurement among the repeats, and its degrees of freedom
     scatter: float = 0.0
     scatter_dof: float = 1.0
 
@@ -105,19 +88,12 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class ByMethod:
-    """All that a method says of a part.
-
-    Parameters
-    ----------
-    method : which.
-    figures : one a characteristic; those that were not tested are missing.
-    conditions : of the test.
-    seen : by family of causes (:data:`cmm_uq.analysis.parts.in_words.FAMILIES`), how the method takes hold of it.
-    """
+    """All that a method says of a part."""
 
     method: Method
-    figures: tuple[Figure, ...]
-    conditions: tuple[Condition, ...]
+    figures: tuple[Figure, ...]  # one a characteristic; those that were not tested are missing
+    conditions: tuple[Condition, ...]  # of the test
+    # by family of causes (:data:`cmm_uq.analysis.parts.in_words.FAMILIES`), how the method takes hold of it.
     seen: Mapping[str, Seen]
 
     def of(self, name: str) -> Figure | None:
@@ -127,21 +103,14 @@ class ByMethod:
 
 @dataclass(frozen=True)
 class Stating:
-    """What one method states of a characteristic, mm or rad.
-
-    Parameters
-    ----------
-    method : which.
-    value : where there is one.
-    u, U : its uncertainty.
-    error : mean error that is taken off, of virtual measurements.
-    """
+    """What one method states of a characteristic, mm or rad."""
 
     method: Method
-    value: float | None
+    value: float | None  # where there is one
+    # u, U: its uncertainty
     u: float
     U: float
-    error: float = 0.0
+    error: float = 0.0  # mean error that is taken off, of virtual measurements
 
 
 @dataclass(frozen=True)
@@ -155,57 +124,35 @@ class Pair:
 
 @dataclass(frozen=True)
 class Compared:
-    """One characteristic by all methods.
+    """One characteristic by all methods."""
 
-    Parameters
-    ----------
-    name : of the characteristic.
-    stated : by each method that says something of it, the virtual measurement first.
-    pairs : Eₙ of each two that have a value.
-    why : they differ, in sentences that follow from the figures.
-    """
-
-    name: str
-    stated: tuple[Stating, ...]
-    pairs: tuple[Pair, ...]
-    why: tuple[Text, ...]
+    name: str  # of the characteristic
+    stated: tuple[Stating, ...]  # by each method that says something of it, the virtual measurement first
+    pairs: tuple[Pair, ...]  # Eₙ of each two that have a value
+    why: tuple[Text, ...]  # they differ, in sentences that follow from the figures
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The methods beside each other; what a part's page and its ``results.json`` say of them.
+    """The methods beside each other; what a part's page and its ``results.json`` say of them."""
 
-    Parameters
-    ----------
-    methods : the others, not the virtual measurement.
-    characteristics : those that another method tested, in the order of the plan.
-    """
-
-    methods: tuple[ByMethod, ...]
-    characteristics: tuple[Compared, ...]
+    methods: tuple[ByMethod, ...]  # the others, not the virtual measurement
+    characteristics: tuple[Compared, ...]  # those that another method tested, in the order of the plan
 
 
-FEWEST_CYCLES = 10
-"""Set-ups of the calibrated part that descriptions of the method ask for."""
+FEWEST_CYCLES = 10  # set-ups of the calibrated part that descriptions of the method ask for
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A characteristic of the calibrated part, mm or rad.
+    """A characteristic of the calibrated part, mm or rad."""
 
-    Parameters
-    ----------
-    value, u : by its certificate.
-    u_part : of what differs between parts: form, roughness, elasticity.
-    expanding_mm : length whose expansion counts; 0 of a form or an angle.
-    angle : whether it is one.
-    """
-
+    # value, u: by its certificate
     value: float
     u: float
-    u_part: float = 0.0
-    expanding_mm: float = 0.0
-    angle: bool = False
+    u_part: float = 0.0  # of what differs between parts: form, roughness, elasticity
+    expanding_mm: float = 0.0  # length whose expansion counts; 0 of a form or an angle
+    angle: bool = False  # whether it is one
 
 
 @dataclass(frozen=True)
@@ -223,17 +170,8 @@ def by_calibrated_part(
 ) -> Figure:  # fmt: skip
     """One characteristic by the repeats of a calibrated part.
 
-    Parameters
-    ----------
-    name : of the characteristic.
-    readings : (n,) of the calibrated part, mm or rad.
-    cycle : (n,) number of the set-up of each.
-    measured : value of the part itself; ``None`` where it was not measured.
-    corrected : whether that is corrected by the systematic error.
-
-    Raises
-    ------
-    CmmUqError : too few readings or set-ups, or no uncertainty of the calibration.
+    ``readings``: (n,) of the calibrated part, mm or rad. ``cycle``: (n,) number of the set-up of each. ``measured``: value
+    of the part itself; ``None`` where it was not measured. ``corrected``: whether that is corrected by the systematic error.
     """
     cycles = len(np.unique(cycle))
     if cycles < FEWEST_CYCLES or len(readings) < FEWEST_READINGS:
@@ -265,22 +203,15 @@ _ORIENTATIONS, _REPEATS = say("between orientations"), say("between repeats in o
 
 @dataclass(frozen=True, eq=False)
 class Standard:
-    """A standard as it was measured beside the part.
+    """A standard as it was measured beside the part."""
 
-    Parameters
-    ----------
-    calibrated, u : length or diameter by its certificate, mm.
-    readings : (n,) of it, mm.
-    orientation : (n,) number of the orientation of each.
-    inner : of a ring, whose diameter a large tip makes small.
-    temperature_c, u_cte_per_k : while it was measured; uncertainty of its coefficient of expansion.
-    """
-
+    # calibrated, u: length or diameter by its certificate, mm
     calibrated: float
     u: float
-    readings: Floats
-    orientation: Ints
-    inner: bool = False
+    readings: Floats  # (n,) of it, mm
+    orientation: Ints  # (n,) number of the orientation of each
+    inner: bool = False  # of a ring, whose diameter a large tip makes small
+    # temperature_c, u_cte_per_k: while it was measured; uncertainty of its coefficient of expansion
     temperature_c: float = REFERENCE_TEMPERATURE
     u_cte_per_k: float = 0.0
 
@@ -297,16 +228,11 @@ class Standard:
 
 @dataclass(frozen=True, eq=False)
 class Standards:
-    """What was measured beside the part.
+    """What was measured beside the part."""
 
-    Parameters
-    ----------
-    length : standard of length; ``None`` where there was none, and the common scale is then not known.
-    tips : standard of each tip, by stylus.
-    """
-
+    # standard of length; ``None`` where there was none, and the common scale is then not known
     length: Standard | None = None
-    tips: Mapping[str, Standard] = field(default_factory=dict)
+    tips: Mapping[str, Standard] = field(default_factory=dict)  # standard of each tip, by stylus
 
     @property
     def scale(self) -> float:
@@ -343,16 +269,8 @@ def by_orientations(
 ) -> Figure:  # fmt: skip
     """One characteristic by measurements of the part in several orientations.
 
-    Parameters
-    ----------
-    name : of the characteristic.
-    readings : (n,) of it, mm or rad; as many in each orientation.
-    orientation : (n,) number of the orientation of each.
-    angle : whether it is one.
-
-    Raises
-    ------
-    CmmUqError : fewer than two orientations, or two measurements in each, or not as many in each.
+    ``readings``: (n,) of it, mm or rad; as many in each orientation. ``orientation``: (n,) number of the orientation of
+    each. ``angle``: whether it is one.
     """
     own, found = unit("rad" if angle else "mm"), one_way(readings, orientation)
     used = [stylus for stylus in standards.tips if slopes.tips.get(stylus, 0.0)]

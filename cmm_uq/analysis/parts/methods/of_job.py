@@ -38,22 +38,15 @@ from cmm_uq.jobs.part.readings import Read, Repeats
 from cmm_uq.jobs.part.tables import CalibratedFacts, CalibratedPartFacts, OrientationsFacts
 from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS
 
-_STEP_MM = 1e-3
-"""By which the farthest point moves, or a tip grows, to see what follows."""
+_STEP_MM = 1e-3  # by which the farthest point moves, or a tip grows, to see what follows
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives of c characteristics.
+    """Derivatives of c characteristics."""
 
-    Parameters
-    ----------
-    scale : (c,) by the scale of all coordinates, mm and rad: of a length itself.
-    tips : by stylus, (c,) by the effective diameter of its tip, mm/mm and rad/mm.
-    """
-
-    scale: Floats
-    tips: dict[str, Floats]
+    scale: Floats  # (c,) by the scale of all coordinates, mm and rad: of a length itself
+    tips: dict[str, Floats]  # by stylus, (c,) by the effective diameter of its tip, mm/mm and rad/mm
 
 
 def sensitivities(plan: Plan) -> Sensitivities:
@@ -72,31 +65,18 @@ def sensitivities(plan: Plan) -> Sensitivities:
     return Sensitivities(scale, tips)
 
 
+# orientations, and measurements in each, that descriptions of the method of several orientations ask for
 ORIENTATIONS_ASKED, REPEATS_ASKED = 4, 5
-"""Orientations, and measurements in each, that descriptions of the method of several orientations ask for."""
-
-ZONES = (*FORMS, *ORIENTATIONS, *RUNOUTS, "position", "coaxiality")
-"""Characteristics that are widths of zones."""
-
-_NO_LENGTH = (*ZONES, "angle")
-"""Characteristics that are none or deviations: their expansion does not count."""
-
+ZONES = (*FORMS, *ORIENTATIONS, *RUNOUTS, "position", "coaxiality")  # characteristics that are widths of zones
+_NO_LENGTH = (*ZONES, "angle")  # characteristics that are none or deviations: their expansion does not count
+# change of a characteristic, mm or rad, for one millimetre of a tip or the whole of its own scale, that is none
 _FELT = 1e-6
-"""Change of a characteristic, mm or rad, for one millimetre of a tip or the whole of its own scale, that is none."""
 
 
 def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[ByMethod, ...]:
     """What other methods say of a part's characteristics; empty where the job has none.
 
-    Parameters
-    ----------
-    job : that was read.
-    plan : of the job.
-    measured : (c,) values of the part; ``None`` where nothing was measured.
-
-    Raises
-    ------
-    CmmUqError : a method's recording is less than the method needs.
+    ``measured``: (c,) values of the part; ``None`` where nothing was measured.
     """
     facts, found = job.facts, []
     slopes = sensitivities(plan) if facts.by_calibrated_part or facts.by_orientations else None
@@ -108,12 +88,7 @@ def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[ByMet
 
 
 def lacking(job: PartJob) -> tuple[tuple[str, Text, str], ...]:
-    """What the tests of other methods lack: table of the job, what is asked for, what to do.
-
-    Raises
-    ------
-    CmmUqError : see :func:`methods_of`.
-    """
+    """What the tests of other methods lack: table of the job, what is asked for, what to do."""
     if job.facts.by_calibrated_part is None and job.facts.by_orientations is None:
         return ()
     plan = plan_of(job)
@@ -258,8 +233,7 @@ def _conditions_orientations(
     if facts.length_standard is not None:
         certificates.append(facts.length_standard.certificate)
     if certificates:
-        found.append(Condition(say("Each standard has a certificate that the job names"),
-                               all(certificates)))  # fmt: skip
+        found.append(Condition(say("Each standard has a certificate that the job names"), all(certificates)))
     found.append(
         Condition(say("Other points in each orientation, so that the part's form is seen"), facts.points_varied)
     )

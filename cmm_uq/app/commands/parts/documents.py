@@ -31,26 +31,17 @@ COMMAND = "part"
 
 @dataclass(frozen=True)
 class Asked:
-    """How a part is evaluated.
+    """How a part is evaluated."""
 
-    Parameters
-    ----------
-    seed : of everything random.
-    trials : number of virtual measurements; ``None`` for as many as is usual.
-    digits : of u that are to be known: then so many are made as that needs, ``trials`` at least; ``None`` for ``trials``.
-    rerun : whether the machine's certificate is computed again from its inputs.
-    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
-    records : of the machine's history, that its drift is read from; ``None`` for none.
-    history : of the machine, that a report has inside; then no records are asked.
-    """
-
-    seed: int = 0
-    trials: int | None = None
+    seed: int = 0  # of everything random
+    trials: int | None = None  # number of virtual measurements; ``None`` for as many as is usual
+    # of u that are to be known: then so many are made as that needs, ``trials`` at least; ``None`` for ``trials``
     digits: int | None = None
-    rerun: bool = False
+    rerun: bool = False  # whether the machine's certificate is computed again from its inputs
+    # files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed
     trust: tuple[Path, ...] | None = None
-    records: str | Path | None = None
-    history: bytes | None = None
+    records: str | Path | None = None  # of the machine's history, that its drift is read from; ``None`` for none
+    history: bytes | None = None  # of the machine, that a report has inside; then no records are asked
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +62,6 @@ class WrittenPart:
 
     @property
     def conforming(self) -> bool:
-        """See :class:`~cmm_uq.certificate.part.measurement.PartFound`."""
         return self.found.conforming
 
     @property
@@ -87,12 +77,7 @@ class WrittenPart:
 
 @naming_package()
 def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
-    """What a part's job gives; nothing is written.
-
-    Raises
-    ------
-    CmmUqError : see :func:`cmm_uq.app.commands.parts.part.part_found`.
-    """
+    """What a part's job gives; nothing is written."""
     from cmm_uq.app.commands.parts.part import part_found
 
     return part_found(
@@ -115,19 +100,8 @@ def write_part(
 ) -> WrittenPart:  # fmt: skip
     """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
 
-    Parameters
-    ----------
-    folder : the job folder.
-    out : where to write; ``reports/<job id>`` by default.
-    asked : how it is evaluated.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    stage : told of progress.
-    language : of the page, instead of the job's.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be evaluated, or something in the folder that this command did not write for this job.
-    OutputError : the folder cannot be written to.
+    ``out``: where to write; ``reports/<job id>`` by default. ``force``: keep what stands in the way as ``NAME.previous``
+    instead of refusing.
     """
     stage("Reading the job", 0.0)
     job = in_language(read_part(folder), language)
@@ -136,17 +110,8 @@ def write_part(
 
 def written(
     job: PartJob, found: Any, out: Path | None = None, *, force: bool = False, stage: Stage = silent
-) -> WrittenPart:  # fmt: skip
-    """Make sure of the folder, then evaluate, render and write, all or none.
-
-    Parameters
-    ----------
-    found : evaluates it.
-
-    Raises
-    ------
-    CmmUqError, OutputError : see :func:`write_part`.
-    """
+) -> WrittenPart:
+    """Make sure of the folder, then evaluate, render and write, all or none."""
     facts = job.facts.job
     fonts_of(facts.language)  # refused before anything is computed
     folder = REPORTS / facts.id if out is None else out
@@ -161,19 +126,8 @@ def written(
     return WrittenPart(one, contents[RESULTS], files)
 
 
-def contents_of(
-    found: PartFound, stage: Stage = silent, *, finished: Finished = unchanged
-) -> dict[str, bytes]:  # fmt: skip
-    """Bytes of every file, by name.
-
-    Parameters
-    ----------
-    finished : what becomes of a document before the next is made of it.
-
-    Raises
-    ------
-    CmmUqError : an input has the name of a file that is written.
-    """
+def contents_of(found: PartFound, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
+    """Bytes of every file, by name."""
     from cmm_uq.certificate.part.results import part_results
     from cmm_uq.certificate.render.html import render_html
     from cmm_uq.certificate.render.pdf import render_pdf

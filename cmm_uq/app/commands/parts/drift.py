@@ -25,9 +25,7 @@ from cmm_uq.laboratory.due.history import MachineHistory
 from cmm_uq.laboratory.records.facts import Series
 from cmm_uq.laboratory.records.place import NONE
 
-FILE = "machine-records/history.json"
-"""By its name among the inputs of a part's report."""
-
+FILE = "machine-records/history.json"  # by its name among the inputs of a part's report
 SCHEMA = "cmm-uq/machine-history/1"
 
 _COLUMNS: Mapping[str, type] = {
@@ -38,15 +36,10 @@ _COLUMNS: Mapping[str, type] = {
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What records say of how a machine changes.
+    """What records say of how a machine changes."""
 
-    Parameters
-    ----------
-    adjusted : days of its adjustments.
-    values : each over time, up to the calibration, by name, with the ordinal of the newest adjustment.
-    """
-
-    adjusted: tuple[dt.date, ...]
+    adjusted: tuple[dt.date, ...]  # days of its adjustments
+    # each over time, up to the calibration, by name, with the ordinal of the newest adjustment
     values: Mapping[str, tuple[Series, int | None]]
 
     def change(self, name: str, days: float) -> float | None:
@@ -62,13 +55,7 @@ class Known:
 
 
 def attached_history(past: MachineHistory, until: dt.date) -> bytes:
-    """The history up to the calibration, as JSON whose numbers are those of the records to the bit.
-
-    Parameters
-    ----------
-    past : of the machine, on the day of the part's measurement.
-    until : day of the calibration.
-    """
+    """The history up to the calibration, as JSON whose numbers are those of the records to the bit."""
     values = []
     for one in past.values:
         series, rows = one.series, np.asarray(one.series.day) <= until.toordinal()
@@ -82,12 +69,7 @@ def attached_history(past: MachineHistory, until: dt.date) -> bytes:
 
 
 def known_of(content: bytes) -> Known:
-    """The history that :func:`attached_history` wrote.
-
-    Raises
-    ------
-    CmmUqError : it is none.
-    """
+    """The history that :func:`attached_history` wrote."""
     try:
         said = json.loads(content)
         if said["schema"] != SCHEMA:
@@ -109,36 +91,22 @@ def _series(one: Mapping[str, Any]) -> Series:
 
 @dataclass(frozen=True, eq=False)
 class Aged:
-    """A machine on the day of a part's measurement, what is known of its changes, in a sentence, and in figures.
-
-    Parameters
-    ----------
-    history : that the changes follow from, as it is attached to the report; ``None`` without records.
-    """
+    """A machine on the day of a part's measurement, what is known of its changes, in a sentence, and in figures."""
 
     state: MachineState
     told: Text
     changes: Mapping[str, float | None] | None = None
+    # that the changes follow from, as it is attached to the report; ``None`` without records
     history: bytes | None = None
 
 
 def with_drift(
     state: MachineState, serial: str, on: dt.date, records: str | Path | None, where: str, *, kept: bytes | None = None
-) -> Aged:  # fmt: skip
+) -> Aged:
     """The state of a machine on a day.
 
-    Parameters
-    ----------
-    state : as its certificate states it, with the day of its calibration.
-    serial : of the machine, or its name.
-    on : day of the part's measurement.
-    records : of its history; ``None`` or ``none`` for none.
-    where : names the certificate, for messages.
-    kept : the history that an earlier report has inside (:mod:`cmm_uq.app.commands.parts.drift`); then records are not asked.
-
-    Raises
-    ------
-    CmmUqError : the records cannot be read, or the machine was adjusted after its calibration.
+    ``records``: of its history; ``None`` or ``none`` for none. ``kept``: the history that an earlier report has inside
+    (:mod:`cmm_uq.app.commands.parts.drift`); then records are not asked.
     """
     since = state.calibrated or on
     if kept is None and (records is None or str(records) == NONE):

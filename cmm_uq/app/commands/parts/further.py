@@ -18,11 +18,9 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
 
-FOLDER = "further"
-"""Of the job that plans them, beside the part's page."""
-
+FOLDER = "further"  # of the job that plans them, beside the part's page
+# errors that are planned for together, set-ups that are searched, and candidates that they are chosen from
 MOST, SET_UPS, CANDIDATES = 5, 4, 60
-"""Errors that are planned for together, set-ups that are searched, and candidates that they are chosen from."""
 
 _SHOWN_BY: tuple[tuple[str, Text], ...] = (
     ("approach_", say("a gauge whose faces are met from both sides, such as a step gauge, shows it")),
@@ -45,14 +43,9 @@ class Planned:
 def further_of(calibrated: Job | None, unseen: Iterable[Unseen]) -> Planned | None:
     """Further set-ups of the calibration's artefact for errors that it left free or did not see.
 
-    Parameters
-    ----------
-    calibrated : job of the calibration; ``None`` where it is not at hand.
-    unseen : of all characteristics.
+    ``calibrated``: job of the calibration; ``None`` where it is not at hand.
 
-    Returns
-    -------
-    ``None`` where nothing is unseen, or the calibration is not at hand.
+    Returns ``None`` where nothing is unseen, or the calibration is not at hand.
     """
     wanted = _by_share(unseen)
     if not wanted or calibrated is None or kind_of(calibrated).observe is None:

@@ -44,9 +44,7 @@ if TYPE_CHECKING:
     from cmm_uq.app.commands.verify import Verification
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
-
-NORMAL_C = 20.0
-"""°C to which lengths are referred (ISO 1)."""
+NORMAL_C = 20.0  # °C to which lengths are referred (ISO 1)
 
 
 def temperatures(job: Job | None) -> Floats | None:
@@ -58,14 +56,7 @@ def temperatures(job: Job | None) -> Floats | None:
 
 
 def machine_warnings(job: PartJob, standing: Standing, calibrated: Job | None) -> Iterable[Text]:
-    """What the reader must know of the machine.
-
-    Parameters
-    ----------
-    job : of the part.
-    standing : of the machine's certificate.
-    calibrated : job of the calibration, where it is at hand.
-    """
+    """What the reader must know of the machine."""
     if standing.origin != MEASURED:
         origin = _ORIGINS.get(standing.origin, Verbatim(standing.origin))
         yield say("The machine's calibration is {origin}: nobody measured this machine.", origin=origin)
@@ -112,33 +103,22 @@ def _thermal(job: PartJob, calibrated: Job | None) -> Iterable[Text]:
 
 
 WHERE = "job.toml [machine_state]"
-
+# before the names of inputs of the machine's own job, where they are attached to a part's report
 CALIBRATION = "machine-job/"
-"""Before the names of inputs of the machine's own job, where they are attached to a part's report."""
-
+# quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
+# show of errors left out
 _MOST = 200
-"""Quantities of a recording, with their repeats, by which a machine's errors are drawn: time grows with the cube of what they
-show of errors left out."""
 
 
 @dataclass(frozen=True, eq=False)
 class MachineFound:
-    """A machine, and how it is known.
+    """A machine, and how it is known."""
 
-    Parameters
-    ----------
-    state : its errors and noise on the day of the part's measurement.
-    standing : of its certificate.
-    job : of its calibration, where the inputs are at hand.
-    warnings : what the reader must know of it.
-    history : that its changes since follow from; ``None`` where no records were asked.
-    """
-
-    state: MachineState
-    standing: Standing
-    job: Job | None
-    warnings: tuple[Text, ...]
-    history: bytes | None = None
+    state: MachineState  # its errors and noise on the day of the part's measurement
+    standing: Standing  # of its certificate
+    job: Job | None  # of its calibration, where the inputs are at hand
+    warnings: tuple[Text, ...]  # what the reader must know of it
+    history: bytes | None = None  # that its changes since follow from; ``None`` where no records were asked
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,21 +143,10 @@ def machine_found(
 ) -> MachineFound:  # fmt: skip
     """The machine of a part's job.
 
-    Parameters
-    ----------
-    job : that was read.
-    rerun : whether the certificate's figures are computed again from its inputs.
-    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
-    records : of the machine's history, for its drift; ``None`` for none.
-    history : of the machine, that a report has inside; then no records are asked.
-    seed : of the draws.
-    stage : told of progress.
-    fits : refuses a machine on which the part cannot be measured, before anything is computed.
-
-    Raises
-    ------
-    CmmUqError : the certificate does not verify, does not hold on the day, states too little, or is of another machine; or the
-        job that is to be analysed in its place cannot be.
+    ``rerun``: whether the certificate's figures are computed again from its inputs. ``trust``: files and folders of
+    certificates that are trusted; ``None`` for nobody, and then nothing need be signed. ``records``: of the machine's
+    history, for its drift; ``None`` for none. ``fits``: refuses a machine on which the part cannot be measured, before
+    anything is computed.
     """
     if job.facts.machine_state.job is not None:
         stated = _analysed(job, seed, stage)
@@ -205,16 +174,7 @@ def machine_found(
 
 
 def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
-    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is read alone.
-
-    Parameters
-    ----------
-    fits : refuses a machine on which the part cannot be measured.
-
-    Raises
-    ------
-    CmmUqError : see :func:`machine_found`.
-    """
+    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is read alone."""
     if job.facts.machine_state.job is not None:
         fits(_machine(job, read_job(_machines_folder(job))))
         return
@@ -224,29 +184,14 @@ def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machin
 
 
 def standing_of(job: PartJob, found: Verification) -> Standing:
-    """The machine's certificate on the day of the part's measurement, without what its errors then are.
-
-    Parameters
-    ----------
-    job : of the part.
-    found : the certificate, verified.
-
-    Raises
-    ------
-    CmmUqError : see :func:`machine_found`.
-    """
+    """The machine's certificate on the day of the part's measurement, without what its errors then are."""
     stated = _certified(job, found, rerun=False)
     _machine(job, stated.job)
     return _standing(job, stated, trusted=False)
 
 
 def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None) -> Verification:
-    """The verification of the certificate that states the machine of a part's job.
-
-    Raises
-    ------
-    CmmUqError : it states too little, or a file of it is hostile.
-    """
+    """The verification of the certificate that states the machine of a part's job."""
     from cmm_uq.app.commands.verify import verify_given
 
     where = _where(job)
@@ -261,12 +206,7 @@ def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None 
 
 
 def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
-    """What a certificate states that verifies.
-
-    Raises
-    ------
-    CmmUqError : it does not, or has no draws of the posterior.
-    """
+    """What a certificate states that verifies."""
     given, where = found.given, _where(job)
     if wrong := found.inquiry.findings:
         more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
@@ -338,12 +278,7 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
 
 
 def _machines_folder(job: PartJob) -> Path:
-    """Folder of the machine's job.
-
-    Raises
-    ------
-    CmmUqError : it is that of the part's own job.
-    """
+    """Folder of the machine's job."""
     folder = job.folder / str(job.facts.machine_state.job)
     if folder.resolve() == job.folder.resolve():
         raise CmmUqError("is the part's own job", where=f"{WHERE} job = {job.facts.machine_state.job!r}",
@@ -374,12 +309,7 @@ def with_history(job: PartJob, kept: bytes | None) -> PartJob:
 
 
 def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
-    """The certificate on the day of the measurement.
-
-    Raises
-    ------
-    CmmUqError : it is later than the measurement, or no longer holds.
-    """
+    """The certificate on the day of the measurement."""
     said, facts, on = stated.results["job"], job.facts.machine_state, job.facts.job.date
     date = dt.date.fromisoformat(said["date"])
     where = _where(job)
@@ -419,12 +349,7 @@ def _where(job: PartJob) -> str:
 
 
 def _machine(job: PartJob, calibrated: Job | None) -> Machine:
-    """Chain, travel and origin: as the job says, else as the calibration has them.
-
-    Raises
-    ------
-    CmmUqError : both say a chain or a travel, and not the same; or neither a travel.
-    """
+    """Chain, travel and origin: as the job says, else as the calibration has them."""
     facts, own = job.facts.machine_state, None if calibrated is None else calibrated.facts.machine
     chain, origin = facts.chain, facts.origin_mm
     if own is not None and "chain" not in facts.model_fields_set:

@@ -34,7 +34,6 @@ from cmm_uq.jobs.source import RESULTS
 from cmm_uq.jobs.tables.origin import EXAMPLE, SIMULATED
 
 Facts = dict[str, Any]
-
 FOLDER = "machine"
 _WHOLE = (".pdf", ".xml")
 _FIX = "Name the certificate (PDF), or the folder that the machine's report wrote"
@@ -42,19 +41,15 @@ _FIX = "Name the certificate (PDF), or the folder that the machine's report wrot
 
 @dataclass
 class Answers:
-    """What was said so far; what is empty stays that of the example.
+    """What was said so far; what is empty stays that of the example."""
 
-    Parameters
-    ----------
-    part, stylus, alignment : keys of these tables.
-    machine : files that state the machine, by name inside the job's folder.
-    features, characteristics : tables, in order.
-    """
-
+    # part, stylus, alignment: keys of these tables
     part: Facts = field(default_factory=dict)
     stylus: Facts = field(default_factory=dict)
     alignment: Facts = field(default_factory=dict)
+    # files that state the machine, by name inside the job's folder
     machine: Mapping[str, bytes] = field(default_factory=dict)
+    # features, characteristics: tables, in order
     features: list[Facts] = field(default_factory=list)
     characteristics: list[Facts] = field(default_factory=list)
     probed: dict[str, Probed] = field(default_factory=dict)
@@ -65,12 +60,7 @@ class Answers:
         return next((name for name in self.machine if name.lower().endswith(_WHOLE)), FOLDER)
 
     def free_name(self, name: str) -> str:
-        """A name that no feature has.
-
-        Raises
-        ------
-        CmmUqError : one has it.
-        """
+        """A name that no feature has."""
         return _free(name, self.probed)
 
     def free_tolerance(self, name: str) -> str:
@@ -78,22 +68,12 @@ class Answers:
         return _free(name, [one["name"] for one in self.characteristics])
 
     def add_feature(self, given: Facts) -> None:
-        """Take a feature.
-
-        Raises
-        ------
-        CmmUqError : the readers of a job refuse it.
-        """
+        """Take a feature."""
         self.probed[given["name"]] = probed_of(given)
         self.features.append(given)
 
     def aligned(self, datums: Sequence[str]) -> Facts:
-        """``[alignment]`` by datums in order, or by best fit where there are none.
-
-        Raises
-        ------
-        CmmUqError : a name of nothing, or datums that leave the part free.
-        """
+        """``[alignment]`` by datums in order, or by best fit where there are none."""
         if not datums:
             return {"best_fit": True}
         named = [tuple(self.probed[each] for each in members(name, self.probed)) for name in datums]
@@ -102,12 +82,7 @@ class Answers:
         return {"datums": list(datums)}
 
     def add_characteristic(self, given: Facts) -> None:
-        """Take a tolerance.
-
-        Raises
-        ------
-        CmmUqError : the readers of a job refuse it.
-        """
+        """Take a tolerance."""
         try:
             facts = CharacteristicFacts.model_validate(given)
         except ValidationError as error:
@@ -126,16 +101,7 @@ def _free(name: str, taken: Any) -> str:
 
 
 def certificate_files(path: Path) -> dict[str, bytes]:
-    """What states a machine, as it goes into the folder of a part's job.
-
-    Parameters
-    ----------
-    path : the certificate, results.json, or the folder of both.
-
-    Raises
-    ------
-    CmmUqError : nothing of the kind lies there.
-    """
+    """What states a machine, as it goes into the folder of a part's job."""
     if path.is_dir():
         whole = sorted(one for one in path.glob("certificate*.pdf") if one.is_file())
         chosen = whole[:1] or [path / RESULTS, path / POSTERIOR]
@@ -145,40 +111,22 @@ def certificate_files(path: Path) -> dict[str, bytes]:
 
 
 Tables = Mapping[str, Mapping[str, Any]]
-
 PART = "part"
 SCHEMA, README = ".cmm-uq/part.schema.json", "README.md"
-_NAMED = ("name", "kind", "what", "features", "datums", "not_measured", "drawing")
-"""Keys whose values are no figures."""
-
+_NAMED = ("name", "kind", "what", "features", "datums", "not_measured", "drawing")  # keys whose values are no figures
 _LISTS = ("stylus", "feature", "characteristic")
 _OTHER_METHODS = ("by_calibrated_part", "by_orientations")
 
 
 def part_files(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
-    """Contents of every file of a new job of a part, by name; its figures are an example.
-
-    Parameters
-    ----------
-    given : what job.toml is to say, by table and key, in place of the example.
-    id : of the job.
-
-    Raises
-    ------
-    CmmUqError : what is given is refused by the readers of such a job.
-    """
+    """Contents of every file of a new job of a part, by name; its figures are an example."""
     tables = _with({name: _copied(table) for name, table in TABLES.items()}, given, id)
     marked = {f"{name}.{key}" for name, table in TABLES.items() for key in _keys(table)}
     return _files(tables, marked - _given_keys(given), {})
 
 
 def part_of_answers(answers: Answers, *, id: str) -> dict[str, bytes]:  # noqa: A002
-    """Contents of every file of a new job of a part as its user described it; what was not said is that of the example.
-
-    Raises
-    ------
-    CmmUqError : the readers of a job refuse what was said.
-    """
+    """Contents of every file of a new job of a part as its user described it; what was not said is that of the example."""
     tables = {name: _copied(table) for name, table in TABLES.items()}
     own: dict[str, Any] = {PART: answers.part, "machine_state": {"certificate": answers.certificate}}
     tables["stylus"] = [{**tables["stylus"][0], **answers.stylus}]
@@ -203,16 +151,7 @@ def _of_the_first(answers: Answers) -> dict[str, Any]:
 def part_of_drawing(path: Path, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     """Contents of every file of a new job of a part whose plan another program wrote.
 
-    Parameters
-    ----------
-    path : of a QIF plan or a DMIS program.
-    given : what job.toml is to say; ``part.not_measured`` names what may be left out.
-    id : of the job.
-
-    Raises
-    ------
-    CmmUqError : the file is damaged, or something of it is not understood and may not be left out; or the readers of a job
-        refuse what is made of it.
+    ``given``: what job.toml is to say; ``part.not_measured`` names what may be left out.
     """
     content, where = content_of(path, TABLE_BYTES, "Check its name"), str(path)
     head = content[:HEAD]

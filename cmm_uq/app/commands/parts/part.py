@@ -42,23 +42,16 @@ from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
 
+# virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2).
 TRIALS = 200_000
-"""Virtual measurements: ten thousand over one less the probability of the interval (JCGM 101:2008, 7.2.2)."""
-
-KEPT = 100_000
-"""Virtual measurements that are kept, for probabilities: one of 5 % is then known to 0.07 %."""
-
+KEPT = 100_000  # virtual measurements that are kept, for probabilities: one of 5 % is then known to 0.07 %.
+# virtual measurements of each way that is compared: its u is then known to 0.9 %, and its part of the planned one better.
 COMPARED = 6000
-"""Virtual measurements of each way that is compared: its u is then known to 0.9 %, and its part of the planned one better."""
-
+# points of a plan from which on fewer virtual measurements are made, as many points in all; a tenth of them at least
 MANY = 1000
-"""Points of a plan from which on fewer virtual measurements are made, as many points in all; a tenth of them at least."""
-
 COVERAGE = 0.95
-
-
+# points that one of a feature counts for that is found anew each time, not by a derivative: a zone, an inscribed element
 ITERATED = 50
-"""Points that one of a feature counts for that is found anew each time, not by a derivative: a zone, an inscribed element."""
 
 
 def affordable(draws: int, plan: Plan) -> int:
@@ -86,21 +79,10 @@ def part_found(
 ) -> PartFound:
     """What a part's job gives.
 
-    Parameters
-    ----------
-    job : that was read.
-    seed : of everything random; the same seed gives the same result.
-    trials : number of virtual measurements; by default :data:`TRIALS`, fewer of a plan of many points.
-    digits : of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least.
-    rerun : whether the machine's certificate is computed again from its inputs.
-    trust : whose signatures on it are trusted; ``None`` where nothing need be signed.
-    records : of the machine's history, for its drift; ``None`` for none.
-    history : of the machine, that a report has inside; then no records are asked.
-    stage : told of progress.
-
-    Raises
-    ------
-    CmmUqError : the machine's certificate does not hold, or the measurement is impossible.
+    ``trials``: number of virtual measurements; by default :data:`TRIALS`, fewer of a plan of many points. ``digits``: of u
+    that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least. ``rerun``: whether
+    the machine's certificate is computed again from its inputs. ``trust``: whose signatures on it are trusted; ``None``
+    where nothing need be signed. ``records``: of the machine's history, for its drift; ``None`` for none.
     """
     refuse_unfit(job)
     plan = plan_of(job)
@@ -181,9 +163,7 @@ class _Keeping:
         return np.ascontiguousarray(errors.T)
 
 
-def _simulated(
-    virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage
-) -> tuple[Simulated, Floats]:  # fmt: skip
+def _simulated(virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage) -> tuple[Simulated, Floats]:
     """Figures of the errors, and (N, c) errors of some of the virtual measurements that they come from."""
     keeping = _Keeping(virtual, stage)
     source = Source(virtual.names, keeping.draw)
@@ -204,23 +184,14 @@ def _unseen(virtual: Virtual, shares: Budget) -> tuple[Unseen, ...]:
     return tuple(found)
 
 
-def judged(
-    job: PartJob, plan: Plan, errors: Floats, measured: Floats | None
-) -> tuple[Judged | None, ...]:  # fmt: skip
+def judged(job: PartJob, plan: Plan, errors: Floats, measured: Floats | None) -> tuple[Judged | None, ...]:
     """What follows from each characteristic's limits, by the job's rule.
 
     Where nothing was measured, what would be accepted is told of a value that is not corrected for its mean error. A zone is
     then decided on by the root mean square of all errors as that of a normal distribution: errors about a perfect part are to
     one side and narrower than those about a part near its limit.
 
-    Parameters
-    ----------
-    errors : (N, c) of virtual measurements.
-    measured : (c,) values; ``None`` where nothing was measured.
-
-    Raises
-    ------
-    CmmUqError : the rule needs a prior that these limits cannot have.
+    ``errors``: (N, c) of virtual measurements. ``measured``: (c,) values; ``None`` where nothing was measured.
     """
     found: list[Judged | None] = []
     for i, (facts, one) in enumerate(zip(job.facts.characteristic, plan.characteristics, strict=True)):
@@ -241,7 +212,7 @@ def judged(
 
 def _prior(
     job: PartJob, facts: CharacteristicFacts, lower: float | None, upper: float | None, *, zone: bool
-) -> Known | None:  # fmt: skip
+) -> Known | None:
     """What is known of the value beforehand: about the middle of its limits, of a zone about zero."""
     given = job.facts.decision.prior
     if given is None:
