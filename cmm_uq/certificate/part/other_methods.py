@@ -113,12 +113,14 @@ def _figures(own: Sequence[Compared], *, angle: bool) -> Table:
             name = say("{method:capital}", method=METHODS[stated.method])
             rows.append((Verbatim(one.name), name, value, significant(stated.u / per_small),
                          significant(stated.U / per_small), apart))  # fmt: skip
-    notes = say(
+    note = say(
         "Eₙ: difference of the virtual measurement's value from this one over √(U₁² + U₂²) (ISO/IEC 17043); beyond 1 the "
         "methods contradict each other. Values that come from the same measured points have most of their error in "
         "common, so that theirs is small."
     )
-    return Table(say("Angles by each method") if angle else say("Lengths by each method"), columns, tuple(rows), notes)
+    return Table(
+        say("Angles by each method") if angle else say("Lengths by each method"), columns, tuple(rows), (note,)
+    )
 
 
 def _seen(methods: Sequence[ByMethod]) -> Table:
