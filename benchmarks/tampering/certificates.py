@@ -11,7 +11,8 @@ from pathlib import Path
 from benchmarks.tampering.cases import SEED, SIGNED
 from benchmarks.tampering.signatures import ROOT as ROOT_PEM
 from benchmarks.tampering.signatures import signed
-from cmm_uq.app.commands.report import write_diagnosis, write_report
+from cmm_uq.app.commands.diagnose import write_diagnosis
+from cmm_uq.app.commands.report import write_report
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"

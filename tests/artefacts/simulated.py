@@ -13,12 +13,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.app.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.plans.plan import plan_outcome
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.report import diagnosis_outcome
+from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.certificate.document import Block, Document, Table
 from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.plain import as_json
 from tests.conftest import ROOT
 

@@ -16,10 +16,11 @@ import pytest
 
 from cmm_uq.analysis.planning.setting import Planning
 from cmm_uq.analysis.screening.shape import Screening
+from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.jobs.simulate import write_simulation
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.report import CERTIFICATE, write_diagnosis, write_report
+from cmm_uq.app.commands.report import REPORT, write_report
 from cmm_uq.artefacts import BUILT_IN, kind_named, names
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import file_name
@@ -135,7 +136,7 @@ def test_a_kind_does_what_it_offers_and_is_refused_the_rest_in_words(
         report = write_report(job, out)
         results = json.loads(report.results)
         assert results["schema"] == "cmm-uq/results/1"
-        page, digital, pdf = (file_name(document, read_job(job).origin) for document in CERTIFICATE)
+        page, digital, pdf = (file_name(document, read_job(job).origin) for document in REPORT.documents)
         whole = read_dcc((out / digital).read_bytes(), digital)
         assert whole.document is not None
         assert whole.document.data == (out / page).read_bytes()

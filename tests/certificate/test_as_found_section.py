@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.analysis import Result, outcome_of
+from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.certificate.document import Document
 from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.reports import AsFound
 from tests.artefacts.reading import tables
 from tests.artefacts.simulated import analysed

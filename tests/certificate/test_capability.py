@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from cmm_uq.app.commands.analysis import Result, outcome_of
+from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.tables.identification import Capability, LengthCapability
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.reading import number, tables

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from cmm_uq.app.commands.analysis import analyse, outcome_of
+from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.certificate.document import DecisionBlock
 from cmm_uq.certificate.sections.first_page import summary
 from cmm_uq.certificate.wording import Headline

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from cmm_uq.app.commands.analysis import analyse, outcome_of
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf

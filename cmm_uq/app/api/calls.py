@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.app.api.outcomes import Diagnosis, Plan, Proof, Report
+from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.jobs.check import JobCheck, check_job, check_read
 from cmm_uq.app.commands.jobs.folder import KEPT, PLAN
 from cmm_uq.app.commands.jobs.new import new_job, new_plan
 from cmm_uq.app.commands.reading import compared_with, in_language, job_of, read_job
-from cmm_uq.app.commands.report import diagnosis_outcome, report_outcome
+from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.jobs.job import Job

@@ -9,11 +9,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from cmm_uq.app.commands.diagnose import DIAGNOSE
 from cmm_uq.app.commands.files import Form
 from cmm_uq.app.commands.parts.documents import written
 from cmm_uq.app.commands.plans.plan import PLAN
 from cmm_uq.app.commands.prove import PROVE
-from cmm_uq.app.commands.report import DIAGNOSE, REPORT
+from cmm_uq.app.commands.report import REPORT
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit

@@ -42,7 +42,7 @@ def command(
 ) -> None:
     """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.report import write_diagnosis
+        from cmm_uq.app.commands.diagnose import write_diagnosis
 
         told = None if quiet or json else show_imported
         written = write_diagnosis(

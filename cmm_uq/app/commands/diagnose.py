@@ -18,19 +18,25 @@ from cmm_uq.analysis.planning.suggestion import next_plan
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.app.commands.against import Against, against_simulation
 from cmm_uq.app.commands.estimation import without_outliers
+from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
 from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of, recorded_model, refuse_planned
-from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.reading import compared_with, in_language, read_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.overflow import refusing_overflow
+from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.outcome import Found, Outcome, Recipe
 from cmm_uq.certificate.result import Diagnosed
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY
+from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
+
+DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (TO_FILL_IN,), recorded=True)
 
 
 def diagnose_read(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None) -> Found:
@@ -139,3 +145,65 @@ def _outcome(result: Diagnosed) -> Outcome:
     plan = result.next_plan
     files = {} if plan is None else {TO_FILL_IN: to_fill_in(plan.points)}
     return replace(diagnosed_outcome(result), files=files)
+
+
+@naming_package()
+def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, stage: Stage = silent) -> Outcome:
+    """Diagnose a job that was read and compose the page; nothing is written.
+
+    Parameters
+    ----------
+    job : that was read.
+    seed : of everything random.
+    alpha : rate of false alarms.
+    stage : told of progress.
+    """
+    readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""
+    stage(f"Searching for what was left out{readings}", 0.0)
+    found = diagnose_read(
+        job, seed=seed, alpha=alpha,
+        progress=lambda part: stage(f"Sampling: {part:.0%} of the draws", 0.7 + 0.2 * part),
+    )  # fmt: skip
+    stage("Composing the page", 0.9)
+    return outcome_of(found, seed)
+
+
+def write_diagnosis(
+    job: Path,
+    out: Path | None = None,
+    *,
+    seed: int = 0,
+    alpha: float = FALSE_ALARMS,
+    against: Path | None = None,
+    force: bool = False,
+    stage: Stage | None = None,
+    told: Told | None = None,
+    records: str | Path | None = NONE,
+    language: Code | None = None,
+) -> Written:
+    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
+
+    Where further set-ups would tell more, ``next_plan.csv`` comes with them.
+
+    Parameters
+    ----------
+    job : the job folder.
+    out : where to write; ``reports/<job id>/diagnosis`` by default.
+    seed : of everything random.
+    alpha : rate of false alarms.
+    against : file of a simulation's prediction that the recording is compared with, whatever the job names.
+    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
+    stage : told of progress.
+    told : of the job, before anything is computed.
+    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
+    language : of the documents, instead of the job's.
+    """
+    read, tell = in_language(read_job(job), language), stage or silent
+    if against is not None:
+        read = compared_with(read, against)
+    if told is not None:
+        told(read)
+    return DIAGNOSE.write(
+        read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell,
+        records=records,
+    )  # fmt: skip

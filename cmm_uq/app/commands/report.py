@@ -1,31 +1,125 @@
-"""From a job to its certificate, or its diagnosis: analyse and compose, then write."""
+"""From a recording to its certificate: read, screen, model, estimate, figures, decide, diagnose, certificate."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.app.commands import analysis, diagnose
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
+from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.app.commands.certificates.reissue import reissued, with_replaced
+from cmm_uq.app.commands.diagnose import screened_model
+from cmm_uq.app.commands.estimation import (
+    accuracy,
+    contradictions,
+    named_draws,
+    noise,
+    parameters,
+    sizes,
+    with_doubt,
+    with_noise,
+)
 from cmm_uq.app.commands.files import Form, Stage, Told, Written, silent
-from cmm_uq.app.commands.reading import compared_with, in_language, read_job
+from cmm_uq.app.commands.model import OVERFLOW_FIX, recipe_of
+from cmm_uq.app.commands.reading import in_language, read_job
+from cmm_uq.artefacts import kind_of
 from cmm_uq.base.languages.translation import Code
+from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.plugins import naming_package
-from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
+from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.origin import DIGITAL
-from cmm_uq.certificate.outcome import Outcome
+from cmm_uq.certificate.outcome import Found, Outcome, Page, Recipe
+from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
+from cmm_uq.machine.model.bending import with_curvature
+from cmm_uq.machine.model.doubt import causes_of
+from cmm_uq.machine.model.kind import Kind
+from cmm_uq.machine.model.noise import noise_of
+from cmm_uq.maths.inference.posterior import Progress
+from cmm_uq.maths.inference.sampling import sample_with_noise
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.signing import Signing
 
-CERTIFICATE = ("certificate.html", DIGITAL, "certificate.pdf")
-DIAGNOSIS = ("diagnosis.html", "diagnosis.pdf")
-REPORT = Form("report", CERTIFICATE, further=(PROVENANCE,), recorded=True)
-DIAGNOSE = Form("diagnose", DIAGNOSIS, "diagnosis", (TO_FILL_IN,), recorded=True)
+REPORT = Form("report", ("certificate.html", DIGITAL, "certificate.pdf"), further=(PROVENANCE,), recorded=True)
+
+
+def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Result:
+    """What is measured of a machine whose errors are named effects, with its uncertainty, its decisions and what is left out.
+
+    The recording is ``y = f(x, θ) + ε``: artefact and set-ups f, effects θ with the range that physics allows, noise ε of
+    readings, set-ups, length and time. Estimates are draws of θ (JCGM 101, 6), figures of performance are those of lengths as
+    recorded (ISO 10360-2, 6), and decisions go by the rule that the job names (ISO 14253-1, JCGM 106).
+    """
+    kind = kind_of(job)
+    observe = partial(kind.observing("reported"), job.facts.artefact, where=job.recording_path)
+
+    # screen, and model: damaged rows refused, exchanged and copied points told, gross errors set aside
+    screened, findings = screened_model(job)
+
+    # estimate: least squares, a stated noise held against the residuals (χ²), then the posterior with the noise unknown
+    model, estimate, p_value = with_noise(screened)
+    components = noise_of(model)
+    draws = sample_with_noise(estimate.linear, components, estimate.least_squares, seed, progress)
+    posterior = with_curvature(model, components, draws)
+    causes = causes_of(model.artefact, job.circumstances)
+
+    # figures of performance of the lengths as recorded, and decisions
+    figures = accuracy(model, estimate, posterior, causes, seed)
+    outside = OutsideReadings.of(job.points, findings, observe)
+    statements = tuple(
+        statement(wish, model.artefact, figures, f"[[conformity]] {i}", kind.tested, None, job.circumstances, outside)
+        for i, wish in enumerate(job.facts.conformity, 1)
+    )
+
+    # diagnose: where several explanations remain, estimates are averages over them
+    diagnosis = diagnose_model(
+        job, screened, findings, seed=seed, known=posterior if model.sigma == screened.sigma else None
+    )
+    averaged = diagnosis.diagnosis.remaining.draws
+    values, doubt = with_doubt(model, estimate, posterior, posterior.draws if averaged is None else averaged, causes)
+    denied = () if averaged is None else contradictions(model, estimate, posterior, averaged)
+
+    result = Result(
+        job, model, findings, estimate, posterior, values,
+        named_draws(model, components, posterior, values, mixture=averaged is not None),
+        parameters(model, values), sizes(model, values),
+        noise(estimate, components, posterior, job.facts.recording.u_coordinate_um, p_value), figures, statements,
+        diagnosis, causes=causes, doubt=doubt, contradictions=denied,
+    )  # fmt: skip
+    for name, quantity in result.quantities():
+        must_be_finite(
+            (quantity.value, quantity.u, *quantity.interval95), f"{job.recording_path}: {name}", OVERFLOW_FIX
+        )
+    return result
+
+
+def report_recipe(job: Job) -> Recipe:
+    """How a job is reported: in its kind's own way, or as observations that named effects explain."""
+
+    def usual(kind: Kind) -> Recipe:
+        page = kind.needs("page", Page, "reported")
+        return Recipe(evaluate, lambda found, seed: certified(found, page))
+
+    return recipe_of(job, lambda own: own.report, usual, "reported")
+
+
+def evaluate_job(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Found:
+    """What the analysis of a job finds, of any kind; the same seed gives the same result."""
+    with refusing_overflow(job.recording_path, OVERFLOW_FIX):
+        return report_recipe(job).analyse(job, seed=seed, progress=progress)
+
+
+def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Found:
+    return evaluate_job(read_job(folder), seed=seed, progress=progress)
+
+
+def outcome_of(found: Found, seed: int = 0) -> Outcome:
+    """What there is to write of what :func:`evaluate_job` found."""
+    return report_recipe(found.job).outcome(found, seed)
 
 
 @naming_package()
@@ -38,16 +132,14 @@ def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: 
     seed : of everything random.
     stage : told of progress.
     composed : whether the certificate is composed, too, so that whatever stops it is said here; figures are the same.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed.
     """
-    found = analysis.analyse_job(
-        job, seed=seed, progress=lambda part: stage(_sampled("Sampling the posterior", part), 0.1 + 0.4 * part)
-    )
+
+    def sampling(part: float) -> None:
+        stage(f"Sampling the posterior: {part:.0%} of the draws", 0.1 + 0.4 * part)
+
+    found = evaluate_job(job, seed=seed, progress=sampling)
     stage("Composing the certificate", 0.5)
-    outcome = reissued(analysis.outcome_of(found, seed))
+    outcome = reissued(outcome_of(found, seed))
     if composed:
         outcome.document  # noqa: B018 - composed when it is first asked for
     return outcome
@@ -73,93 +165,12 @@ def write_report(
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
     language : of the documents, instead of the job's.
     signing : who signs the certificate; ``None`` for nobody.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed, the certificate cannot be signed, or something in the folder that this command did
-        not write for this job.
-    OutputError : the folder cannot be written to.
     """
     tell = stage or silent
     tell("Reading the job", 0.0)
     read = with_replaced(in_language(read_job(job), language), records, out)
-    analysis.report_recipe(read)  # refused before anything is made
+    report_recipe(read)  # refused before anything is made
     if told is not None:
         told(read)
     return REPORT.write(read, lambda: report_outcome(read, seed=seed, stage=tell), out, force=force, stage=tell,
                         records=records, signing=signing)  # fmt: skip
-
-
-@naming_package()
-def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, stage: Stage = silent) -> Outcome:
-    """Diagnose a job that was read and compose the page; nothing is written.
-
-    Parameters
-    ----------
-    job : that was read.
-    seed : of everything random.
-    alpha : rate of false alarms.
-    stage : told of progress.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be diagnosed.
-    """
-    readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""
-    stage(f"Searching for what was left out{readings}", 0.0)
-    found = diagnose.diagnose_read(
-        job, seed=seed, alpha=alpha, progress=lambda part: stage(_sampled("Sampling", part), 0.7 + 0.2 * part)
-    )
-    stage("Composing the page", 0.9)
-    return diagnose.outcome_of(found, seed)
-
-
-def write_diagnosis(
-    job: Path,
-    out: Path | None = None,
-    *,
-    seed: int = 0,
-    alpha: float = FALSE_ALARMS,
-    against: Path | None = None,
-    force: bool = False,
-    stage: Stage | None = None,
-    told: Told | None = None,
-    records: str | Path | None = NONE,
-    language: Code | None = None,
-) -> Written:
-    """Diagnose a job and write ``diagnosis.html``, ``diagnosis.pdf`` and ``results.json``, all or none.
-
-    Where further set-ups would tell more, ``next_plan.csv`` comes with them.
-
-    Parameters
-    ----------
-    job : the job folder.
-    out : where to write; ``reports/<job id>/diagnosis`` by default.
-    seed : of everything random.
-    alpha : rate of false alarms.
-    against : file of a simulation's prediction that the recording is compared with, whatever the job names.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    stage : told of progress.
-    told : of the job, before anything is computed.
-    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
-    language : of the documents, instead of the job's.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be diagnosed, or something in the folder that this command did not write for this job.
-    OutputError : the folder cannot be written to.
-    """
-    read, tell = in_language(read_job(job), language), stage or silent
-    if against is not None:
-        read = compared_with(read, against)
-    if told is not None:
-        told(read)
-    return DIAGNOSE.write(
-        read, lambda: diagnosis_outcome(read, seed=seed, alpha=alpha, stage=tell), out, force=force, stage=tell,
-        records=records,
-    )  # fmt: skip
-
-
-def _sampled(what: str, part: float) -> str:
-    """A stage with how much of the draws that are needed is there."""
-    return f"{what}: {part:.0%} of the draws"

@@ -87,7 +87,8 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
     CmmUqError : nothing.
     """
     from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-    from cmm_uq.app.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
+    from cmm_uq.app.commands.diagnose import DIAGNOSE, diagnosis_outcome
+    from cmm_uq.app.commands.report import REPORT, report_outcome
 
     data = given.results[1] if given.results else {}
     seed = _seed(data)

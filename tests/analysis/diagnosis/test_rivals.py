@@ -12,8 +12,9 @@ import pytest
 
 from cmm_uq.analysis.conformity.accuracy import figures
 from cmm_uq.analysis.diagnosis.model_average import REMAINS, SETTLED
-from cmm_uq.app.commands.analysis import analyse_observations, outcome_of
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import evaluate as analyse_observations
+from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Machine
 from cmm_uq.base.units import MICROMETRE

@@ -10,7 +10,7 @@ import numpy as np
 import pikepdf
 import pytest
 
-from cmm_uq.app.commands.analysis import analyse
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
 from tests.app.cli.process import run
 from tests.artefacts.simulated import analysed

@@ -14,8 +14,8 @@ import pytest
 
 import cmm_uq
 from cmm_uq.app.commands.against import Against, against_simulation
+from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.reading import compared_with_frame
-from cmm_uq.app.commands.report import write_diagnosis
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model import MeasurementModel

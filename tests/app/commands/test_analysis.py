@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cmm_uq.app.commands.analysis import Result, analyse, outcome_of
+from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.result import Result
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT
 

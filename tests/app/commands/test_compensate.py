@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.analysis import analyse
 from cmm_uq.app.commands.jobs.compensate import write_compensated
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.base.errors import CmmUqError
 from tests.conftest import ROOT
 

@@ -15,13 +15,14 @@ import pytest
 
 from cmm_uq.app.api import calls as beginning
 from cmm_uq.app.commands.budget import write_budget
+from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.jobs.check import check_job, check_read
 from cmm_uq.app.commands.jobs.folder import BUDGET, PLAN, README, RECORDING, SCHEMA
 from cmm_uq.app.commands.jobs.new import job_of_export, known, new_job, titles, write_new
 from cmm_uq.app.commands.parts.new import PART
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.report import diagnosis_outcome, report_outcome
+from cmm_uq.app.commands.report import report_outcome
 from cmm_uq.artefacts import BUILT_IN, kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.origin import origin_warnings

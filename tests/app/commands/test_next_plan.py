@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
+from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.report import diagnosis_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
 from cmm_uq.certificate.outcome import Outcome
 from tests.conftest import ROOT

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.analysis import analyse_job
 from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.jobs.simulate import simulate
 from cmm_uq.app.commands.plans.planning import RECORDED, Plan, make_plan
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.truth import Truth

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.analysis import analyse
 from cmm_uq.app.commands.jobs.simulate import simulate, write_simulation
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.truth import NoiseFacts, Truth
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from benchmarks.coverage.stated_doubt import held, recorded
-from cmm_uq.app.commands.analysis import Result, analyse
+from cmm_uq.app.commands.report import analyse
 from cmm_uq.artefacts.ballbar.analysis import figures as bar_figures
 from cmm_uq.artefacts.gauge_lines.analysis import figures
+from cmm_uq.certificate.result import Result
 from cmm_uq.machine.model.certified_places import CALIBRATION
 from tests.artefacts.simulated import analysed
 from tests.conftest import ROOT

@@ -8,9 +8,10 @@ import pytest
 
 import cmm_uq
 from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import tail_probability
-from cmm_uq.app.commands.analysis import Result, analyse_job
 from cmm_uq.app.commands.diagnose import diagnose_read
+from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.job import Job
 
 EFFECTS = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")

@@ -9,7 +9,7 @@ import shutil
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.analysis import analyse, outcome_of
+from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
 from cmm_uq.artefacts.shift_axis.results import shift_results
 from cmm_uq.certificate.document import Document, Plot

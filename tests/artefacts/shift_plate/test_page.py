@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.analysis import outcome_of
+from cmm_uq.app.commands.report import outcome_of
 from cmm_uq.artefacts.shift_plate.analysis import PlaneShiftResult
 from cmm_uq.artefacts.shift_plate.page import sections, warnings
 from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate

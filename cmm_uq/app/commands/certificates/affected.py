@@ -19,10 +19,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
+from cmm_uq.app.commands.diagnose import DIAGNOSE, diagnosis_outcome
 from cmm_uq.app.commands.files import Stage, called, silent
 from cmm_uq.app.commands.laboratory.records import RESULTS, inputs_of
 from cmm_uq.app.commands.reading import in_language, job_of
-from cmm_uq.app.commands.report import DIAGNOSE, REPORT, diagnosis_outcome, report_outcome
+from cmm_uq.app.commands.report import REPORT, report_outcome
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH, code_of
 from cmm_uq.certificate.results.plain import as_json

@@ -258,7 +258,7 @@ def _checks(found: Verification) -> tuple[Checked, ...]:
 
 def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
     """What the machine's job gives when it is analysed here."""
-    from cmm_uq.app.commands import analysis
+    from cmm_uq.app.commands.report import evaluate_job, outcome_of
     from cmm_uq.certificate.results.plain import as_json
 
     named = str(job.facts.machine_state.job)
@@ -268,8 +268,8 @@ def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
                          fix="Give the machine's certificate, or read the job from its folder")  # fmt: skip
     stage("Analysing the machine's job", 0.02)
     read = job_of(attached) if attached else read_job(_machines_folder(job))
-    found = analysis.analyse_job(read, seed=seed)
-    outcome = analysis.outcome_of(found, seed)
+    found = evaluate_job(read, seed=seed)
+    outcome = outcome_of(found, seed)
     if outcome.draws is None:
         raise CmmUqError("states too little: its analysis draws no errors of the machine", where=f"{WHERE} job = {named!r}",
                          fix="Name a job whose errors are a list of effects")  # fmt: skip

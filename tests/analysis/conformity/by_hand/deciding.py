@@ -10,9 +10,9 @@ from cmm_uq.analysis.conformity.accuracy import figures
 from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.standards import statement
 from cmm_uq.analysis.conformity.statement import Statement
-from cmm_uq.app.commands.analysis import analyse_job
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import job_of
+from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.units import unit
 from cmm_uq.maths.uncertainty.quantity import Quantity
