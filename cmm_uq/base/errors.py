@@ -73,14 +73,7 @@ def printable(text: str) -> str:
 
 
 def shortened(text: str, most: int, *, end: float = 0.5) -> str:
-    """The text, or its two ends with an ellipsis between, at most ``most`` characters.
-
-    Parameters
-    ----------
-    text : to be shortened.
-    most : characters, 2 or more.
-    end : part of them that is kept of the text's end.
-    """
+    """The text, or its two ends with an ellipsis between, at most ``most`` characters."""
     if len(text) <= most:
         return text
     tail = int((most - 1) * end)
@@ -115,12 +108,7 @@ class Gathered:
             self.problems += [error, *error.also]
 
     def refuse(self) -> None:
-        """Raise the first error with the others in it; nothing where there is none.
-
-        Raises
-        ------
-        CmmUqError : something was gathered.
-        """
+        """Raise the first error with the others in it; nothing where there is none."""
         if self.problems:
             first, *others = self.problems
             first.also = tuple(others[: MOST_GATHERED - 1])

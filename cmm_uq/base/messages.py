@@ -68,8 +68,6 @@ DASH = Number("–")
 class Message(Text):
     """A sentence, or words: the English text, with its pattern and arguments.
 
-    Parameters
-    ----------
     pattern : with placeholders as for ``str.format``; ``{why:capital}`` begins with a capital letter, ``{what:small}`` with a
         small one.
     arguments : by name.
@@ -88,15 +86,12 @@ class Message(Text):
         return message
 
     def __reduce__(self) -> tuple[type[Message], tuple[str, dict[str, Argument]]]:
-        """For pickling."""
         return Message, (self.pattern, dict(self.arguments))
 
 
 class Plural(Message):
     """A message in two forms, for one and for many; a language with other forms chooses by the count.
 
-    Parameters
-    ----------
     number : of what is spoken of.
     one, many : the forms of English.
     """
@@ -115,7 +110,6 @@ class Plural(Message):
         return message
 
     def __reduce__(self) -> tuple[type[Plural], tuple[int, Message, Message]]:  # type: ignore[override]
-        """For pickling."""
         return Plural, (self.number, self.one, self.many)
 
 

@@ -20,17 +20,7 @@ _NOT_FINITE = "infs or NaNs"
 
 @contextmanager
 def refusing_overflow(where: str, fix: str) -> Iterator[None]:
-    """A computation whose overflow is an error of its input, told in one line without the warnings before it.
-
-    Parameters
-    ----------
-    where : file, key or column that it most likely comes from.
-    fix : what to do about it.
-
-    Raises
-    ------
-    CmmUqError : the computation left the range of numbers.
-    """
+    """A computation whose overflow is an error of its input, told in one line without the warnings before it."""
     with warnings.catch_warnings(record=True) as told:
         try:
             with naming_package():
@@ -46,12 +36,7 @@ def refusing_overflow(where: str, fix: str) -> Iterator[None]:
 
 
 def must_be_finite(figures: Iterable[float], where: str, fix: str) -> None:
-    """Refuse a result of which a figure is no finite number.
-
-    Raises
-    ------
-    CmmUqError : one is not finite.
-    """
+    """Refuse a result of which a figure is no finite number."""
     if not np.isfinite(np.fromiter(figures, dtype=np.float64)).all():
         raise _overflow(where, fix)
 

@@ -36,8 +36,6 @@ class BrokenPluginError(CmmUqError):
 class Plugin:
     """Something that another package offers.
 
-    Parameters
-    ----------
     package, version : of the package.
     entry : its entry point, of the name of what it offers.
     """
@@ -57,12 +55,7 @@ class Plugin:
         return f"the {WHAT[self.entry.group]} {self.name!r}"
 
     def loaded(self, of: type[Offered]) -> Offered:
-        """What it offers; the package is imported now.
-
-        Raises
-        ------
-        BrokenPluginError : it cannot be imported, or is nothing of this class.
-        """
+        """What it offers; the package is imported now."""
 
         def made() -> object:
             found = self.entry.load()
@@ -76,12 +69,7 @@ class Plugin:
         return found
 
     def attempt(self, what: Callable[[], Any]) -> Any:
-        """What the package's code returns; errors of its own are said to be its own.
-
-        Raises
-        ------
-        BrokenPluginError : the code fails. An error that is meant for the user, such as a missing column, is passed on.
-        """
+        """What the package's code returns; errors of its own are said to be its own."""
         try:
             return what()
         except CmmUqError:
@@ -98,13 +86,7 @@ Of = TypeVar("Of", bound=Plugin)
 
 
 def offered(group: str, of: type[Of]) -> tuple[Of, ...]:
-    """What the installed packages offer in a group, by name; nothing is imported.
-
-    Parameters
-    ----------
-    group : one of :data:`WHAT`.
-    of : what makes each of package, version and entry point.
-    """
+    """What the installed packages offer in a group, by name; nothing is imported."""
     found = sorted(_entries(group, tuple(sys.path)), key=lambda entry: (entry.name, entry.value))
     return tuple(of(*((e.dist.name, e.dist.version) if e.dist else (e.module, "")), e) for e in found)
 
@@ -120,12 +102,7 @@ def _installed(path: tuple[str, ...]) -> Any:
 
 
 def named(plugins: Iterable[Of], name: str) -> Of | None:
-    """The one of this name; ``None`` where there is none.
-
-    Raises
-    ------
-    CmmUqError : two packages offer it.
-    """
+    """The one of this name; ``None`` where there is none."""
     found = [plugin for plugin in plugins if plugin.name == name]
     if len(found) > 1:
         given = " and ".join(f"{plugin.package} {plugin.version}" for plugin in found)
@@ -145,12 +122,7 @@ def versions(names: Mapping[str, Iterable[str]]) -> dict[str, str]:
 
 @contextmanager
 def naming_package() -> Iterator[None]:
-    """A computation in which other packages take part: where the code of one fails, the error says so.
-
-    Raises
-    ------
-    BrokenPluginError : an error that came through the code of another package, which stays its cause.
-    """
+    """A computation in which other packages take part: where the code of one fails, the error says so."""
     try:
         yield
     except CmmUqError:

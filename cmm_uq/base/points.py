@@ -86,10 +86,7 @@ class Machine:
 def beyond_travel(readings: Floats, travel_mm: Floats) -> list[tuple[int, int]]:
     """(axis, row) of the reading that lies farthest beyond the travel of each axis, where one does.
 
-    Parameters
-    ----------
-    readings : (n, axes) of the scales, mm.
-    travel_mm : (axes, 2) lowest and highest; ``nan`` bounds nothing.
+    ``readings``: (n, axes) of the scales, mm; ``travel_mm``: (axes, 2) lowest and highest; ``nan`` bounds nothing.
     """
     if not len(readings):
         return []

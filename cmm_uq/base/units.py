@@ -101,12 +101,7 @@ UNITS: Mapping[str, Unit] = MappingProxyType({row[0]: Unit(*row) for row in (
 
 
 def unit(symbol: str) -> Unit:
-    """The unit of a symbol; a unit itself, such as one of another package, as it is.
-
-    Raises
-    ------
-    CmmUqError : the table has none.
-    """
+    """The unit of a symbol; a unit itself, such as one of another package, as it is."""
     if isinstance(symbol, Unit):
         return symbol
     if symbol not in UNITS:

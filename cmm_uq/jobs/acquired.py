@@ -101,8 +101,6 @@ class AcquisitionRecord(_Said):
 class Provenance:
     """Of a job's recording.
 
-    Parameters
-    ----------
     said : what stands in the file.
     changed : whether the recording was changed after it was taken.
     """
@@ -171,7 +169,6 @@ class Provenance:
 
     @property
     def data(self) -> dict[str, Any]:
-        """For results.json."""
         said = self.said
         return {
             "program": said.program, "simulated": said.simulated, "changed": self.changed, "sessions": len(said.sessions),
@@ -198,19 +195,7 @@ def provenance_name(recording: str) -> str:
 
 
 def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> Provenance:
-    """What stands in the file.
-
-    Parameters
-    ----------
-    content : its bytes.
-    recording : bytes of the recording.
-    origin : what job.toml says of it.
-    where : the file, for messages.
-
-    Raises
-    ------
-    CmmUqError : it says nothing of the kind, or that the recording was simulated, and job.toml that it was measured.
-    """
+    """What stands in the file."""
     fix = "Take it away, or have cmm-uq acquire write it anew"
     try:
         said = AcquisitionRecord.model_validate_json(content)

@@ -17,8 +17,6 @@ SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squar
 class Beginning:
     """What a new job of a kind begins with.
 
-    Parameters
-    ----------
     title : what is measured, in words.
     numbering : what ``measurement`` and ``point`` number, in a sentence.
     artefact : keys of ``[artefact]`` beside its kind.

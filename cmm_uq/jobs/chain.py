@@ -61,8 +61,6 @@ _NO_EVIDENCE = say("no arrangement covers this calibration, and no evidence of t
 class Link:
     """One certificate that results rest on.
 
-    Parameters
-    ----------
     what : was calibrated.
     table : of job.toml that states it.
     chain : the certificate; ``None`` where none is stated.
@@ -190,8 +188,6 @@ def right(chain: Traceability) -> Text:
 class Chain:
     """To what the results of a job are traceable.
 
-    Parameters
-    ----------
     links : the certificates that they rest on.
     said : the statement where it follows from no certificate, or stands before what does.
     claim : what is said.
@@ -224,12 +220,7 @@ class Chain:
 
 
 def chain_of(job: Job, read: Collection[str] = ()) -> Chain:
-    """To what the results of a job are traceable.
-
-    Parameters
-    ----------
-    read : columns that the effects of its model go by, beside the artefact's temperature.
-    """
+    """To what the results of a job are traceable."""
     facts = job.facts
     if job.origin != MEASURED:
         return Chain((), NOT_MEASURED, "not shown")

@@ -37,12 +37,7 @@ IN_THE_RECORDING = ("temperature_log",)
 
 
 def recording_name(job: Job) -> str:
-    """Name of the recording that a command makes from a job's: its own, or another where that one was imported.
-
-    Raises
-    ------
-    CmmUqError : an earlier recording was imported too, which the derived job could no longer read.
-    """
+    """Name of the recording that a command makes from a job's: its own, or another where that one was imported."""
     if not _was_imported(job):
         return job.facts.recording.file
     if job.facts.recording.earlier is not None:
@@ -66,15 +61,6 @@ def kept_inputs(job: Job) -> dict[str, bytes]:
 def derived_toml(job: Job, by: str, files: Mapping[str, bytes], *, without: tuple[str, ...] = ()) -> bytes:
     """job.toml for a recording that a command made from a job.
 
-    Parameters
-    ----------
-    job : that it was made from.
-    by : the command.
-    files : what the command wrote beside job.toml, by name.
-    without : keys of ``[machine]`` that no longer hold.
-
-    Notes
-    -----
     A simulated recording stays simulated whatever is made from it.
     """
     text = job.inputs["job.toml"].decode("utf-8-sig")
@@ -106,7 +92,7 @@ def _was_imported(job: Job) -> bool:
 
 def _changed(
     document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None, certified: Mapping[str, Any]
-) -> Any:  # fmt: skip
+) -> Any:
     table = document["job"]
     for key in (*OF_THE_CERTIFICATE, *changes):
         if key in table:
@@ -178,19 +164,7 @@ def is_compensated(job: Job) -> bool:
 
 
 def against(job: Job, content: bytes, name: str, path: Path | None = None) -> Job:
-    """A job that is compared with what a simulation predicts, whatever its ``[simulation]`` says.
-
-    Parameters
-    ----------
-    job : that was read, with its recording.
-    content : the bytes of the prediction, or of an error map.
-    name : of its file.
-    path : where that lies, if anywhere.
-
-    Raises
-    ------
-    CmmUqError : it is no prediction, or has the name of another input of the job.
-    """
+    """A job that is compared with what a simulation predicts, whatever its ``[simulation]`` says."""
     where, is_map = str(path or name), is_error_map(content, str(path or name))
     predicted = {"file": name, "temperature_c": NOMINAL_C}
     simulation = SimulationFacts.model_validate({"map": predicted} if is_map else {"file": name})

@@ -185,7 +185,7 @@ class JobFile(Table):
     @classmethod
     def _rules_have_their_uncertainty(
         cls, wishes: list[ConformityFacts], info: ValidationInfo
-    ) -> list[ConformityFacts]:  # fmt: skip
+    ) -> list[ConformityFacts]:
         artefact = info.data.get("artefact")
         for wish in wishes:
             if artefact is None or "test_uncertainty" not in info.data:

@@ -51,8 +51,6 @@ _FIX = "Export it as plain SVG with its texts as paths, or as PNG"
 class Logo:
     """A checked picture.
 
-    Parameters
-    ----------
     format : by its content.
     content : of the file.
     """
@@ -73,12 +71,7 @@ def logo_of(laboratory: Laboratory, inputs: Mapping[str, bytes]) -> Logo | None:
 
 
 def checked_logo(content: bytes, where: str) -> Logo:
-    """A picture, whatever its file is called.
-
-    Raises
-    ------
-    CmmUqError : it is neither PNG nor SVG, too large, damaged, or can do more than be looked at.
-    """
+    """A picture, whatever its file is called."""
     if len(content) > LOGO_BYTES.most:
         raise CmmUqError(f"is larger than {LOGO_BYTES.most} bytes, a logo's most", where=where, fix=_FIX)
     if content.startswith(_SIGNATURE):

@@ -56,8 +56,6 @@ PART = "part"
 class Nameable:
     """What a job may name.
 
-    Parameters
-    ----------
     tables, kinds : of the kinds of measurement, and their names.
     standards : of conformity.
     """
@@ -70,15 +68,7 @@ class Nameable:
 def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
     """Read and check a job.
 
-    Parameters
-    ----------
-    folder : the job folder, or its job.toml.
-    nameable : kinds and standards that it may name.
-    recorded : whether the recording must be there; otherwise a job still to be measured has no points.
-
-    Raises
-    ------
-    CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
+    ``recorded``: whether the recording must be there; otherwise a job still to be measured has no points.
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
@@ -86,17 +76,7 @@ def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
 
 
 def job_of(files: Mapping[str, bytes], nameable: Nameable, *, recorded: bool = True) -> Job:
-    """Read and check a job that lies in no folder yet.
-
-    Parameters
-    ----------
-    files : contents of job.toml and of all that it names, by name.
-    nameable, recorded : see :func:`read_job`.
-
-    Raises
-    ------
-    CmmUqError : a file is missing, or says something unknown or contradictory.
-    """
+    """Read and check a job that lies in no folder yet."""
     return _beside_replaced(_read(FilesInMemory(files), nameable, recorded=recorded), FilesInMemory(files))
 
 
@@ -259,12 +239,7 @@ def _refuse_what_needs_a_recording(facts: JobFile, path: Path) -> None:
 
 
 def read_machine(folder: Path, nameable: Nameable) -> Job:
-    """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is.
-
-    Raises
-    ------
-    CmmUqError : see :func:`read_job`.
-    """
+    """A job for its machine alone: job.toml, error maps and temperature log, whatever its recording is."""
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
     source = FilesInFolder(path)
@@ -290,7 +265,7 @@ def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Read |
 
     facts = checked(
         content, source.toml, lambda data: _model_for(data, nameable, source.toml), nameable.standards, beside=beside
-    )  # fmt: skip
+    )
     places = says[0].places if says else None
     if places is not None and isinstance(facts.artefact, ReferencedFacts):
         largest = max(float(values.max()) for values in places.u.values())
@@ -331,12 +306,7 @@ def _of_the_machine(facts: MachineFacts) -> tuple[list[str], list[str], list[str
 
 
 def _model_for(data: dict[str, Any], nameable: Nameable, path: Path) -> type[JobFile]:
-    """What a job.toml must say for the kind that it names.
-
-    Raises
-    ------
-    CmmUqError : it is the job of a part.
-    """
+    """What a job.toml must say for the kind that it names."""
     if PART in data and "artefact" not in data:
         raise CmmUqError("is the job of a part, not of a machine", where=f"{path}: [{PART}]",
                          fix="cmm-uq part JOB reports it; cmm-uq check JOB says what it lacks")  # fmt: skip

@@ -47,13 +47,7 @@ class _Described(GenerateJsonSchema):
 
 
 def schema_of(table: type[BaseModel], title: str = "") -> Schema:
-    """Schema of a table, with everything in it written out.
-
-    Parameters
-    ----------
-    table : that checks a file, or a part of it.
-    title : of the file.
-    """
+    """Schema of a table, with everything in it written out."""
     whole = table.model_json_schema(schema_generator=_Described, mode="validation")
     inside = whole.pop("$defs", {})
     found: Schema = _written_out(whole, inside)
@@ -63,15 +57,8 @@ def schema_of(table: type[BaseModel], title: str = "") -> Schema:
 
 def job_schema(
     tables: Mapping[str, type[ArtefactFacts]], effects: Mapping[str, str], standards: Iterable[str]
-) -> Schema:  # fmt: skip
-    """Schema of job.toml for every kind of measurement.
-
-    Parameters
-    ----------
-    tables : of ``[artefact]``, by the name of the kind.
-    effects : what each effect is, by its name.
-    standards : names.
-    """
+) -> Schema:
+    """Schema of job.toml for every kind of measurement."""
     found = schema_of(JobFile, "job.toml of cmm-uq")
     keys = found["properties"]
     each = {kind: schema_of(table) for kind, table in tables.items()}
@@ -88,14 +75,7 @@ def job_schema(
 
 
 def chosen_by(key: str, each: Mapping[str, Schema], word: str) -> Schema:
-    """Schema of a table whose other keys depend on one: those of all its values, each with the values that have it.
-
-    Parameters
-    ----------
-    key : on which the others depend.
-    each : schema of the table by the key's value.
-    word : for these values, as ``Kinds``.
-    """
+    """Schema of a table whose other keys depend on one: those of all its values, each with the values that have it."""
     keys: dict[str, Schema] = {}
     for value, found in each.items():
         for name, item in found["properties"].items():
@@ -201,14 +181,9 @@ def commented(
 ) -> str:  # fmt: skip
     """Tables of a file, in the order of its schema.
 
-    Parameters
-    ----------
-    schema : of the file.
-    given : what it says, by table and key; a list of tables as a list.
-    leave_out : tables, and dotted keys, that are of no use here.
-    asked_by : value by which the keys of a table are chosen (see :func:`cmm_uq.jobs.schema.chosen_by`).
-    comment : whether what is not given stands there as a comment.
-    examples : dotted keys whose values are an example's, and are said to be.
+    ``asked_by``: value by which the keys of a table are chosen (see :func:`cmm_uq.jobs.schema.chosen_by`); ``comment``:
+    whether what is not given stands there as a comment; ``examples``: dotted keys whose values are an example's, and are
+    said to be.
     """
     out, parts = set(leave_out), []
     for name, table in schema["properties"].items():
@@ -227,12 +202,7 @@ def commented(
 
 
 def written(value: Any) -> str:
-    """A value as TOML has it.
-
-    Raises
-    ------
-    TypeError : TOML has no such value.
-    """
+    """A value as TOML has it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -40,16 +40,7 @@ _FORBIDDEN = frozenset('<>:"|?*')
 def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Path:
     """Path of a file that a job names.
 
-    Parameters
-    ----------
-    folder : of the job.
-    name : of the file, relative to the folder, parts separated by /.
-    where : file and key, for messages.
-    written : whether a command wrote it, with the recording that it derived.
-
-    Raises
-    ------
-    CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
+    ``written``: whether a command wrote it, with the recording that it derived.
     """
     check_name(name, where, written=written)
     try:
@@ -66,23 +57,13 @@ def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Pat
 
 
 def check_name(name: str, where: str, *, written: bool = False) -> None:
-    """Refuse a name that no file of a job can have; see :func:`inside`.
-
-    Raises
-    ------
-    CmmUqError : the name is none that every system can read, is reserved, or leads out of the folder.
-    """
+    """Refuse a name that no file of a job can have; see :func:`inside`."""
     if problem := _name_problem(name, written):
         raise CmmUqError(problem[0], where=where, fix=problem[1])
 
 
 def check_distinct(names: Iterable[str], where: str) -> None:
-    """Refuse two names that some systems take for one.
-
-    Raises
-    ------
-    CmmUqError : names differ only by upper and lower case, or by how an accent is written.
-    """
+    """Refuse two names that some systems take for one."""
     seen: dict[str, str] = {}
     for name in names:
         other = seen.setdefault(unicodedata.normalize("NFC", name).casefold(), name)
@@ -130,29 +111,15 @@ class JobFiles(Protocol):
     @property
     def toml(self) -> Path:
         """Of job.toml; for messages where it lies in no folder."""
-        ...
 
     def has(self, name: str, *, written: bool = False) -> bool:
         """Whether the file is there; see :meth:`content`."""
-        ...
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
-        """Bytes of job.toml.
-
-        Raises
-        ------
-        CmmUqError : it is missing or too large.
-        """
-        ...
+        """Bytes of job.toml."""
 
     def content(self, name: str, limit: Limit, fix: str, *, written: bool = False) -> bytes:
-        """Bytes of a file that it names.
-
-        Raises
-        ------
-        CmmUqError : its name cannot be that of a job's file, it is missing or too large.
-        """
-        ...
+        """Bytes of a file that it names."""
 
 
 @dataclass(frozen=True)
@@ -162,15 +129,12 @@ class FilesInFolder:
     toml: Path
 
     def has(self, name: str, *, written: bool = False) -> bool:
-        """See :meth:`JobFiles.has`."""
         return os.path.lexists(inside(self.toml.parent, name, str(self.toml), written=written))
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
-        """See :meth:`JobFiles.job_file`."""
         return content_of(self.toml, limit, fix)
 
     def content(self, name: str, limit: Limit, fix: str, *, written: bool = False) -> bytes:
-        """See :meth:`JobFiles.content`."""
         return content_of(inside(self.toml.parent, name, str(self.toml), written=written), limit, fix)
 
 
@@ -182,19 +146,15 @@ class FilesInMemory:
 
     @property
     def toml(self) -> Path:
-        """See :attr:`JobFiles.toml`."""
         return Path("job.toml")
 
     def has(self, name: str, *, written: bool = False) -> bool:
-        """See :meth:`JobFiles.has`."""
         return name in self.files
 
     def job_file(self, limit: Limit, fix: str) -> bytes:
-        """See :meth:`JobFiles.job_file`."""
         return self._content(self.toml.name, limit, fix)
 
     def content(self, name: str, limit: Limit, fix: str, *, written: bool = False) -> bytes:
-        """See :meth:`JobFiles.content`."""
         check_name(name, str(self.toml), written=written)
         return self._content(name, limit, fix)
 

@@ -62,7 +62,6 @@ class NoiseFacts(Table):
 
     @property
     def coordinates_um(self) -> tuple[float, float, float]:
-        """Of each axis."""
         given = self.coordinate_um
         return (given.x, given.y, given.z) if isinstance(given, ByAxis) else (given, given, given)
 

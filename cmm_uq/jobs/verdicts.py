@@ -48,8 +48,6 @@ def gravest(outcomes: Iterable[str]) -> str:
 class Verdict:
     """One statement of conformity, by a standard or by a tolerance that the job sets.
 
-    Parameters
-    ----------
     name : of what is decided: ``E0``; ``scale_x.ppm``; the name of a characteristic of a part.
     outcome : one of :data:`GRAVEST`.
     value, U, limit : in ``unit``; ``None`` where there is none.
@@ -71,7 +69,6 @@ class Verdict:
 
     @property
     def standing(self) -> Literal["good", "open", "bad"]:
-        """See :func:`standing_of`."""
         return standing_of(self.outcome)
 
     @property
@@ -80,7 +77,6 @@ class Verdict:
         return f"{self.by} {self.name}".strip()
 
     def data(self) -> dict[str, Any]:
-        """For results.json."""
         return {
             "name": self.name, "by": self.by or None, "title": str.__str__(self.title) or None, "outcome": self.outcome,
             "value": self.value, "U": self.U, "limit": self.limit, "unit": str.__str__(self.unit),
@@ -113,12 +109,7 @@ class Verdicts(tuple[Verdict, ...]):
 
     @classmethod
     def of_results(cls, results: Mapping[str, Any]) -> Verdicts:
-        """Of a results.json; of one without the key from what its standards and tolerances decided.
-
-        Parameters
-        ----------
-        results : its contents, or the content of an entry of the records.
-        """
+        """Of a results.json; of one without the key from what its standards and tolerances decided."""
         there = results.get("verdicts")
         if isinstance(there, Mapping) and "statements" in there:
             return cls(_read(one) for one in there["statements"])

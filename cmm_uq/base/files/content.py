@@ -20,18 +20,7 @@ _OPEN = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) 
 
 
 def content_of(path: Path, limit: Limit, fix: str) -> bytes:
-    """Bytes of a file.
-
-    Parameters
-    ----------
-    path : of the file.
-    limit : on its size, bytes.
-    fix : what to do when it cannot be read.
-
-    Raises
-    ------
-    CmmUqError : it is missing, cannot be read, is no regular file, or is larger than the limit.
-    """
+    """Bytes of a file."""
     where = str(path)
     try:
         descriptor = os.open(path, _OPEN)
@@ -58,12 +47,7 @@ def content_of(path: Path, limit: Limit, fix: str) -> bytes:
 
 
 def check_file(path: Path, fix: str) -> None:
-    """Refuse what is no regular file, for a file that is too large to be read whole.
-
-    Raises
-    ------
-    CmmUqError : it is missing, or is a folder, a pipe or a device.
-    """
+    """Refuse what is no regular file, for a file that is too large to be read whole."""
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError) as error:
@@ -73,12 +57,7 @@ def check_file(path: Path, fix: str) -> None:
 
 
 def text_of(content: bytes, where: str, fix: str = "Save it as UTF-8") -> str:
-    """Text of a file's bytes, UTF-8 with or without a byte-order mark.
-
-    Raises
-    ------
-    CmmUqError : they are no such text; with the line.
-    """
+    """Text of a file's bytes, UTF-8 with or without a byte-order mark."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

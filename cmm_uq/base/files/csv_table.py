@@ -21,8 +21,6 @@ FORMULA = tuple("=+-@＝＋－＠")
 class Cells:
     """The rows of a CSV file, the first of which names the columns.
 
-    Parameters
-    ----------
     header : first row that is neither empty nor a comment; empty where there is none.
     header_line : its line in the file.
     rows : the others.
@@ -39,18 +37,6 @@ def cells_of(content: bytes, where: str, fix: str, *, most_rows: Limit = ROWS, d
     """Cells of a CSV file, without the blanks around them; rows may still differ in length.
 
     Empty rows, and those whose first cell begins with #, are passed over.
-
-    Parameters
-    ----------
-    content : of the file, UTF-8.
-    where : its name, for messages.
-    fix : how to save it, for messages.
-    most_rows : limit on its rows.
-    delimiter : between cells.
-
-    Raises
-    ------
-    CmmUqError : it is no text, or goes beyond the limits of a table.
     """
     reader = csv.reader(lines_within(text_of(content, where, fix), where), delimiter=delimiter, skipinitialspace=True)
     found: list[list[str]] = []
@@ -106,12 +92,7 @@ def _check_row(cells: list[str], count: int, rows: int, most_rows: Limit, file: 
 
 
 def lines_within(text: str, where: str) -> Iterator[str]:
-    """Lines of a table, none longer and no more of them than are read.
-
-    Raises
-    ------
-    CmmUqError : one is, or there are.
-    """
+    """Lines of a table, none longer and no more of them than are read."""
     for number, line in enumerate(io.StringIO(text, newline=""), 1):
         if len(line) > LINE.most or number > LINES.most:
             raise CmmUqError(
@@ -126,8 +107,6 @@ def lines_within(text: str, where: str) -> Iterator[str]:
 class CsvTable:
     """A header and its rows.
 
-    Parameters
-    ----------
     where : the file's name, for messages.
     header : column names, without the blanks around them.
     rows : cells as text, each row as long as the header.
@@ -140,12 +119,7 @@ class CsvTable:
     lines: tuple[int, ...]
 
     def number(self, row: int, column: str) -> float:
-        """A finite number.
-
-        Raises
-        ------
-        CmmUqError : the cell is something else.
-        """
+        """A finite number."""
         text = self.rows[row][self.header.index(column)]
         if problem := number_problem(text):
             plain = problem[0].endswith(("a number", "a finite number", "no value"))
@@ -161,13 +135,7 @@ class CsvTable:
 
 
 def csv_table(content: bytes, where: str, required: Iterable[str], *, most_rows: Limit = ROWS) -> CsvTable:
-    """Table of a CSV file.
-
-    Raises
-    ------
-    CmmUqError : no text, no rows, a required column missing, a column named twice, a row of another length, or beyond the
-        limits of a table.
-    """
+    """Table of a CSV file."""
     cells = cells_of(content, where, "Save it as CSV in UTF-8", most_rows=most_rows)
     header = tuple(cells.header)
     if not cells.rows:

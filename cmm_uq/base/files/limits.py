@@ -12,8 +12,6 @@ from dataclasses import dataclass
 class Limit:
     """A limit.
 
-    Parameters
-    ----------
     most : what is still read.
     unit : of it.
     what : is limited.

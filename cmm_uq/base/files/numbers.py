@@ -31,13 +31,7 @@ _SHOWN = 40
 
 
 def number_problem(cell: str, fix: str = GIVE) -> tuple[str, str] | None:
-    """Why a cell of a table is no number that can be used and what to do about it, or ``None``.
-
-    Parameters
-    ----------
-    cell : as text, without blanks around it.
-    fix : what to do where there is no number.
-    """
+    """Why a cell of a table is no number that can be used and what to do about it, or ``None``."""
     if not cell:
         return "no value", fix
     shown = repr(cell[:_SHOWN])
@@ -67,18 +61,7 @@ def _size_problem(cell: str, value: float, shown: str) -> tuple[str, str] | None
 
 
 def numbers(cells: Sequence[str], where: Callable[[int], str], fix: str = GIVE) -> Floats:
-    """Values (n,) of the cells of a column.
-
-    Parameters
-    ----------
-    cells : as text, without blanks around them.
-    where : place of a cell by its index, for messages.
-    fix : what to do where there is no number.
-
-    Raises
-    ------
-    CmmUqError : a cell is no number, or one beyond :data:`SMALLEST` and :data:`LARGEST`; every such cell.
-    """
+    """Values (n,) of the cells of a column."""
     try:
         values = np.array(list(map(float, cells)), dtype=np.float64)
     except ValueError:
@@ -115,15 +98,8 @@ _FREEDOM = ("dof", "nu", "nu_eff", "v_eff", "degrees_of_freedom", "freiheitsgrad
 def conversion(given: str, known: Collection[str]) -> str | None:
     """What to give instead of a key in another unit; ``None`` where it is none of a known one.
 
-    Parameters
-    ----------
-    given : key or column as it was written.
-    known : those that are read.
-
-    Notes
-    -----
-    An uncertainty u with ν degrees of freedom has a t distribution, whose standard deviation is u·√(ν/(ν − 2)) (JCGM 101:2008,
-    6.4.9).
+    An uncertainty u with ν degrees of freedom has a t distribution, whose standard deviation is u·√(ν/(ν − 2)) (JCGM
+    101:2008, 6.4.9).
     """
     if given.startswith("U_") and (standard := f"u_{given[2:]}") in known:
         return f"Give {standard} = U/k, the standard uncertainty: U is k times as large"

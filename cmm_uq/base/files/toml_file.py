@@ -39,20 +39,7 @@ _MARKS = frozenset("\u200c\u200d\u200e\u200f\u061c\u00ad\ufeff")
 
 
 def toml_of(text: str, where: str, *, most_word: int = WORD.most, most_listed: int = LISTED.most) -> dict[str, Any]:
-    """Contents of a TOML file.
-
-    Parameters
-    ----------
-    text : of the file.
-    where : its name, for messages.
-    most_word : characters without a blank between them.
-    most_listed : entries of a list.
-
-    Raises
-    ------
-    tomllib.TOMLDecodeError : it is no TOML.
-    CmmUqError : it goes beyond a limit, or a text has control characters in it.
-    """
+    """Contents of a TOML file."""
     _check_text(text, where)
     try:
         data = tomllib.loads(text)
@@ -142,21 +129,7 @@ def checked(
     content: bytes, path: Path, model: type[Facts] | Callable[[dict[str, Any]], type[Facts]], context: object = None,
     *, most_word: int = WORD.most, beside: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> Facts:  # fmt: skip
-    """The contents of a TOML file as a checked object.
-
-    Parameters
-    ----------
-    content : the file's bytes, UTF-8.
-    path : of the file, for messages.
-    model : what it must say, or what that is for a file that says this.
-    context : what its checks go by beside the file.
-    most_word : characters without a blank between them.
-    beside : the same with what other files say beside.
-
-    Raises
-    ------
-    CmmUqError : it is no TOML, says something unknown, missing or contradictory, or goes beyond a limit; with line and key.
-    """
+    """The contents of a TOML file as a checked object."""
     text = text_of(content, str(path))
     try:
         data = toml_of(text, str(path), most_word=most_word)
@@ -176,14 +149,7 @@ def checked(
 def as_toml(data: Mapping[str, Any], where: str) -> bytes:
     """What a TOML file says, as its bytes.
 
-    Parameters
-    ----------
-    data : tables, lists, texts, numbers, dates, truth values; ``None`` leaves its key out.
-    where : for messages.
-
-    Raises
-    ------
-    CmmUqError : something in it is none of these.
+    ``data``: tables, lists, texts, numbers, dates, truth values; ``None`` leaves its key out.
     """
     try:
         return tomlkit.dumps(_plain(data)).encode()

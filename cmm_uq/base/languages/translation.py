@@ -42,8 +42,6 @@ ENGLISH: Code = "en"
 class Language:
     """How a language writes what is no sentence.
 
-    Parameters
-    ----------
     code : by BCP 47.
     decimal : its decimal sign.
     day : pattern of a date.
@@ -95,8 +93,6 @@ def code_of(tag: str) -> Code:
 class Catalogue:
     """Patterns in one language, by the English ones.
 
-    Parameters
-    ----------
     single : of messages.
     plural : of plurals, by both forms of English: the forms of the language, that for one first.
     """
@@ -165,8 +161,6 @@ _ESCAPED, _MEANT = re.compile(r"\\(.)"), {"n": "\n", "t": "\t"}
 class Translation(Text):
     """A text as it stands in a language, and what was said.
 
-    Parameters
-    ----------
     text : in the language.
     source : what it was in English.
     """
@@ -176,13 +170,11 @@ class Translation(Text):
     source: Text
 
     def __new__(cls, text: str, source: Text) -> Self:
-        """Both."""
         said = super().__new__(cls, text)
         said.source = source
         return said
 
     def __reduce__(self) -> tuple[type[Translation], tuple[str, Text]]:
-        """For pickling."""
         return Translation, (str.__str__(self), self.source)
 
 
@@ -250,7 +242,6 @@ class _Localised(Filled):
         self.language = language
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """One argument."""
         if not isinstance(value, str):
             return self.language.number(format(value, format_spec))
         if format_spec in ("capital", "small") and not self.language.cases:

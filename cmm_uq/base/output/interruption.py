@@ -30,7 +30,6 @@ class Unplaced(Protocol):
 
     def discard(self) -> None:
         """Remove it."""
-        ...
 
 
 _placing = threading.Lock()
@@ -72,13 +71,7 @@ def changing() -> Iterator[None]:
 
 @contextlib.contextmanager
 def placing(folder: Path, staged: Unplaced | None = None) -> Iterator[None]:
-    """While files are put in place, a signal waits; afterwards it says that they were written.
-
-    Parameters
-    ----------
-    folder : where they are put.
-    staged : what they were before, which nobody removes meanwhile.
-    """
+    """While files are put in place, a signal waits; afterwards it says that they were written."""
     give_way()  # of a thread that is not the one that a signal stops
     _going_in.append(folder)  # before the lock: a signal in between must not stop whoever holds it
     try:

@@ -24,8 +24,6 @@ LARGEST = 4 * 2**20
 class Owner:
     """Who writes a set; only the same owner may replace it.
 
-    Parameters
-    ----------
     command : of ``cmm-uq``.
     job : id of the job that it was asked for.
     origin : of that job's recording.

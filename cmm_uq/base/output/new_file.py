@@ -16,17 +16,7 @@ from cmm_uq.base.output.placing import free_name
 
 @contextlib.contextmanager
 def writing_to(path: Path, fix: str) -> Iterator[None]:
-    """While something is written there.
-
-    Parameters
-    ----------
-    path : of a file or folder.
-    fix : what is to be done about a refusal.
-
-    Raises
-    ------
-    OutputError : the disk is full, or the place cannot be written to.
-    """
+    """While something is written there."""
     try:
         yield
     except (OSError, ValueError) as error:
@@ -39,28 +29,13 @@ _MENDED = "Free the disk, mend the permissions, or name another file"
 
 
 def write_new(out: Path, content: bytes) -> None:
-    """Write a file that is not there yet.
-
-    Parameters
-    ----------
-    out : its path.
-    content : its bytes.
-
-    Raises
-    ------
-    OutputError : something is there, or it cannot be written.
-    """
+    """Write a file that is not there yet."""
     with new_file(out) as path:
         path.write_bytes(content)
 
 
 def refuse_taken(out: Path) -> None:
-    """Make sure, before there is anything to write, that a new file could be there.
-
-    Raises
-    ------
-    OutputError : something is there, or its folder is not.
-    """
+    """Make sure, before there is anything to write, that a new file could be there."""
     if os.path.lexists(out):
         raise OutputError("is there already", where=str(out), fix=_TAKEN)
     if not out.parent.is_dir():
@@ -69,17 +44,7 @@ def refuse_taken(out: Path) -> None:
 
 @contextlib.contextmanager
 def new_file(out: Path, *, force: bool = False) -> Iterator[Path]:
-    """Where a file is to be written that then takes its place; where that fails, nothing is left, after a signal neither.
-
-    Parameters
-    ----------
-    out : its path.
-    force : keep what is there as ``NAME.previous`` instead of refusing.
-
-    Raises
-    ------
-    OutputError : something is there, or it cannot be written.
-    """
+    """Where a file is to be written that then takes its place; where that fails, nothing is left, after a signal neither."""
     unfinished = _Unfinished()
     with interruption.staged(unfinished):
         try:

@@ -20,8 +20,6 @@ PREVIOUS = ".previous"
 class Journal:
     """What is to be done.
 
-    Parameters
-    ----------
     token : of the stage.
     new : SHA-256 of each new file, by name.
     replaced : SHA-256 of the files of the former set that new ones replace, by name.
@@ -36,7 +34,6 @@ class Journal:
     stale: Mapping[str, str]
 
     def as_json(self) -> bytes:
-        """The file's bytes."""
         return json.dumps(asdict(self)).encode()
 
     @classmethod
@@ -52,12 +49,7 @@ class Journal:
 
 
 def place(folder: Path, placing: Path, journal: Journal) -> None:
-    """Put the set in place, the manifest last. May be called again after it was interrupted anywhere.
-
-    Raises
-    ------
-    OSError : the system refuses; :func:`rolled_back` undoes what was done.
-    """
+    """Put the set in place, the manifest last. May be called again after it was interrupted anywhere."""
     for name, kept in journal.kept.items():
         if os.path.lexists(folder / name) and not os.path.lexists(folder / kept):
             (folder / name).rename(folder / kept)
@@ -118,18 +110,7 @@ def journal_for(
 ) -> Journal:
     """What has to happen to the files of a folder for a new set to take their place.
 
-    Parameters
-    ----------
-    folder : of the set.
-    owner : of the new set.
-    files : SHA-256 of each new file, by name; empty texts where it is not known yet.
-    inputs : that nothing may happen to.
-    force : whether what is not the owner's may be renamed.
-    token : of the stage.
-
-    Raises
-    ------
-    CmmUqError : something in the way may not be replaced.
+    ``force``: whether what is not the owner's may be renamed.
     """
     old = read_manifest(folder)
     stranger = old is not None and old.owner != owner

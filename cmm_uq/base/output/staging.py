@@ -32,14 +32,7 @@ from cmm_uq.base.output.placing import JOURNAL, NEW, Journal, journal_for, place
 def locked(path: Path, *, create: bool) -> int | None:
     """Take the lock of a file without waiting.
 
-    Parameters
-    ----------
-    path : of the lock file.
-    create : make it, and fail where it is there already; otherwise it must be there.
-
-    Returns
-    -------
-    descriptor that holds the lock until it is closed; ``None`` where another process holds it, or the file is gone.
+    Returns descriptor that holds the lock until it is closed; ``None`` where another process holds it, or the file is gone.
     """
     try:
         descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if create else 0), 0o600)
@@ -96,15 +89,12 @@ class Ledger(Protocol):
 
     def intend(self, token: str, folder: Path, manifest: str) -> None:
         """Note that a set is to be put in place: the token of its stage, and the SHA-256 of its manifest."""
-        ...
 
     def commit(self, token: str) -> None:
         """Have the set, all of which is in place. What is raised takes its files back, unless it is :class:`InDoubtError`."""
-        ...
 
     def forget(self, token: str) -> None:
         """The set was not put in place."""
-        ...
 
 
 @dataclass(eq=False)
@@ -130,12 +120,7 @@ class Stage:
         return self.folder / f"{STAGE}{self.token}{LOCK}"
 
     def room(self, name: str) -> Path:
-        """Where a file that is too large for memory is written, to be named to :meth:`write`.
-
-        Raises
-        ------
-        CmmUqError : it cannot be the name of an output.
-        """
+        """Where a file that is too large for memory is written, to be named to :meth:`write`."""
         self._check(name)
         return self.stage / NEW / name
 
@@ -245,21 +230,7 @@ class Stage:
 def staged(
     folder: Path, owner: Owner, *, inputs: Iterable[Path] = (), force: bool = False, expected: Iterable[str] = ()
 ) -> Iterator[Stage]:
-    """Room for a set of files beside its place, gone afterwards; fails at once where it could not be put in place.
-
-    Parameters
-    ----------
-    folder : where the set belongs.
-    owner : who writes it.
-    inputs : files that it is made from; none of them is ever replaced or moved.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    expected : names that will be written, so that a refusal comes before the work.
-
-    Raises
-    ------
-    CmmUqError : something that is not this owner's stands in the way.
-    OutputError : the place cannot be written to.
-    """
+    """Room for a set of files beside its place, gone afterwards; fails at once where it could not be put in place."""
     given = tuple(inputs)
     with writing_to(folder, _MENDED):
         made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
@@ -283,12 +254,7 @@ def staged(
 
 
 def finish_interrupted(folder: Path) -> None:
-    """Complete or roll back what a process that is no more left in a folder; a stranger's files there are left alone.
-
-    Raises
-    ------
-    OutputError : it was committed and cannot be put in place.
-    """
+    """Complete or roll back what a process that is no more left in a folder; a stranger's files there are left alone."""
     try:
         names = [path.name for path in folder.iterdir() if path.name.startswith((STAGE, PLACING))]
     except (OSError, ValueError):

@@ -266,8 +266,6 @@ class Comment(Part):
 class Certificate(Part):
     """A certificate.
 
-    Parameters
-    ----------
     version : of the schema.
     document : the human-readable copy.
     signatures : XML signatures (XAdES), as they stand: what they are worth is the business of ``cmm_uq.certificate.sign``.

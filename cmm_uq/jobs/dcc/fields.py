@@ -31,8 +31,6 @@ from cmm_uq.base.files.limits import NUMERAL
 class Simple:
     """A simple type.
 
-    Parameters
-    ----------
     what : it is, after "is not": "a date".
     read : value of a text; raises ``ValueError`` where it is none.
     write : text of a value; what ``read`` refuses is not written.
@@ -142,8 +140,6 @@ class _Missing:
 class Element:
     """A part of a certificate: a frozen record, equal to another of its class with the same fields.
 
-    Parameters
-    ----------
     SPACE : prefix of the namespace of its elements.
     UNORDERED : whether these may stand in any order.
     """
@@ -233,8 +229,6 @@ Place = Attribute | Child | Many | Choice | Content | ForeignElements
 class Field:
     """A field of a class.
 
-    Parameters
-    ----------
     name : of it.
     place : in XML.
     tags : of its elements, with prefix, and the class of each; none of a simple one.

@@ -45,8 +45,6 @@ from cmm_uq.jobs.dcc.quantities import RectangularRegion as Box
 class ValueUncertainty:
     """Uncertainty of one value.
 
-    Parameters
-    ----------
     expanded, factor, probability : U, k and p, where they are given.
     standard : u, where it is given by itself.
     low, high : ends of the interval, where one is given.
@@ -74,8 +72,6 @@ NONE = ValueUncertainty()
 class QuantityFigures:
     """A quantity.
 
-    Parameters
-    ----------
     place : names of the measurement, the result and the lists that it stands in.
     name : of it.
     ref_types : what it is by the vocabularies of good practice: ``basic_measuredValue``.

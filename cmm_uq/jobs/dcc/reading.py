@@ -94,17 +94,7 @@ _IGNORED = ("xsi:schemaLocation", "xsi:noNamespaceSchemaLocation", "xsi:type")
 
 
 def read(data: bytes, where: str) -> Certificate:
-    """The certificate of a file.
-
-    Parameters
-    ----------
-    data : of the file.
-    where : its name, for messages.
-
-    Raises
-    ------
-    CmmUqError : it is no XML, no DCC, or breaks the schema; ``also`` says what else.
-    """
+    """The certificate of a file."""
     root = _root(data, where)
     reader = _Reader(where, strict=root.attributes.get("schemaVersion") == VERSION)
     found = reader.read(root, Certificate)
@@ -114,12 +104,7 @@ def read(data: bytes, where: str) -> Certificate:
 
 
 def unread(data: bytes, where: str) -> tuple[str, ...]:
-    """XPaths of what a certificate of another version of the schema has, and is left out by :func:`read`.
-
-    Raises
-    ------
-    CmmUqError : as of :func:`read`.
-    """
+    """XPaths of what a certificate of another version of the schema has, and is left out by :func:`read`."""
     reader = _Reader(where, strict=False)
     reader.read(_root(data, where), Certificate)
     reader.gathered.refuse()

@@ -21,18 +21,7 @@ _IMPORT = re.compile(r'namespace="([^"]+)"\s+schemaLocation="([^"]+)"')
 
 
 def checked_by_schema(data: bytes, folder: Path, where: str) -> None:
-    """Refuse a certificate that the schema of its version refuses.
-
-    Parameters
-    ----------
-    data : of the file.
-    folder : with the schemas.
-    where : name of the file, for messages.
-
-    Raises
-    ------
-    CmmUqError : it breaks the schema, the folder has none of its version, or xmlschema is not installed.
-    """
+    """Refuse a certificate that the schema of its version refuses."""
     version = parsed(data, where).attributes.get("schemaVersion", "")
     schema = _schema(folder, version, where)
     import defusedxml.ElementTree

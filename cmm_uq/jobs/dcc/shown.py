@@ -34,8 +34,6 @@ class Grid:
 class CertificateView:
     """A certificate for a person.
 
-    Parameters
-    ----------
     rows : particulars.
     parts : title, rows and tables of each measurement.
     """

@@ -29,8 +29,6 @@ _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 class Node:
     """An element.
 
-    Parameters
-    ----------
     tag : its name, ``prefix:name``.
     attributes : by name.
     line : of its start; 0 where it was not read.
@@ -67,12 +65,7 @@ class Node:
 
 
 def parsed(data: bytes, where: str) -> Node:
-    """The root of a file.
-
-    Raises
-    ------
-    CmmUqError : it is no XML, has a document type, or passes a limit.
-    """
+    """The root of a file."""
     if len(data) > DCC_BYTES.most:
         raise CmmUqError(f"is larger than {DCC_BYTES.most} {DCC_BYTES.unit}", where=where, fix="Is it the right file?")
     grown = _Growing(where)
@@ -140,12 +133,7 @@ def _named(name: str) -> str:
 
 
 def serialised(root: Node) -> bytes:
-    """A file of a tree: UTF-8, two spaces a level, the same bytes for the same tree.
-
-    Raises
-    ------
-    CmmUqError : a text holds a character that no XML can.
-    """
+    """A file of a tree: UTF-8, two spaces a level, the same bytes for the same tree."""
     declared = {f"xmlns:{prefix}": uri for prefix, uri in NAMESPACES.items() if prefix != "ds"}
     parts = ['<?xml version="1.0" encoding="UTF-8"?>\n']
     _write(root, declared, "", parts)

@@ -31,7 +31,6 @@ class Calypso(Format):
         return _first_line(head).startswith("planid\tpartnb")
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         lines = report_lines(text, where)
         header = [word.strip() for word in lines[0].split("\t")]

@@ -44,21 +44,7 @@ def lengths_unit(
     sheet: Sheet, keys: ImportKeys, named: Mapping[str, WrittenUnit], written: Written, where: str,
     reach_mm: float | None = None,
 ) -> tuple[WrittenUnit, list[Fact]]:  # fmt: skip
-    """The unit of the coordinates, and of every length whose unit is not named.
-
-    Parameters
-    ----------
-    sheet : with the unit that its format or its text names.
-    keys : what the job says.
-    named : units in headings of coordinates.
-    written : coordinates as written.
-    where : the file, for messages.
-    reach_mm : diagonal of the machine's travel, where it is known.
-
-    Raises
-    ------
-    CmmUqError : two of these contradict each other, or nothing says the unit and millimetres and inches both fit.
-    """
+    """The unit of the coordinates, and of every length whose unit is not named."""
     found = {unit.name: heading for heading, unit in reversed(list(named.items()))}
     if len(found) > 1:
         (one, first), (other, second) = list(found.items())[:2]
@@ -102,8 +88,6 @@ _SHOWN = 15
 class Columns:
     """Columns of a recording.
 
-    Parameters
-    ----------
     values : by name, each (n,).
     lines : (n,) of each point in the file.
     sources : heading and unit of each column, by name.
@@ -120,8 +104,6 @@ class Columns:
 class _Rows:
     """Rows of figures.
 
-    Parameters
-    ----------
     columns : cells of each column of the sheet.
     at : index of each row in the sheet.
     after : rows of text after the table.
@@ -137,24 +119,14 @@ def columns_of(
 ) -> Columns:
     """Columns of a recording, from a sheet.
 
-    Parameters
-    ----------
-    sheet, header : with its header.
-    keys : what the job says.
-    where : the file, for messages.
-    reach_mm : of the machine's travel, where it is known.
-    points : whether measurements and points must be numbered.
-
-    Raises
-    ------
-    CmmUqError : a cell, a row, the decimal sign, the unit or the numbering is missing, damaged or can be read in two ways.
+    ``points``: whether measurements and points must be numbered.
     """
     rows = _rows(sheet, header, where)
     table = _Table(sheet, header, rows, where)
     numeric = [i for name, own in header.columns.items() if name != NAME and name not in NUMBERS for i in own]
     sign = sheet.decimal or decimal_sign(
         [rows.columns[i] for i in numeric], lambda i, row: table.place(numeric[i], row), keys.decimal
-    )  # fmt: skip
+    )
     written = {name: table.written(name, sign) for name in header.columns if name != NAME and name not in NUMBERS}
     unit, said = lengths_unit(sheet, keys, table.named_units(written), written, where, reach_mm)
     values = {name: table.in_units(name, parts, unit) for name, parts in written.items() if parts}
@@ -181,15 +153,12 @@ class _Table:
     where: str
 
     def place(self, column: int, row: int) -> str:
-        """Of a cell."""
         return self.sheet.at(self.where, self.rows.at[row], column, self.header.headings[column])
 
     def start(self) -> str:
-        """Of the header."""
         return self.sheet.at(self.where, self.header.row)
 
     def cells(self, column: int) -> Sequence[Cell]:
-        """Of a column."""
         return self.rows.columns[column]
 
     def written(self, name: str, sign: str) -> list[tuple[Floats, WrittenUnit | None, int]]:
@@ -208,12 +177,7 @@ class _Table:
         return found
 
     def named_units(self, written: dict[str, list[tuple[Floats, WrittenUnit | None, int]]]) -> dict[str, WrittenUnit]:
-        """Units that headings or cells of lengths name, by heading.
-
-        Raises
-        ------
-        CmmUqError : a unit that is not known, or one of another quantity.
-        """
+        """Units that headings or cells of lengths name, by heading."""
         named = {}
         leading = [name for name in COORDINATES if name in written] or [
             name for name in written if not name.endswith("_um")
@@ -235,9 +199,7 @@ class _Table:
                     named[heading] = unit or UNITS["mm"]
         return named
 
-    def in_units(
-        self, name: str, parts: list[tuple[Floats, WrittenUnit | None, int]], length: WrittenUnit
-    ) -> Floats:  # fmt: skip
+    def in_units(self, name: str, parts: list[tuple[Floats, WrittenUnit | None, int]], length: WrittenUnit) -> Floats:
         """A column in the unit of its name, (n,), points of a row in turn."""
         sort, found = sort_of(name), []
         for values, unit, i in parts:

@@ -31,7 +31,6 @@ class Dcc(Format):
     title = say("digital calibration certificate (DCC)")
 
     def recognises(self, head: bytes) -> bool:
-        """See :meth:`Format.recognises`."""
         return begins_with(head, ROOT)
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:

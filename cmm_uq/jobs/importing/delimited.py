@@ -44,7 +44,6 @@ class Delimited(Format):
         return bool(text.strip()) and len(_CONTROL.findall(text)) == 0
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         delimiter = _delimiter(text, where, keys)
         rows, lines = _rows(text, delimiter, where)

@@ -33,11 +33,9 @@ class Dmis(Format):
     title = say("DMIS output (ISO 22093)")
 
     def recognises(self, head: bytes) -> bool:
-        """See :meth:`Format.recognises`."""
         return _ANY.search(head_text(head)) is not None
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         unit, rows, others = None, [], 0
         for line, statement in statements(report_lines(text, where), where):
@@ -61,12 +59,7 @@ class Dmis(Format):
 
 
 def statements(lines: Sequence[str], where: str) -> Iterator[tuple[int, str]]:
-    """Statements without comments, those over several lines joined, with the line that each begins on.
-
-    Raises
-    ------
-    CmmUqError : a statement goes on for longer than a line may be.
-    """
+    """Statements without comments, those over several lines joined, with the line that each begins on."""
     begun, start = "", 0
     for line, content in enumerate(lines, 1):
         part = content.strip()

@@ -23,18 +23,6 @@ _REPORT_LINE = 2000
 def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, str]:
     """Text of a file, and what its encoding is called.
 
-    Parameters
-    ----------
-    content : of the file.
-    where : its name, for messages.
-    asked : encoding that the job names.
-
-    Raises
-    ------
-    CmmUqError : the bytes are no text in it.
-
-    Notes
-    -----
     A byte-order mark decides; without one, UTF-16 shows by a zero in every other byte, UTF-8 by being valid; what remains is
     Windows-1252, which has every character of ISO 8859-1 in the same place.
     """
@@ -67,12 +55,7 @@ def _without_mark(content: bytes) -> str:
 
 
 def report_lines(text: str, where: str) -> list[str]:
-    """Lines of a report, none of them longer than a report's can be.
-
-    Raises
-    ------
-    CmmUqError : too many lines, or one too long.
-    """
+    """Lines of a report, none of them longer than a report's can be."""
     lines = text.splitlines()
     if len(lines) > LINES.most:
         raise CmmUqError(f"has {len(lines)} lines, {LINES.most} are the most", where=where, fix="Split the report")
@@ -94,12 +77,7 @@ HOSTILE_FIX = "Export it again; a measuring program writes no DOCTYPE or ENTITY"
 
 
 def root_of(content: bytes, where: str) -> Element:
-    """The root of an XML file.
-
-    Raises
-    ------
-    CmmUqError : it is damaged, or declares entities.
-    """
+    """The root of an XML file."""
     from defusedxml.common import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 

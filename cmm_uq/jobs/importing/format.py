@@ -72,12 +72,7 @@ _FILES = (
 
 
 def refuse_unread(head: bytes, where: str) -> None:
-    """Refuse a file of a kind that is never read.
-
-    Raises
-    ------
-    CmmUqError : it is one.
-    """
+    """Refuse a file of a kind that is never read."""
     for start, what, fix in _FILES:
         if head.startswith(start):
             raise CmmUqError(what, where=where, fix=fix)
@@ -102,12 +97,7 @@ TEXT = "delimited.Delimited"
 
 
 def format_of(content: bytes, where: str) -> Format:
-    """The format of a file.
-
-    Raises
-    ------
-    CmmUqError : it is none that is read.
-    """
+    """The format of a file."""
     head = content[:HEAD]
     for plugin in offered(IMPORTS, Plugin):
         found = plugin.loaded(Format)  # type: ignore[type-abstract]

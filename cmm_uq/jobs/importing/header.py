@@ -26,8 +26,6 @@ _SHOWN = 12
 class Header:
     """A header, understood.
 
-    Parameters
-    ----------
     row : its index in the sheet; that of the first row of figures where columns are named by number and there is none.
     first : index of the first row of figures.
     headings : of every column.
@@ -45,7 +43,6 @@ class Header:
 
     @property
     def points(self) -> int:
-        """In a row."""
         return max(map(len, self.columns.values()))
 
     @property
@@ -58,20 +55,7 @@ class Header:
 def header_of(sheet: Sheet, keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]) -> Header | None:
     """The header of a sheet: the first row that names the wanted columns.
 
-    Parameters
-    ----------
-    sheet : to be searched.
-    keys : columns that the job names.
-    where : the file, for messages.
-    wanted : alternatives of columns that a table must have.
-
-    Returns
-    -------
-    ``None`` where no row names them.
-
-    Raises
-    ------
-    CmmUqError : two columns could be one of the recording's, or a unit is not known.
+    Returns ``None`` where no row names them.
     """
     if _by_number(keys) and any(set(columns) <= set(keys.columns) for columns in wanted):
         return _numbered(sheet, keys)

@@ -34,8 +34,6 @@ _UNIT_LINE = re.compile(
 class ImportedTable:
     """A file, read.
 
-    Parameters
-    ----------
     columns : of a recording, by name, each (n,), in the units of their names.
     lines : (n,) line of each point in the file.
     recognised : how it was read.
@@ -47,19 +45,7 @@ class ImportedTable:
 
 
 def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
-    """A recording in any format that is known.
-
-    Parameters
-    ----------
-    content : bytes of the file.
-    where : its path, for messages.
-    keys : what the job says beside.
-    reach_mm : diagonal of the machine's travel, where it is known.
-
-    Raises
-    ------
-    CmmUqError : it is of no known format, damaged or hostile, or can be read in two ways that no key settles.
-    """
+    """A recording in any format that is known."""
     found = _read(content, where, keys, POINTS, reach_mm)
     own = [name for name in found.columns if name.startswith("reference_u_") or name == "reference_U_um"]
     others = [name for name in own if found.recognised.columns[name] != name and name not in keys.columns]
@@ -78,12 +64,7 @@ def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | 
 
 
 def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedTable:
-    """Certified values in any format that is known: distances or places, by the number of their point.
-
-    Raises
-    ------
-    CmmUqError : see :func:`imported`.
-    """
+    """Certified values in any format that is known: distances or places, by the number of their point."""
     asked = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
     found = _read(content, where, asked, REFERENCES, None)
     columns = {f"reference_{name}" if name in POINTS[0] else name: values for name, values in found.columns.items()}
@@ -108,7 +89,7 @@ def _read(
 
 def _chosen(
     sheets: Sequence[Sheet], keys: ImportKeys, where: str, wanted: Sequence[Sequence[str]]
-) -> tuple[Sheet, Header]:  # fmt: skip
+) -> tuple[Sheet, Header]:
     """The sheet with the table, and its header."""
     if keys.sheet is not None:
         sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()] or _no_sheet(
@@ -146,21 +127,8 @@ _HEAD = 16_384
 
 def read_recording_file(
     content: bytes, where: str, machine: Machine, keys: ImportKeys, without: Collection[str] = ()
-) -> tuple[Points, Recognised | None]:  # fmt: skip
-    """Points of a recording, and how it was read where it is in another format than the project's own.
-
-    Parameters
-    ----------
-    content : bytes of the file.
-    where : its path, for messages.
-    machine : that read the points.
-    keys : what the job says beside the name of the file.
-    without : columns that are known to have empty cells, and are left out.
-
-    Raises
-    ------
-    CmmUqError : it is damaged, or of no format that is known.
-    """
+) -> tuple[Points, Recognised | None]:
+    """Points of a recording, and how it was read where it is in another format than the project's own."""
     if not keys.asked and is_own(content):
         return read_recording(content, where, machine, without), None
 

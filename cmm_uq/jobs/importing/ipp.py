@@ -33,7 +33,6 @@ class Ipp(Format):
         return len(_ANY.findall(head_text(head))) >= 2
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         requests, answers, others, scans = _lines(report_lines(text, where))
         if not answers:

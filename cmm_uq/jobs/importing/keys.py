@@ -23,8 +23,6 @@ from cmm_uq.base.points import Floats
 class WrittenUnit:
     """A unit: ``value · up / down + offset`` in the unit of its sort (mm, °C, s, hPa, %).
 
-    Parameters
-    ----------
     name : as it is said.
     sort : of quantity.
     up, down : whole numbers.
@@ -89,11 +87,7 @@ def sort_of(column: str) -> tuple[str, int] | None:
 def converted(values: Floats, unit: WrittenUnit, column: str) -> Floats:
     """Values of a column in the unit of its name.
 
-    Parameters
-    ----------
-    values : (n,) as written.
-    unit : of them.
-    column : of the recording.
+    ``values``: (n,) as written.
     """
     sort = sort_of(column)
     up, down = unit.up * (sort[1] if sort else 1), unit.down

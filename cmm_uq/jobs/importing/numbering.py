@@ -33,13 +33,7 @@ At = Callable[[int], str]
 def numbered(cells: Sequence[Cell], sign: str, at: At) -> tuple[Floats, Text | None]:
     """Numbers (n,) of a column that numbers measurements, points or repeats; names are numbered as they first appear.
 
-    Returns
-    -------
-    and what names became which numbers, where they are names.
-
-    Raises
-    ------
-    CmmUqError : numbers and names are mixed, or a cell is empty.
+    Returns and what names became which numbers, where they are names.
     """
     if cells and is_number(cells[0]):
         return values_of(cells, sign, at), None
@@ -64,17 +58,7 @@ def completed(
 ) -> tuple[dict[str, Floats], list[Fact]]:
     """Numbers of every point, where the file leaves some out.
 
-    Parameters
-    ----------
-    given : columns that the file has, each (n,).
-    labels : names of the points.
-    count : of points, n.
-    keys : what the job says.
-    place : of the table, for messages.
-
-    Raises
-    ------
-    CmmUqError : nothing says which points belong together.
+    ``given``: columns that the file has, each (n,).
     """
     found = dict(given)
     if MEASUREMENT in found:

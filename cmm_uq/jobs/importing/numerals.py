@@ -46,18 +46,7 @@ At = Callable[[int, int], str]
 
 
 def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -> str:
-    """The decimal sign of the numbers of a table.
-
-    Parameters
-    ----------
-    columns : that must be numbers.
-    at : place of a cell.
-    asked : the sign that the job names.
-
-    Raises
-    ------
-    CmmUqError : cells contradict each other, or every comma can be read either way.
-    """
+    """The decimal sign of the numbers of a table."""
     if asked is not None:
         return asked
     texts = [_joined(column) for column in columns]
@@ -99,12 +88,7 @@ def _first(texts: Sequence[str], patterns: Sequence[re.Pattern[str]]) -> tuple[i
 
 
 def split_units(cells: Sequence[Cell], at: Callable[[int], str]) -> tuple[Sequence[Cell], WrittenUnit | None]:
-    """Cells without the unit that all of them end in, and that unit.
-
-    Raises
-    ------
-    CmmUqError : some cells have another unit, or none.
-    """
+    """Cells without the unit that all of them end in, and that unit."""
     first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
     found = apart(first) if first else None
     if found is None:
@@ -122,19 +106,7 @@ def split_units(cells: Sequence[Cell], at: Callable[[int], str]) -> tuple[Sequen
 
 
 def values_of(cells: Sequence[Cell], sign: str, at: Callable[[int], str], fix: str = GIVE) -> Floats:
-    """Values (n,) of cells.
-
-    Parameters
-    ----------
-    cells : of a column.
-    sign : its decimal sign.
-    at : place of a cell by its index.
-    fix : what to do where there is no number.
-
-    Raises
-    ------
-    CmmUqError : a cell is no number.
-    """
+    """Values (n,) of cells."""
     sorts = set(map(type, cells))
     if str not in sorts:
         return _of_numbers(np.array(cells, dtype=np.float64), at, fix)

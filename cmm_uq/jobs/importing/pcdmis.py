@@ -54,7 +54,6 @@ class PcDmis(Format):
         )
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         text, encoding = decoded(content, where, keys.encoding)
         places, others = _places(text, where)
         located = {place.sort.upper() for place in places if len(place.found) == len(AXES)}

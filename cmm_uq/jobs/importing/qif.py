@@ -25,11 +25,9 @@ class Qif(Format):
     title = say("QIF results")
 
     def recognises(self, head: bytes) -> bool:
-        """See :meth:`Format.recognises`."""
         return begins_with(head, "QIFDocument")
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         root = root_of(content, where)
         items = [element for element in root.iter() if local(element).endswith("FeatureItem")]
         named = {item.get("id", ""): child(item, "FeatureName") for item in items}
@@ -52,12 +50,7 @@ class Qif(Format):
 
 
 def length_unit(root: Element, where: str) -> str | None:
-    """Name of the unit of length in ``FileUnits``, whose name must fit the factor beside it; ``None`` where there is none.
-
-    Raises
-    ------
-    CmmUqError : a unit that is not known, or another factor than its own.
-    """
+    """Name of the unit of length in ``FileUnits``, whose name must fit the factor beside it; ``None`` where there is none."""
     found = next((e for e in root.iter() if local(e) == "PrimaryUnits"), None)
     length = None if found is None else next((e for e in found if local(e) == "LinearUnit"), None)
     if length is None:
@@ -113,12 +106,7 @@ def _points(element: Element, where: str) -> Iterator[Row]:
 
 
 def three(text: str, place: str) -> list[str]:
-    """The three numbers of a place or a direction, as they are written.
-
-    Raises
-    ------
-    CmmUqError : there are fewer or more.
-    """
+    """The three numbers of a place or a direction, as they are written."""
     words = text.split()
     if len(words) != 3:
         raise CmmUqError(f"has {len(words)} coordinates where a place has three", where=place,

@@ -47,20 +47,7 @@ OTHER_UNITS = re.compile(
 
 
 def read_recording(content: bytes, name: str, machine: Machine, without: Collection[str] = ()) -> Points:
-    """Points of a recording.
-
-    Parameters
-    ----------
-    content : the file's bytes, UTF-8.
-    name : the file's name, for messages.
-    machine : that read them.
-    without : columns that are known to have empty cells, and are left out.
-
-    Raises
-    ------
-    CmmUqError : a column is missing or twice there, a cell is no number of a possible size, a row is incomplete, a point is
-        there twice.
-    """
+    """Points of a recording."""
     wrong, table = Gathered(), dict[str, Floats]()
     header, rows, lines = _table(content, name, wrong)
     with wrong.going_on():
@@ -82,20 +69,10 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
 
 def points_of(
     table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine, wrong: Gathered | None = None
-) -> Points:  # fmt: skip
+) -> Points:
     """Points of the columns of a recording.
 
-    Parameters
-    ----------
-    table : columns by name, each (n,), those of :data:`REQUIRED` among them.
-    lines : of each point in its file.
-    name : the file's name, for messages.
-    machine : that read them.
-    wrong : what is wrong with the recording already.
-
-    Raises
-    ------
-    CmmUqError : a number that is impossible in its column, a point that is there twice.
+    ``table``: columns by name, each (n,), those of :data:`REQUIRED` among them.
     """
     wrong = wrong or Gathered()
     for column, values in table.items():

@@ -85,15 +85,7 @@ def sheets_of(
     rows: Sequence[Row], headings: Sequence[str], *, unit: str | None, decimal: str | None = None,
     facts: tuple[Fact, ...] = (),
 ) -> list[Sheet]:  # fmt: skip
-    """A sheet for each sort of feature.
-
-    Parameters
-    ----------
-    rows : of all features.
-    headings : of their cells.
-    unit, decimal : of their lengths and numbers, where the format says them.
-    facts : recognised.
-    """
+    """A sheet for each sort of feature."""
     sheets = []
     for sort in dict.fromkeys(sort for sort, _, _ in rows):
         own = [(cells, line) for of, cells, line in rows if of == sort]
@@ -109,8 +101,6 @@ def sheets_of(
 class Recognition:
     """How a file was read.
 
-    Parameters
-    ----------
     file : its name.
     format : its format's name.
     title : of the format, as printed.
@@ -154,7 +144,6 @@ class Recognition:
 
     @property
     def data(self) -> dict[str, Any]:
-        """For results.json."""
         return {
             "file": self.file, "format": self.format, **{fact.key: str.__str__(fact.value) for fact in self.facts},
             "columns": dict(self.columns), "points": self.points,

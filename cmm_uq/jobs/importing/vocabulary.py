@@ -96,8 +96,6 @@ _WORDS = re.compile(r"[^\W\d_]+|\d+")
 class Heading:
     """A column's heading, understood.
 
-    Parameters
-    ----------
     column : of a recording, or :data:`NAME`; ``None`` where it is none that is known.
     index : number of the point in a row of several.
     unit : named in it.

@@ -37,12 +37,7 @@ ZIP = b"PK\x03\x04"
 
 
 def opened(content: bytes, where: str) -> zipfile.ZipFile:
-    """A ZIP archive that can be read.
-
-    Raises
-    ------
-    CmmUqError : it is damaged, encrypted, or would be too large unpacked.
-    """
+    """A ZIP archive that can be read."""
     try:
         archive = zipfile.ZipFile(io.BytesIO(content))
         members = archive.infolist()
@@ -91,11 +86,9 @@ class Excel(Format):
     title = say("Excel workbook")
 
     def recognises(self, head: bytes) -> bool:
-        """See :meth:`Format.recognises`."""
         return has(head, "[Content_Types].xml", "xl/workbook.xml", "xl/worksheets", "_rels/.rels")
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         with opened(content, where) as archive:
             if not any(name.startswith("xl/") for name in archive.namelist()):
                 raise CmmUqError("is an Office document, and no workbook", where=where, fix="Save the table as .xlsx")
@@ -157,12 +150,7 @@ def cell_of(value: Any) -> Cell:
 
 
 def check_row(cells: Sequence[Cell], rows: int, place: str) -> None:
-    """Refuse what goes beyond the limits of a table.
-
-    Raises
-    ------
-    CmmUqError : too many rows, too many cells, or a cell too long.
-    """
+    """Refuse what goes beyond the limits of a table."""
     if len(cells) > COLUMNS.most:
         raise CmmUqError(f"has {len(cells)} cells, {COLUMNS.most} are the most", where=place,
                          fix="Keep the columns that the job needs")  # fmt: skip
@@ -190,7 +178,6 @@ class OpenDocument(Format):
         return b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet" in head[:200]
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`."""
         from defusedxml.common import DefusedXmlException
         from defusedxml.ElementTree import iterparse
 

@@ -59,8 +59,6 @@ SAME = 1e-9
 class PointUncertainties:
     """Uncertainties of certified points.
 
-    Parameters
-    ----------
     numbers : of the points.
     u : (f,) standard uncertainty of each, µm, by column of the recording.
     covariances : (f, f) µm², in the order of ``u``; none where the certificate gives none.
@@ -83,8 +81,6 @@ class PointUncertainties:
 class CertifiedValues:
     """What a digital certificate says.
 
-    Parameters
-    ----------
     table : keys of ``[artefact]``, those of its certificate in a table of their own.
     recognised : how values that stand alone were read; ``None`` where points are joined to the recording.
     places : uncertainties of such points; ``None`` where the certificate states none of them.
@@ -103,19 +99,7 @@ class CertifiedValues:
 
 
 def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[ArtefactFacts]) -> CertifiedValues:
-    """What the certificate of an artefact says that job.toml does not.
-
-    Parameters
-    ----------
-    content : of the certificate's file.
-    where : its name, for messages.
-    given : ``[artefact]`` as job.toml has it, unchecked.
-    facts : what ``[artefact]`` of this kind is.
-
-    Raises
-    ------
-    CmmUqError : it is no DCC that can be read, lacks what this kind needs, or says another thing than job.toml.
-    """
+    """What the certificate of an artefact says that job.toml does not."""
     certificate = read(content, where)
     table: dict[str, Any] = {"certificate": _chain(certificate, _table(given, "certificate"), where)}
     table |= _identity(certificate, given, where)
@@ -229,7 +213,7 @@ def _u_um(one: Figures) -> float | None:
 
 def _uncertain(
     key: str, u_um: float | None, given: Mapping[str, Any], where: str, shown: str, what: str, length_mm: float = 0.0
-) -> dict[str, float]:  # fmt: skip
+) -> dict[str, float]:
     """The uncertainty, where the job has none; what it has must not be smaller."""
     try:
         own = with_standard_uncertainty(dict(given)).get(key)
@@ -249,15 +233,15 @@ def _uncertain(
 
 def _longest(
     certificate: Certificate, content: bytes, where: str, given: Mapping[str, Any]
-) -> tuple[dict[str, Any], PointUncertainties | None]:  # fmt: skip
+) -> tuple[dict[str, Any], PointUncertainties | None]:
     """Longest certified distance of points that are joined to the recording by their numbers, and their uncertainties."""
     try:
         keys = CertificateFile.model_validate(dict(_table(given, "certificate")))
     except ValidationError:
         return {}, None  # what is wrong with it is said where the table is checked
-    found = imported_references(content, where, FileKeys.model_validate(
-        {name: getattr(keys, name) for name in FileKeys.model_fields}
-    ))  # fmt: skip
+    found = imported_references(
+        content, where, FileKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
+    )
     sources = found.recognised.columns
     wanted = [name for name in ("reference_mm", *(f"reference_{axis}_mm" for axis in AXES)) if name in found.columns]
     headings = [sources.get(name) or sources.get(name.removeprefix("reference_")) for name in wanted]

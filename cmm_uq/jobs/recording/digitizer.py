@@ -64,8 +64,6 @@ class _Results(Part):
 class DescribedDigitizer:
     """A digitizer ready for use.
 
-    Parameters
-    ----------
     offset_mm : [U1 V1 W1].
     poses : by their numbers.
     covariance_mm2 : (3, 3) of the offset; ``None`` where the job gives the numbers themselves.
@@ -99,18 +97,7 @@ def calibration_file(facts: DigitizerFacts | None) -> str | None:
 def digitizer_of(
     facts: DigitizerFacts | None, inputs: Mapping[str, bytes], folder: Path, origin: Origin
 ) -> DescribedDigitizer | None:
-    """The digitizer that a job describes; ``None`` where it describes none.
-
-    Parameters
-    ----------
-    inputs : contents of the job's files by their names.
-    folder : of the job, for messages.
-    origin : of what is compensated with it.
-
-    Raises
-    ------
-    CmmUqError : the calibration is no results.json of a digitizer, or of a simulated recording and this one is measured.
-    """
+    """The digitizer that a job describes; ``None`` where it describes none."""
     if facts is None:
         return None
     name = calibration_file(facts)

@@ -101,8 +101,6 @@ _FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
 class Prediction:
     """What a simulation predicts, row by row.
 
-    Parameters
-    ----------
     where : file, for messages.
     measurement : (r,).
     point : (r,); zeros of predicted lengths.
@@ -129,18 +127,7 @@ class Prediction:
 
 
 def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Prediction:
-    """The prediction in a file.
-
-    Parameters
-    ----------
-    content : its bytes.
-    where : its name, for messages.
-    facts : how it is to be read.
-
-    Raises
-    ------
-    CmmUqError : a column is missing or named in vain, a cell is no number of a possible size, a point is predicted twice.
-    """
+    """The prediction in a file."""
     cells = _table(content, where)
     place = _places(cells, where, facts)
     unit = UNIT_MM[facts.unit]
@@ -164,12 +151,7 @@ def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Predi
 
 
 def is_error_map(content: bytes, where: str) -> bool:
-    """Whether a file is no prediction but an error map as CSV.
-
-    Raises
-    ------
-    CmmUqError : it is no text.
-    """
+    """Whether a file is no prediction but an error map as CSV."""
     names = [name.strip() for name in _header(text_of(content, where, _FIX)).split(",")]
     return set(_OF_A_MAP) <= set(names)
 

@@ -49,20 +49,7 @@ def reference_file(artefact: ArtefactFacts) -> list[str]:
 def with_references(
     points: Points, artefact: ArtefactFacts, inputs: Mapping[str, bytes], folder: Path, where: str
 ) -> tuple[Points, Recognised]:
-    """A recording with the certified values of its points, and how their file was read.
-
-    Parameters
-    ----------
-    points : without certified values.
-    artefact : whose certificate names a file.
-    inputs : bytes of the files of the job, by name.
-    folder : of the job, for messages.
-    where : file of the recording, for messages.
-
-    Raises
-    ------
-    CmmUqError : the file cannot be read, does not number its values, or lacks a point; or the recording has such values too.
-    """
+    """A recording with the certified values of its points, and how their file was read."""
     chain = artefact.certificate
     if chain is None or chain.file is None:
         raise CmmUqError("the certificate names no file", where=where)
@@ -96,19 +83,7 @@ def with_references(
 
 
 def with_uncertainties(points: Points, artefact: ArtefactFacts, where: str, unread: Sequence[str] = ()) -> Points:
-    """A recording with the standard uncertainty of its certified values in place of the expanded one.
-
-    Parameters
-    ----------
-    points : with certified values.
-    artefact : whose ``k`` belongs to a column of expanded uncertainties.
-    where : the file that has them, for messages.
-    unread : headings of its columns that are not used.
-
-    Raises
-    ------
-    CmmUqError : an uncertainty without its coverage factor, twice, below 0, or in a column that is not read.
-    """
+    """A recording with the standard uncertainty of its certified values in place of the expanded one."""
     columns, factor = points.columns, factor_of(artefact.k, artefact.degrees_of_freedom)
     unread = [*unread, *(name for name in columns if name not in OPTIONAL)]
     if (other := next((name for name in unread if _ANOTHER_U.fullmatch(name)), None)) is not None:
@@ -159,19 +134,9 @@ NOISE_RATIO = "noise_ratio"
 def against_earlier(later: Points, earlier: Points, cte_per_k: float, where: str) -> Points:
     """The later recording, means over repeats, with the earlier one as its reference positions.
 
-    Parameters
-    ----------
-    later, earlier : recordings of the same balls in the same placings, numbered alike.
-    cte_per_k : of the plate, which brings the earlier positions to 20 °C when their temperature was recorded.
-    where : file of the later recording, for messages.
+    ``cte_per_k``: of the plate, which brings the earlier positions to 20 °C when their temperature was recorded.
 
-    Returns
-    -------
-    points with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm`` and :data:`NOISE_RATIO`.
-
-    Raises
-    ------
-    CmmUqError : a ball of the later recording is not in the earlier one.
+    Returns points with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm`` and :data:`NOISE_RATIO`.
     """
     now, then = _Balls(later), _Balls(earlier)
     known = {key: i for i, key in enumerate(map(tuple, then.keys.tolist()))}

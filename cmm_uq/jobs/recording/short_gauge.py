@@ -23,15 +23,7 @@ FARTHEST_MM = 1.0
 
 
 class ShortGaugeFacts(Table):
-    """``[short_gauge]``: a gauge block, or another gauge of two opposite faces, and the recording of it.
-
-    Attributes
-    ----------
-    file : its recording: points 1 and 2, the middles of its two faces, in every measurement and repeat.
-    length_mm : of its certificate, at 20 °C.
-    u_um : of that length as it was met: of the certificate, and what the gauge's temperature leaves open.
-    cte_per_k : of its expansion.
-    """
+    """``[short_gauge]``: a gauge block, or another gauge of two opposite faces, and the recording of it."""
 
     file: str
     """Its recording: points 1 and 2, the middles of its two faces, in every measurement and repeat."""
@@ -72,8 +64,6 @@ class ShortGaugeFacts(Table):
 class ShortGauge:
     """A short gauge as recorded, q times.
 
-    Parameters
-    ----------
     facts : what the job says of it.
     points : the recording.
     rows : (q, 2) of points 1 and 2 of each (measurement, repeat), by these.
@@ -105,18 +95,7 @@ class ShortGauge:
 
 
 def short_gauge_of(facts: ShortGaugeFacts, content: bytes, where: str, machine: Machine) -> ShortGauge:
-    """A short gauge with its recording.
-
-    Parameters
-    ----------
-    content : bytes of the recording.
-    where : its file, for messages.
-
-    Raises
-    ------
-    CmmUqError : the recording is damaged, a face is missing, a length is that of another gauge, or its faces were reached
-        from the same side.
-    """
+    """A short gauge with its recording."""
     points = read_recording(content, where, machine)
     for own in points.rows_of_groups:
         if sorted(points.point[own].tolist()) != [1, 2]:

@@ -33,8 +33,6 @@ BRIDGED = 2.5
 class TemperatureLog:
     """Mean temperature of each scale over time.
 
-    Parameters
-    ----------
     times : (m,) s, increasing; where the log gives dates, since the start that was told, or since 1970.
     scales : (m, 3) mean of the thermocouples on scales x, y, z, °C.
     spread : (m, 3) largest less smallest of them, K: how far one number describes a scale.
@@ -51,16 +49,7 @@ class TemperatureLog:
     dated: bool = False
 
     def at(self, times: ArrayLike, place: Callable[[int], str] | None = None) -> Floats:
-        """Temperatures (n, 3) of the scales at times (n,), linear between the entries of the log, °C.
-
-        Parameters
-        ----------
-        place : names where a time comes from, for messages; the log when left out.
-
-        Raises
-        ------
-        CmmUqError : a time lies before or after the log, or in a gap of it.
-        """
+        """Temperatures (n, 3) of the scales at times (n,), linear between the entries of the log, °C."""
         return self._between(times, self.scales, place)
 
     def spread_at(self, times: ArrayLike) -> Floats:
@@ -120,17 +109,7 @@ def parse_temperature_log(
 ) -> TemperatureLog:
     """Temperature log from the content of a CSV file.
 
-    Parameters
-    ----------
-    content : of the file, UTF-8.
-    where : its name, for messages.
-    sensors : columns of the thermocouples on scales x, y and z; by their names when left out.
-    start : from which seconds count, where the log gives dates; 1970 when left out.
-    max_gap : longest interval that is interpolated over, s; :data:`BRIDGED` median intervals when left out.
-
-    Raises
-    ------
-    CmmUqError : what is wrong, with its line.
+    ``max_gap``: longest interval that is interpolated over, s; :data:`BRIDGED` median intervals when left out.
     """
     table = csv_table(content, where, ())
     times = _seconds(table, start)
@@ -227,25 +206,13 @@ KEY = "[machine] temperature_log"
 
 
 def log_of(machine: MachineFacts, inputs: Mapping[str, bytes], folder: Path) -> TemperatureLog | None:
-    """The log that a job names, ``None`` where it names none.
-
-    Parameters
-    ----------
-    inputs : contents of the job's files by their names.
-    folder : of the job, for messages.
-
-    Raises
-    ------
-    CmmUqError : it is no temperature log, or its clock is not the recording's.
-    """
+    """The log that a job names, ``None`` where it names none."""
     given = machine.temperature_log
     if given is None:
         return None
     sensors = given.columns.model_dump() if given.columns is not None else None
     where = str(folder / given.file)
-    log = parse_temperature_log(
-        inputs[given.file], where, sensors, start=given.start, max_gap=given.max_gap_s
-    )  # fmt: skip
+    log = parse_temperature_log(inputs[given.file], where, sensors, start=given.start, max_gap=given.max_gap_s)
     if log.dated and given.start is None:
         raise CmmUqError("gives dates, and the recording's time_s counts seconds", where=where,
                          fix=f"Say in {KEY} when time_s was 0: start = 2004-06-01T14:30:00")  # fmt: skip
@@ -253,17 +220,7 @@ def log_of(machine: MachineFacts, inputs: Mapping[str, bytes], folder: Path) -> 
 
 
 def with_logged(points: Points, log: TemperatureLog | None, toml: Path, recording: str) -> Points:
-    """The points of a recording with the temperatures of their scales.
-
-    Parameters
-    ----------
-    toml : the job's, for messages.
-    recording : its recording, for messages.
-
-    Raises
-    ------
-    CmmUqError : the recording has temperatures of the scales itself, or no times, or a time that the log does not know.
-    """
+    """The points of a recording with the temperatures of their scales."""
     if log is None:
         return points
     own = next((name for name in COLUMNS if name in points.columns), None)

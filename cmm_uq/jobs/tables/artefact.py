@@ -27,8 +27,6 @@ from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUn
 class CertifiedValue:
     """A value of ``[artefact]`` that a digital certificate may state.
 
-    Parameters
-    ----------
     key : of it; with a dot where it stands in a table of its own, which the job must have.
     u_key : of its standard uncertainty, µm; empty where it has none.
     words : parts of the names by which certificates call it, in small letters.
@@ -75,12 +73,7 @@ CIPM: Arrangement = "CIPM MRA"
 
 
 class Traceability(Table):
-    """A certificate of the artefact, the short gauge or a thermometer.
-
-    Attributes
-    ----------
-    machine : measuring machine that the artefact was certified on, by its name or its serial number.
-    """
+    """A certificate of the artefact, the short gauge or a thermometer."""
 
     number: str = ""
     """Number of the certificate, for the statement of traceability."""
@@ -159,15 +152,6 @@ class ArtefactFacts(Table):
 
     ``U_um`` with ``k`` or ``degrees_of_freedom`` may stand for ``u_um``, which is then filled in.
     Without ``length_mm`` the artefact is uncalibrated, unless its certified figures stand in the recording.
-
-    Attributes
-    ----------
-    with_references : whether they do; its ``u_um`` may then stand without ``length_mm``.
-    with_recording : whether there is one; otherwise what ``[machine]`` names is measured.
-    with_earlier : whether two recordings of it at two dates can be compared.
-    carries_probe : whether its recording itself says how far from the end of the ram each point was, as tip offsets do.
-    form_key : key of the form deviation by its certificate, for a kind that has a form to be compared.
-    certified_values : that the artefact's digital certificate may state, where they do not stand in the recording.
     """
 
     with_references: ClassVar[bool] = False
@@ -271,10 +255,7 @@ class ReferencedFacts(ArtefactFacts):
     def with_covariances(self, numbers: Sequence[int], covariances: Sequence[Floats]) -> Self:
         """The same with the covariances that a digital certificate gives of its points.
 
-        Parameters
-        ----------
-        numbers : of the f points.
-        covariances : (f, f) µm², for the distances, or for each coordinate.
+        ``covariances``: (f, f) µm², for the distances, or for each coordinate.
         """
         found = self.model_copy()
         found._covariances = tuple(numbers), tuple(covariances)
@@ -303,5 +284,4 @@ class ReferencedFacts(ArtefactFacts):
 
     @property
     def nominal_only(self) -> bool:
-        """See :attr:`ArtefactFacts.nominal_only`."""
         return self.nominal

@@ -119,17 +119,7 @@ class NegligibleLines(Table):
 
 
 class TestUncertainty(Table):
-    """``[test_uncertainty]``: what a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165).
-
-    Attributes
-    ----------
-    u_cte_per_k : of the artefact's coefficient of expansion, 1/K.
-    u_temperature_k : of its temperature, K.
-    u_alignment_um, u_fixturing_um : of a length, by misalignment and by what the clamping does to it, µm.
-    u_form_um : of the calibrated form deviation of a test sphere, µm.
-    u_repeat_um : of a range or a difference of repeated readings, by what of the artefact changed between them, µm.
-    negligible, machine : lines that somebody answers for instead.
-    """
+    """``[test_uncertainty]``: what a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165)."""
 
     __test__ = False  # no test of pytest's
 
@@ -183,16 +173,7 @@ Kelvins = Annotated[float, Field(gt=0, le=1000)]
 
 
 class RatedConditions(Table):
-    """``[rated_conditions]``: under which the limits of the machine hold, by its data sheet.
-
-    Attributes
-    ----------
-    temperature_c : lowest and highest temperature, °C.
-    change_k_per_h : largest change in an hour, K/h.
-    difference_k : largest difference between places at one time, K.
-    probe, stylus : for which the limits hold, as ``[probe]`` names them.
-    declared : by whom and why the test counts as one under rated conditions, where no rated temperature is stated.
-    """
+    """``[rated_conditions]``: under which the limits of the machine hold, by its data sheet."""
 
     temperature_c: Limits | None = None
     """Lowest and highest temperature."""
@@ -229,8 +210,6 @@ class ProbeFacts(Table):
 class Circumstances:
     """What a test must know of the job beside its recording.
 
-    Parameters
-    ----------
     uncertainty, rated, probe : as the job states them.
     cte_per_k : coefficient of expansion of the artefact, 1/K; ``None`` where it is not stated.
     short_gauge : recorded beside lengths that are not bidirectional by themselves.

@@ -83,13 +83,7 @@ class UnconditionalRisk(Table):
 
 
 class Prior(Table):
-    """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2).
-
-    Attributes
-    ----------
-    sd_um, share_of_limit : its standard deviation, or that over the limit of each error.
-    mean_um : its mean.
-    """
+    """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2)."""
 
     sd_um: Limit | None = None
     """Standard deviation of the errors of such machines."""
@@ -194,13 +188,8 @@ def clause_files(wishes: list[ConformityFacts]) -> list[str]:
 
 def forms_of(
     wishes: list[ConformityFacts], inputs: Mapping[str, bytes], folder: Path, standards: Standards
-) -> dict[str, ClausesForm]:  # fmt: skip
-    """The forms that a job names, by their file.
-
-    Raises
-    ------
-    CmmUqError : one is no form, is of another standard, or has a clause that this has not.
-    """
+) -> dict[str, ClausesForm]:
+    """The forms that a job names, by their file."""
     found: dict[str, ClausesForm] = {}
     for i, wish in enumerate(wishes, 1):
         if wish.clauses is None:
@@ -227,22 +216,18 @@ class StandardFacts(Protocol):
     @property
     def sensing(self) -> str | None:
         """For which probes it is; ``None`` for any."""
-        ...
 
     @property
     def clause_names(self) -> Sequence[str]:
         """Names of its clauses, as a form has them."""
-        ...
 
     def characteristic(self, name: str | None) -> object:
         """One that it decides; ``ValueError`` for a name that it does not."""
-        ...
 
     def uncertainty_missing(
         self, wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty
-    ) -> str | None:  # fmt: skip
+    ) -> str | None:
         """The key whose uncertainty the rule needs and does not have; ``None`` when nothing is missing."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -260,7 +245,7 @@ def standards_in(info: ValidationInfo) -> Standards | None:
 
 def uncertainty_missing(
     wish: ConformityFacts, artefact: ArtefactFacts, stated: TestUncertainty, standards: Standards | None
-) -> str | None:  # fmt: skip
+) -> str | None:
     """See :meth:`StandardFacts.uncertainty_missing`; ``None`` where there is nothing to check against."""
     asked = _asked(wish, standards)
     return asked.uncertainty_missing(wish, artefact, stated) if asked else None

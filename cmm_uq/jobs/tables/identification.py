@@ -152,14 +152,7 @@ class LengthCapability(Table):
 
 
 class Capability(Table):
-    """``[laboratory.cmc]``: calibration and measurement capability, the least U (95 %, k = 2) that a certificate may state.
-
-    Attributes
-    ----------
-    length : of what is stated in mm or µm.
-    scale_ppm : of what is stated in ppm or µm/m.
-    angle_arcsec : of what is stated in ″.
-    """
+    """``[laboratory.cmc]``: calibration and measurement capability, the least U (95 %, k = 2) that a certificate may state."""
 
     length: LengthCapability | None = None
     """Least U of what is stated in mm or µm."""
@@ -169,13 +162,7 @@ class Capability(Table):
     """Least U of what is stated in ″."""
 
     def least(self, unit: str, length_mm: float) -> float:
-        """The least U of a quantity in its own unit; 0 where none is given for it.
-
-        Parameters
-        ----------
-        unit : as printed.
-        length_mm : that the quantity is of, or rests on.
-        """
+        """The least U of a quantity in its own unit; 0 where none is given for it."""
         if unit in _LENGTHS and self.length is not None:
             per_length = length_mm / self.length.k if self.length.k else 0.0
             return (self.length.a_um + per_length) * _LENGTHS[unit]

@@ -47,13 +47,7 @@ HOW_MPE = (
 def mpe_of(text: str) -> dict[str, float]:
     """Keys of the table that says the same.
 
-    Parameters
-    ----------
-    text : A + L/K, A + B·L/K, min(A + L/K; B) or A; ``±`` before it and ``µm`` behind it change nothing.
-
-    Raises
-    ------
-    ValueError : it is none of these.
+    ``text``: A + L/K, A + B·L/K, min(A + L/K; B) or A; ``±`` before it and ``µm`` behind it change nothing.
     """
     plain = re.sub(r"\s+", "", text)
     plain = re.sub(r"^±\((.*)\)(?:µm|μm|um)?$|^±(.*)$", lambda found: found[1] or found[2], plain)
@@ -118,8 +112,6 @@ _LEADING_ZERO = re.compile(r"(?<![\d.,])0,(?=\d)")
 class Growing:
     """Uncertainty of a length, µm, that grows with it: ``fixed_um`` + ``per_mm`` · L, or the root of the sum of both squares.
 
-    Parameters
-    ----------
     fixed_um, per_mm : µm, and µm per mm.
     squares : whether the squares are added.
     """
@@ -139,12 +131,7 @@ class Growing:
 
 
 def growing_of(text: str) -> Growing | float:
-    """An uncertainty as a certificate prints it; a number where it is one.
-
-    Raises
-    ------
-    ValueError : it is none, or may be read in two ways.
-    """
+    """An uncertainty as a certificate prints it; a number where it is one."""
     plain = re.sub(r"\s+", "", text.translate(_MINUS))
     plain = re.sub(r"^[uU](?:95)?(?:\([lL]\))?=|(?:µm|μm|um)(?!/)", "", plain)
     plain = re.sub(r"^\((.*)\)$", r"\1", plain)
@@ -206,13 +193,7 @@ def factor_of(k: float | None, degrees_of_freedom: float | None) -> float | None
 def with_standard_uncertainty(data: Any, *, columns: bool = False) -> Any:
     """A table with ``u_um`` beside ``U_um``, which stays as stated, or as it is where it has none.
 
-    Parameters
-    ----------
-    columns : whether ``k`` may belong to a column of the recording alone.
-
-    Raises
-    ------
-    ValueError : one of them without the other, beside ``u_um``, or no uncertainty.
+    ``columns``: whether ``k`` may belong to a column of the recording alone.
     """
     if not (isinstance(data, dict) and {"U_um", "k"} & data.keys()):
         return data

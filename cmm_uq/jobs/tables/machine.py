@@ -159,15 +159,7 @@ class Pose(Table):
 
 
 class DigitizerFacts(Table):
-    """``digitizer``: a laser digitizer on the ram.
-
-    Attributes
-    ----------
-    offset_mm : [U1 V1 W1], the mount in the digitizer's frame.
-    poses : its attitudes.
-    calibration : in place of both, the results.json of its calibration, or the folder with it, inside the job's; ``poses``
-        beside it replace those in which it was calibrated.
-    """
+    """``digitizer``: a laser digitizer on the ram."""
 
     offset_mm: Triple | None = None
     """[U1, V1, W1]: the mount in the digitizer's frame."""
@@ -194,12 +186,7 @@ class DigitizerFacts(Table):
 
 
 def check_carriages(chain: str) -> None:
-    """Refuse a chain without each of its three carriages once.
-
-    Raises
-    ------
-    ValueError : it has others.
-    """
+    """Refuse a chain without each of its three carriages once."""
     if sorted(chain.replace("F", "", 1)) != ["X", "Y", "Z"]:
         raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
 

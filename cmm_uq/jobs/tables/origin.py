@@ -64,19 +64,7 @@ def first_line(by: str, program: str, how: str) -> str:
 
 
 def check_mark(folder: Path, origin: str, recording: bytes, where: str) -> None:
-    """That a recording which was derived says so.
-
-    Parameters
-    ----------
-    folder : of the job.
-    origin : what job.toml says.
-    recording : its bytes.
-    where : its file, for messages.
-
-    Raises
-    ------
-    CmmUqError : it was simulated or compensated, and the job passes it off as measured.
-    """
+    """That a recording which was derived says so."""
     if origin != MEASURED:
         return
     written = _WRITTEN.match(recording)
@@ -92,18 +80,7 @@ def check_mark(folder: Path, origin: str, recording: bytes, where: str) -> None:
 
 
 def check_examples(toml: bytes, origin: str, where: str) -> None:
-    """That no figure of an example is taken for one of a machine or an artefact that was measured.
-
-    Parameters
-    ----------
-    toml : bytes of job.toml.
-    origin : what it says of the recording.
-    where : its path, for messages.
-
-    Raises
-    ------
-    CmmUqError : the recording is measured and a figure is still marked as an example's; every such figure.
-    """
+    """That no figure of an example is taken for one of a machine or an artefact that was measured."""
     if origin != MEASURED:
         return
     wrong = Gathered()
