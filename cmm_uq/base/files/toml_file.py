@@ -19,6 +19,7 @@ from cmm_uq.base.errors import MOST_GATHERED, CmmUqError, shortened, suggestion
 from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.limits import DEPTH, LISTED, NUMERAL, TEXT, TOML_KEY, WORD
 from cmm_uq.base.files.numbers import conversion
+from cmm_uq.base.files.table import sentences
 
 _STRING = (
     r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:"{3,5})?+'
@@ -237,8 +238,6 @@ def _meant(word: str, table: type[BaseModel] | None) -> str:
 
 def _explained(key: str, table: type[BaseModel] | None) -> str:
     """The sentence of a key, to follow another; nothing where there is none."""
-    from cmm_uq.base.files.table import sentences  # reads source code, which only a mistake is worth
-
     told = sentences(table).get(key, "") if table is not None else ""
     return f" {told.rstrip('.')}" if told else ""
 

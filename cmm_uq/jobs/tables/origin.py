@@ -45,7 +45,7 @@ class DerivedFrom(BaseModel):
     error maps), which belong to this job and are attached to its documents.
     """
 
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, defer_build=True, use_attribute_docstrings=True)
     job: str
     """Id of the job that the recording was made from."""
     by: Literal["simulate", "compensate"]

@@ -123,8 +123,7 @@ class DeclaredSource(Table):
     """How the instrument speaks: a ready profile (`cmm-uq instruments list`), or a TOML file of one's own beside job.toml."""
     port: Annotated[str, Field(max_length=300)] = ""
     """Where it is: `/dev/ttyUSB0`, `COM3`, `socket://host:port`, `rfc2217://host:port`, `tcp://host:port`,
-    `visa://RESOURCE`, or `file:NAME` to replay bytes.
-    """
+    `visa://RESOURCE`, or `file:NAME` to replay bytes. """
     serial: str = ""
     """Serial number of the instrument; one that it gives itself must be the same."""
     certificate: str = ""
