@@ -14,7 +14,7 @@ from cmm_uq.certificate.result import Result
 from cmm_uq.jobs.reports import AsFound
 from tests.artefacts.reading import tables
 from tests.artefacts.simulated import analysed
-from tests.jobs.test_as_found import FOUND
+from tests.jobs.test_reports import FOUND
 
 
 def adjusted(found: Any, before: dict[str, Any]) -> Outcome:

@@ -1,4 +1,7 @@
-"""The files of a command are one set: all or none, never over anything else, whatever happens in between."""
+"""The files of a command are one set: all or none, never over anything else, whatever happens in between.
+
+Leftovers of a process that is no more are acted upon by one process at a time, and never those of one that lives.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output import MANIFEST, Owner, finish_interrupted, read_manifest, staged
+from cmm_uq.base.output import MANIFEST, Owner, finish_interrupted, is_pending, read_manifest, staged, staging
 from cmm_uq.base.output import staging as staging_module
+from cmm_uq.base.output.staging import locked
 
 MINE = Owner("report", "job-1")
 OLD, NEW = {"a.txt": b"old a", "b.txt": b"old b"}, {"a.txt": b"new a", "c.txt": b"new c"}
@@ -339,3 +343,42 @@ def test_a_place_below_a_file_is_told_as_unwritable(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot be written"), staged(tmp_path / "file" / "out", MINE):
         pass
+
+
+def test_a_lock_that_is_just_being_made_is_not_taken_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another process looks at the lock in the moment between its making and its locking: whoever stages makes another."""
+    made: list[Path] = []
+
+    def looked_at(path: Path, *, create: bool) -> int | None:
+        if create and not made:
+            made.append(path)
+            path.touch()  # made, not locked yet
+            finish_interrupted(tmp_path)
+            assert not path.exists()
+            return None
+        return locked(path, create=create)
+
+    monkeypatch.setattr(staging, "locked", looked_at)
+    with staged(tmp_path, Owner("report", "k-1")) as stage:
+        assert stage.lock.exists()
+        assert stage.lock != made[0]
+        finish_interrupted(tmp_path)
+        assert stage.stage.exists()
+        assert is_pending(tmp_path, stage.token)
+
+
+def test_what_somebody_completes_is_left_to_it(tmp_path: Path) -> None:
+    """The lock of a stage whose process is no more is held by whoever completes it."""
+    lock, placing = tmp_path / f"{staging.STAGE}{'0' * 12}{staging.LOCK}", tmp_path / staging.PLACING
+    placing.mkdir()
+    (placing / "token").write_text("0" * 12)
+    lock.touch()
+    held = locked(lock, create=False)
+    assert held is not None
+    finish_interrupted(tmp_path)
+    assert placing.exists()
+    assert is_pending(tmp_path, "0" * 12)
+    os.close(held)
+    finish_interrupted(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert not is_pending(tmp_path, "0" * 12)
