@@ -16,10 +16,10 @@ from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.analysis.parts.ways import Way, spread
 from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.parts.documents import Asked, contents_of, found_of
-from cmm_uq.app.commands.parts.part import part_found
+from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, evaluate
+from cmm_uq.app.commands.parts.part import evaluate_part
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.verify.pdf_file import PdfFile
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.inference.least_squares import LeastSquares
@@ -34,11 +34,11 @@ TRIALS = 1000
 
 
 @cache
-def plate_found() -> PartFound:
+def plate_found() -> PartMeasurement:
     """Its bore measured 20 µm off along x."""
     off = np.zeros((60, 3))
     off[-8:, 0] = 0.02
-    return part_found(plate_of(by_certificate(), off), trials=TRIALS)
+    return evaluate_part(plate_of(by_certificate(), off), trials=TRIALS)
 
 
 @cache
@@ -56,7 +56,7 @@ def plate_report() -> Mapping[str, bytes]:
     return files
 
 
-_AGAIN: dict[tuple[object, ...], PartFound] = {}
+_AGAIN: dict[tuple[object, ...], PartMeasurement] = {}
 _SAMPLED: dict[bytes, NoisyPosterior] = {}
 
 
@@ -85,14 +85,14 @@ def unchanged(plan: Plan, given: Circumstances, draws: int, seed: int, *, planne
     return [Way(say("as planned"), spread(planned, draws, seed), draws)]
 
 
-def found_again_once(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
+def found_again_once(job: PartJob, asked: PartOptions, stage: Stage = silent) -> PartMeasurement:
     """What a report's inputs give when computed again, once for all reports that have the very same inside and asked the same.
 
     Reports that differ in what they state alone are each held to it. It is never what the report itself was made of.
     """
     key = (asked, job.facts.model_dump_json(), *sorted(job.inputs.items()))
     if key not in _AGAIN:
-        _AGAIN[key] = found_of(job, asked, stage)
+        _AGAIN[key] = evaluate(job, asked, stage)
     return _AGAIN[key]
 
 

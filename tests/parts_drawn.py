@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.placing import Pose
-from cmm_uq.analysis.parts.plan import Association, Characteristic, Feature, Nominal
+from cmm_uq.analysis.parts.placing import PartPose
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.maths.geometry.association import Association
 
 UP = np.array([0.0, 0.0, 1.0])
 MACHINE = Machine("m", travel_mm=np.array([[0.0, 900.0], [0.0, 550.0], [-500.0, 0.0]]))
-POSE = Pose(np.eye(3), np.array([300.0, 200.0, -300.0]))
+POSE = PartPose(np.eye(3), np.array([300.0, 200.0, -300.0]))
 
 
 def machine(

@@ -18,7 +18,7 @@ import cmm_uq
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import AtPose
-from cmm_uq.app.commands.parts.machine import machine_found
+from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.job import TABLES, read_part
@@ -55,7 +55,7 @@ def main() -> None:
     (FOLDER / "job.toml").write_bytes(head.encode() + as_toml(tables, "job.toml"))
     job = read_part(FOLDER)
     plan = plan_of(job)
-    given = circumstances_of(job, machine_found(job).state, plan, 1)
+    given = circumstances_of(job, state_machine(job).state, plan, 1)
     place = AtPose(plan, given, given.poses[0])
     moved = place.measured.moved(place.drawn(np.random.default_rng(SEED), 1), slice(None))[0] + place.measured.base
     rows = [f"# {DRAWN.replace(chr(10), ' ')}", "feature,point,x_mm,y_mm,z_mm"]

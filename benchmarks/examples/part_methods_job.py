@@ -33,7 +33,7 @@ from cmm_uq.analysis.parts.causes.stylus import STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.methods.of_job import methods_of
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import forms_of, plan_of, surroundings_of
@@ -149,11 +149,11 @@ class Bench:
         smooth = tuple(replace(one, roughness_um=0.0) for one in forms_of(self.job))
         return np.asarray(sum(each.moved(each.draw(self.random, 1), slice(None))[0] for each in forms(smooth, plan)[0]))
 
-    def setup(self, plan: Plan, true: Floats, pose: Pose, repeats: int) -> list[Floats]:
+    def setup(self, plan: Plan, true: Floats, pose: PartPose, repeats: int) -> list[Floats]:
         """(c,) values of each repeat in one set-up: temperatures and tip are the same, noise and roughness are not."""
         return [evaluated(plan, points) for points in self.points(plan, true, pose, repeats)]
 
-    def points(self, plan: Plan, true: Floats, pose: Pose, repeats: int) -> list[Floats]:
+    def points(self, plan: Plan, true: Floats, pose: PartPose, repeats: int) -> list[Floats]:
         """(n, 3) points of each, in the frame of the part."""
         names = {one.name for one in plan.features}
         rough = tuple(replace(one, field_um=0.0) for one in forms_of(self.job) if one.feature in names)
@@ -170,11 +170,11 @@ class Bench:
         return found
 
 
-def turned(quarters: int) -> Pose:
+def turned(quarters: int) -> PartPose:
     """The plate turned about the vertical through its middle, by so many quarters of a revolution."""
     c, s = round(np.cos(0.5 * np.pi * quarters)), round(np.sin(0.5 * np.pi * quarters))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return Pose(turn, ORIGIN + MIDDLE_MM - turn @ MIDDLE_MM)
+    return PartPose(turn, ORIGIN + MIDDLE_MM - turn @ MIDDLE_MM)
 
 
 def standards(plan: Plan) -> tuple[Plan, Plan]:

@@ -20,7 +20,7 @@ import numpy as np
 import cmm_uq
 from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.artefacts.ballbar.observe import Ballbar
@@ -64,7 +64,7 @@ def main(machines: int, *, free: bool = False) -> None:
         stated = MachineState(
             bars.machine, named, random.multivariate_normal(mean, covariance, 4000), noise, corrections=mean
         )
-        pose = Pose(np.eye(3), PLACES[random.integers(len(PLACES))] - bars.machine.origin_mm)
+        pose = PartPose(np.eye(3), PLACES[random.integers(len(PLACES))] - bars.machine.origin_mm)
         real = MachineState(bars.machine, every, truth[None], noise, corrections=np.append(mean, np.zeros(len(sd) - 6)))
         seen = AtPose(plan, Circumstances(real), pose)
         error = seen.errors(seen.drawn(random, 1), exact=True)[0]

@@ -29,7 +29,7 @@ from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known
 from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.artefacts.ballbar.observe import Ballbar
@@ -123,12 +123,12 @@ def calibrated(cell: Cell, hidden: truth.Truth, sigma: float, offset: float, ran
     return Ballbar(ArtefactFacts(kind="ballbar", **certified), as_points(made))
 
 
-def placed(random: np.random.Generator) -> Pose:
+def placed(random: np.random.Generator) -> PartPose:
     """Anywhere in the volume, turned anyhow about z."""
     angle = random.uniform(0, 2 * np.pi)
     turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
     middle = random.uniform([120, 120, -450], [780, 480, -150])
-    return Pose(turn, middle - turn @ [100.0, 50, 0])
+    return PartPose(turn, middle - turn @ [100.0, 50, 0])
 
 
 def measured(task: tuple[Cell, int, int], made: Made = Made()) -> dict[str, Any]:

@@ -26,15 +26,15 @@ from cmm_uq.analysis.parts.causes.stylus import STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE, Expansion, Surroundings
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.methods.method import (
-    Calibrated,
+    CalibratedCharacteristic,
+    CalibratedStandard,
+    CalibratedStandards,
     Slopes,
-    Standard,
-    Standards,
     by_calibrated_part,
     by_orientations,
 )
 from cmm_uq.analysis.parts.methods.of_job import sensitivities
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Characteristic, Plan, Stylus
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
@@ -69,7 +69,7 @@ def machine() -> MachineState:
 class Bench:
     """A plan in several poses on the same machines."""
 
-    def __init__(self, plan: Plan, poses: Sequence[Pose], state: MachineState) -> None:
+    def __init__(self, plan: Plan, poses: Sequence[PartPose], state: MachineState) -> None:
         warm = Surroundings(Expansion(11.5e-6, u_temperature_k=0.05))
         self.plan = plan
         self.places = [AtPose(plan, Circumstances(state, tuple(poses), warm), pose) for pose in poses]
@@ -113,9 +113,9 @@ def main(machines: int) -> None:
     )
 
 
-def _pose(turn: Floats, beside: float = 0.0) -> Pose:
+def _pose(turn: Floats, beside: float = 0.0) -> PartPose:
     middle = np.array([100.0, 50.0, 0.0])
-    return Pose(turn, np.array([400.0 + beside, 450.0, -450.0]) - turn @ middle)
+    return PartPose(turn, np.array([400.0 + beside, 450.0, -450.0]) - turn @ middle)
 
 
 def _orientations(plan: Plan, values: Floats, turns: Sequence[Floats], state: MachineState, truth: Floats, tips: Floats,
@@ -137,9 +137,9 @@ def _orientations(plan: Plan, values: Floats, turns: Sequence[Floats], state: Ma
     held, u = np.zeros((2, len(truth), len(values)))
     for m in range(len(truth)):
         off = random.standard_normal(2) * [U_BAR, U_RING]
-        standards = Standards(
-            Standard(BAR, U_BAR, BAR + off[0] + bars[m], of),
-            {"stylus": Standard(RING, U_RING, RING + off[1] + rings[m], of, inner=True)},
+        standards = CalibratedStandards(
+            CalibratedStandard(BAR, U_BAR, BAR + off[0] + bars[m], of),
+            {"stylus": CalibratedStandard(RING, U_RING, RING + off[1] + rings[m], of, inner=True)},
         )
         for i, one in enumerate(plan.characteristics):
             slope = Slopes(float(slopes.scale[i]), {"stylus": float(slopes.tips["stylus"][i])})
@@ -159,7 +159,9 @@ def _calibrated(plan: Plan, values: Floats, beside: float, state: MachineState, 
     for m in range(len(truth)):
         for i, one in enumerate(plan.characteristics):
             u_cal = U_CAL if one.what != "angle" else U_CAL / 100
-            known = Calibrated(values[i] + u_cal * random.standard_normal(), u_cal, angle=one.what == "angle")
+            known = CalibratedCharacteristic(
+                values[i] + u_cal * random.standard_normal(), u_cal, angle=one.what == "angle"
+            )
             found = by_calibrated_part(
                 one.name, values[i] + repeats[m, :, i], cycle, known, measured=values[i] + own[m, i]
             )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.base.points import Floats, Machine
@@ -70,7 +70,7 @@ def polar() -> list[Figure]:
         plan = Plan((spot, *_frame(around)), (Characteristic("p", "position", ("p",), ("A", "B", "C")),))
         measured = plan.points.copy()
         measured[plan.rows["p"], 0] = off
-        at = AtPose(plan, Circumstances(state, measured=measured), Pose())
+        at = AtPose(plan, Circumstances(state, measured=measured), PartPose())
         drawn = at.drawn(np.random.default_rng(9), TRIALS)
         values = 0.5 * at.read(drawn, exact=True)[:, 0]  # half of a position is the modulus
         where = "JCGM 102:2011, 9.3.2, r = 0"
@@ -105,7 +105,7 @@ def arcs() -> list[Figure]:
         plan = Plan(
             (Feature("c", "circle", radius * out, out, "stylus", nominal),), (Characteristic("c", "size", ("c",)),)
         )
-        at = AtPose(plan, Circumstances(state), Pose())
+        at = AtPose(plan, Circumstances(state), PartPose())
         u[degrees] = 0.5 * float(at.errors(at.drawn(np.random.default_rng(3), TRIALS // 4), exact=True).std())
     return [
         Figure("orders of magnitude of u of a circle by three points, 120° against 1° apart",

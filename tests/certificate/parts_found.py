@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from cmm_uq.analysis.parts.budget import budget, displaced
+from cmm_uq.analysis.parts.budget import point_errors, variance_shares
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.result import conforming, evaluated, stated
 from cmm_uq.analysis.parts.setup import circumstances_of, plan_of
 from cmm_uq.analysis.parts.virtual import Virtual
 from cmm_uq.analysis.parts.ways import ways
-from cmm_uq.app.commands.parts.part import COVERAGE, judged
+from cmm_uq.app.commands.parts.part import COVERAGE, decide_limits
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.part.measurement import Checked, PartFound, Standing, Unseen
+from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, UnseenError, VerificationCheck
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
@@ -29,13 +29,27 @@ ERRORS = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_zx", "sq
 TRAVEL = np.array([[0.0, 700.0], [0.0, 1000.0], [-600.0, 0.0]])
 DRAWS = 4000
 
-STANDING = Standing(
-    source="certificate", files=("machine/certificate.pdf",), number="K-2031", laboratory="Calibration laboratory",
-    machine="Portal 7", serial="1102", origin="measured", date=dt.date(2026, 3, 1), age=dt.timedelta(days=91),
-    valid_until=dt.date(2027, 2, 28), verdict="VERIFIED", checked=(Checked("files", 3), Checked("figures", 52)), again=False,
-    trusted=False, draft=False, given_recording=True, path=say("All errors are drawn together."),
-    drift=say("What changed since then is not reckoned with."), temperature_c=20.1,
-)  # fmt: skip
+STANDING = CertificateStatus(
+    source="certificate",
+    files=("machine/certificate.pdf",),
+    number="K-2031",
+    laboratory="Calibration laboratory",
+    machine="Portal 7",
+    serial="1102",
+    origin="measured",
+    date=dt.date(2026, 3, 1),
+    age=dt.timedelta(days=91),
+    valid_until=dt.date(2027, 2, 28),
+    verdict="VERIFIED",
+    checked=(VerificationCheck("files", 3), VerificationCheck("figures", 52)),
+    again=False,
+    trusted=False,
+    draft=False,
+    given_recording=True,
+    path=say("All errors are drawn together."),
+    drift=say("What changed since then is not reckoned with."),
+    temperature_c=20.1,
+)
 
 
 def machine(
@@ -63,7 +77,7 @@ def measured_points(job: PartJob, moved: Mapping[str, Sequence[float]] | None = 
 def found_of(
     job: PartJob | None = None, *, points: Floats | None = None, state: MachineState | None = None, draws: int = DRAWS,
     **changes: Any,
-) -> PartFound:  # fmt: skip
+) -> PartMeasurement:  # fmt: skip
     """A part's measurement; without points one that is planned.
 
     Parameters
@@ -80,15 +94,15 @@ def found_of(
     blocks = iter((errors.T,))
     simulated = from_source(Source(virtual.names, lambda _random, _n: next(blocks)), draws, COVERAGE, 0)
     values = None if points is None else evaluated(plan, points)
-    shares = budget(virtual, 1024)
+    shares = variance_shares(virtual, 1024)
     unseen = tuple(
-        Unseen(name, line, line.partition(": ")[2], title_of(line.partition(": ")[2]), share, why)
+        UnseenError(name, line, line.partition(": ")[2], title_of(line.partition(": ")[2]), share, why)
         for name in shares.characteristics for line, share, why in shares.told(name, virtual.named, 0.05)
     )  # fmt: skip
     together = None if values is None else conforming(plan, errors, values)[1]
-    found = PartFound(
+    found = PartMeasurement(
         job, plan, given, virtual, simulated, stated(simulated, values), values, shares, unseen, None,
-        judged(job, plan, errors, values), None if together is None or np.isnan(together) else together,
-        tuple(ways(plan, given, 1000)), displaced(virtual, 200), (300.0, 450.0, -500.0), STANDING,
+        decide_limits(job, plan, errors, values), None if together is None or np.isnan(together) else together,
+        tuple(ways(plan, given, 1000)), point_errors(virtual, 200), (300.0, 450.0, -500.0), STANDING,
     )  # fmt: skip
     return replace(found, **changes)

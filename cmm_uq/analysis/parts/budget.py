@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Drawn
+from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause
 from cmm_uq.analysis.parts.virtual import AtPose, Virtual, in_parts
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
@@ -31,7 +31,7 @@ PLACE = "place on the table"
 
 
 @dataclass(frozen=True, eq=False)
-class Budget:
+class VarianceShares:
     """Shares of the variance of c characteristics."""
 
     characteristics: tuple[str, ...]  # c names
@@ -70,13 +70,13 @@ class Budget:
         return self.factors[max(own, key=lambda i: self.within[i, column])] if own else cause
 
 
-def line_of(cause: Cause) -> str:
+def line_of(cause: PartCause) -> str:
     """The line of the budget by cause that a cause belongs to."""
     names = set(cause.factors)
     return f"{cause.name}: {names.pop()}" if len(names) == 1 else cause.name
 
 
-def budget(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Budget:
+def variance_shares(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> VarianceShares:
     """Shares of the variance of each characteristic."""
     random, places = np.random.default_rng(seed), virtual.places
     each = max(2, draws // len(places))
@@ -105,19 +105,21 @@ def budget(virtual: Virtual, draws: int = DRAWS, seed: int = 0) -> Budget:
     total = [0.5 * np.mean((y - yA) ** 2, axis=0) / variance for y in mixed]
     factors, within = _within(several, [np.concatenate(own) for own in zip(*drawn, strict=True)], yA)
     names = (*lines, PLACE) if len(places) > 1 else tuple(lines)
-    return Budget(tuple(virtual.names), names, np.array(first), np.array(total), factors, within, np.sqrt(variance))
+    return VarianceShares(
+        tuple(virtual.names), names, np.array(first), np.array(total), factors, within, np.sqrt(variance)
+    )
 
 
 def _errors(places: Sequence[AtPose], coefficients: Sequence[Sequence[Drawn]], exact: bool) -> Floats:
     return np.concatenate([place.errors(given, exact=exact) for place, given in zip(places, coefficients, strict=True)])
 
 
-def _exchanged(A: Sequence[Drawn], B: Sequence[Drawn], causes: Sequence[Cause], line: str) -> list[Drawn]:
+def _exchanged(A: Sequence[Drawn], B: Sequence[Drawn], causes: Sequence[PartCause], line: str) -> list[Drawn]:
     """The first coefficients with those of one line from the second."""
     return [b if line_of(cause) == line else a for a, b, cause in zip(A, B, causes, strict=True)]
 
 
-def _within(causes: Sequence[Cause], drawn: Sequence[Floats], y: Floats) -> tuple[tuple[str, ...], Floats]:
+def _within(causes: Sequence[PartCause], drawn: Sequence[Floats], y: Floats) -> tuple[tuple[str, ...], Floats]:
     """Names of factors of causes, and their shares (f, c)."""
     names, shares = list[str](), list[Floats]()
     centred = y - y.mean(axis=0)
@@ -135,20 +137,20 @@ def _within(causes: Sequence[Cause], drawn: Sequence[Floats], y: Floats) -> tupl
     return tuple(names), np.array(shares).reshape(len(names), y.shape[1])
 
 
-DISPLACED_DRAWS = 2_000  # A standard deviation is then known to two percent
+POINT_DRAWS = 2_000  # A standard deviation is then known to two percent
 _BLOCK = 300_000  # coordinates drawn at once
 _NEGLIGIBLE = 1e-9  # of the largest, a singular value of rigid motions that points do not tell from others
 
 
 @dataclass(frozen=True, eq=False)
-class Displaced:
+class PointErrors:
     """Errors of points: indicated less true, in the frame of the part."""
 
     mean: Floats  # (n, 3) mm
     covariance: Floats  # (n, 3, 3) of each point, mm²
 
 
-def displaced(virtual: Virtual, draws: int = DISPLACED_DRAWS, seed: int = 0) -> Displaced:
+def point_errors(virtual: Virtual, draws: int = POINT_DRAWS, seed: int = 0) -> PointErrors:
     """Mean and covariance of the error of each point, each place as often as the others."""
     points, random = virtual.plan.points, np.random.default_rng(seed)
     n = len(points)
@@ -165,7 +167,7 @@ def displaced(virtual: Virtual, draws: int = DISPLACED_DRAWS, seed: int = 0) -> 
             second += np.einsum("kni,knj->nij", off, off)
             total += count
     mean = first / total
-    return Displaced(mean, second / total - mean[:, :, None] * mean[:, None, :])
+    return PointErrors(mean, second / total - mean[:, :, None] * mean[:, None, :])
 
 
 def _rigid(points: Floats) -> Floats:

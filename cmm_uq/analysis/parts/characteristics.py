@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cmm_uq.analysis.parts.association import VALUES, Features
-from cmm_uq.analysis.parts.datums import BEST_FIT, Frame
+from cmm_uq.analysis.parts.datums import BEST_FIT, PartFrame
 from cmm_uq.analysis.parts.plan import (
     DIRECTED,
     FORMS,
@@ -55,15 +55,15 @@ FORM_OF: Mapping[str, tuple[FeatureKind, ...]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredFeatures:
     """Features and frames of N virtual measurements."""
 
     features: Mapping[Key, Features]  # by name and association
-    frames: Mapping[tuple[str, ...], Frame]  # of the part, by names of datums
+    frames: Mapping[tuple[str, ...], PartFrame]  # of the part, by names of datums
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class CharacteristicEvaluation:
     """How one characteristic follows from features."""
 
     characteristic: Characteristic
@@ -103,16 +103,16 @@ class Evaluation:
             return True
         return self.feature.kind == "plane" and what in (*ORIENTATIONS, "position")
 
-    def __call__(self, measured: Measured) -> Floats:
+    def __call__(self, measured: MeasuredFeatures) -> Floats:
         """Values (N,), mm or rad."""
         what = self.characteristic.what
         return np.asarray(_OF[what](self, measured), dtype=np.float64)
 
-    def first(self, measured: Measured) -> Features:
+    def first(self, measured: MeasuredFeatures) -> Features:
         """Its first feature."""
         return measured.features[self.keys[0]]
 
-    def frame(self, measured: Measured) -> Frame:
+    def frame(self, measured: MeasuredFeatures) -> PartFrame:
         """The frame of its datums."""
         return measured.frames[self.frame_of]
 
@@ -188,9 +188,9 @@ def never_negative(plan: Plan) -> NDArray[np.bool_]:
 def _coinciding(one: Characteristic, plan: Plan) -> bool:
     if one.what not in RELATIONS or len(one.features) < 2:
         return False
-    of = Evaluation(one, plan, {})
+    of = CharacteristicEvaluation(one, plan, {})
     nominal = {key: Features(_values(plan.feature(key[0]))) for key in of.keys}
-    return bool(of(Measured(nominal, {}))[0] < _COINCIDE)
+    return bool(of(MeasuredFeatures(nominal, {}))[0] < _COINCIDE)
 
 
 def _values(feature: Feature) -> Floats:
@@ -199,15 +199,15 @@ def _values(feature: Feature) -> Floats:
     return np.hstack([place, np.zeros(3) if direction is None else direction, np.zeros(VALUES - 6)])[None]
 
 
-def _size(of: Evaluation, measured: Measured) -> Floats:
+def _size(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     return of.first(measured).diameter
 
 
-def _form(of: Evaluation, measured: Measured) -> Floats:
+def _form(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     return of.first(measured).form
 
 
-def _distance(of: Evaluation, measured: Measured) -> Floats:
+def _distance(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Along the normal of a plane, else across an axis, else between two places; of two alike, the first's."""
     first, second = of.characteristic.features
     kinds = [of.plan.feature(name).kind for name in (first, second)]
@@ -222,7 +222,7 @@ def _distance(of: Evaluation, measured: Measured) -> Floats:
     return np.asarray(np.linalg.norm(apart, axis=1))
 
 
-def _angle(of: Evaluation, measured: Measured) -> Floats:
+def _angle(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Between two directions, in the sense of the nominal ones; of a single cone its whole angle."""
     if len(of.keys) == 1:
         return np.asarray(2 * measured.features[of.keys[0]].values[:, 7])
@@ -230,7 +230,7 @@ def _angle(of: Evaluation, measured: Measured) -> Floats:
     return _between(one, other)
 
 
-def _orientation(of: Evaluation, measured: Measured) -> Floats:
+def _orientation(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Width of the zone that has its nominal angle to the first datum."""
     own, datum = of.first(measured), measured.features[of.datums[0]].direction
     cosine = float(of.nominal[of.feature.name].direction[0] @ of.nominal[of.characteristic.datums[0]].direction[0])
@@ -253,7 +253,7 @@ def _orientation(of: Evaluation, measured: Measured) -> Floats:
     return np.asarray(np.ptp(np.einsum("npi,ni->np", own.points, tilted), axis=1))
 
 
-def _position(of: Evaluation, measured: Measured) -> Floats:
+def _position(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Twice the largest distance from the nominal place, in the frame of the datums."""
     own, frame, nominal = of.first(measured), of.frame(measured), of.nominal[of.feature.name]
     place, direction = nominal.position[0], nominal.direction[0]
@@ -267,7 +267,7 @@ def _position(of: Evaluation, measured: Measured) -> Floats:
     return np.asarray(2 * np.linalg.norm(off, axis=1))
 
 
-def _coaxiality(of: Evaluation, measured: Measured) -> Floats:
+def _coaxiality(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Twice the largest distance of the axis, or of the centre, from that of the datum."""
     own, datum = of.first(measured), measured.features[of.datums[0]]
     off = own.position - datum.position
@@ -276,12 +276,12 @@ def _coaxiality(of: Evaluation, measured: Measured) -> Floats:
     return np.asarray(2 * np.linalg.norm(off - _along(off, datum.direction), axis=1))
 
 
-def _coordinate(of: Evaluation, measured: Measured) -> Floats:
+def _coordinate(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     at = of.frame(measured).points(of.place(of.feature.name, of.first(measured)))
     return np.asarray(at[:, AXES.index(of.characteristic.what)])
 
 
-def _runout(of: Evaluation, measured: Measured) -> Floats:
+def _runout(of: CharacteristicEvaluation, measured: MeasuredFeatures) -> Floats:
     """Largest range in a section of the points' distances from the datum axis, or along it where they are of a plane."""
     own, datum = of.first(measured), measured.features[of.datums[0]]
     apart = own.points - datum.position[:, None]
@@ -292,7 +292,7 @@ def _runout(of: Evaluation, measured: Measured) -> Floats:
     return np.asarray(np.max([np.ptp(seen[:, rows], axis=1) for rows in of.sections], axis=0))
 
 
-_OF: Mapping[str, Callable[[Evaluation, Measured], Floats]] = {
+_OF: Mapping[str, Callable[[CharacteristicEvaluation, MeasuredFeatures], Floats]] = {
     "size": _size, "distance": _distance, "angle": _angle, "position": _position, "coaxiality": _coaxiality,
     **dict.fromkeys(FORMS, _form), **dict.fromkeys(ORIENTATIONS, _orientation), **dict.fromkeys(AXES, _coordinate),
     **dict.fromkeys(RUNOUTS, _runout),

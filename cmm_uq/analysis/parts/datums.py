@@ -31,7 +31,7 @@ _AXES: tuple[FeatureKind, ...] = ("line", "circle", "cylinder", "cone")
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class PartFrame:
     """From measured coordinates to those of the part: x → (x − origin) · turn + nominal origin."""
 
     turn: Floats  # (N, 3, 3)
@@ -88,12 +88,12 @@ class BestFit:
                 break
         return motion
 
-    def frame(self, motion: Floats) -> Frame:
+    def frame(self, motion: Floats) -> PartFrame:
         """The frame that takes a motion (N, 6) back."""
         from scipy.spatial.transform import Rotation
 
         turn = Rotation.from_rotvec(motion[:, 3:]).as_matrix()
-        return Frame(turn, self.middle + motion[:, :3], self.middle)
+        return PartFrame(turn, self.middle + motion[:, :3], self.middle)
 
 
 class DatumSystem:
@@ -116,11 +116,11 @@ class DatumSystem:
         self._to = self._origins(self.nominal, one)[0]
         self._turn = one[0]
 
-    def frames(self, measured: Sequence[Features]) -> Frame:
+    def frames(self, measured: Sequence[Features]) -> PartFrame:
         """The frames of measured datums, in the order of the datums."""
         each = _members(measured)
         turn = self._rotations(each)
-        return Frame(np.swapaxes(turn, 1, 2) @ self._turn, self._origins(each, turn), self._to)
+        return PartFrame(np.swapaxes(turn, 1, 2) @ self._turn, self._origins(each, turn), self._to)
 
     def _choose(self) -> None:
         """The datum that fixes two rotations, and what fixes the third: a direction, or where one lies from one before."""

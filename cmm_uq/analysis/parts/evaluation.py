@@ -14,8 +14,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from cmm_uq.analysis.parts.association import VALUES, Features, ProbedFeature
-from cmm_uq.analysis.parts.causes.cause import Cause, Drawn, Rows
-from cmm_uq.analysis.parts.characteristics import Evaluation, Key, Measured
+from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause, Rows
+from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation, Key, MeasuredFeatures
 from cmm_uq.analysis.parts.common_datums import ProbedCommon
 from cmm_uq.analysis.parts.datums import BEST_FIT, BestFit, DatumSystem
 from cmm_uq.analysis.parts.plan import FORMS, Feature, Plan
@@ -67,7 +67,7 @@ class Evaluator:
     """
 
     def __init__(
-        self, plan: Plan, base: Floats, causes: Sequence[Cause | None], known: Known | None = None,
+        self, plan: Plan, base: Floats, causes: Sequence[PartCause | None], known: Known | None = None,
         along: Collection[str] = (),
     ) -> None:  # fmt: skip
         self.plan, self.base, self.causes, self.along = plan, base, causes, along
@@ -75,7 +75,7 @@ class Evaluator:
         self._followed: dict[object, tuple[Floats, Floats]] = {}
         asked = [name for one in plan.characteristics for name in (*one.features, *one.datums)]
         self.nominal = {name: self._nominal(name) for name in dict.fromkeys((*asked, *plan.alignment.datums))}
-        self.evaluations = [Evaluation(one, plan, self.nominal) for one in plan.characteristics]
+        self.evaluations = [CharacteristicEvaluation(one, plan, self.nominal) for one in plan.characteristics]
         self.keys = list(dict.fromkeys(key for one in self.evaluations for key in (*one.keys, *one.datums)))
         self.of_points = {one.keys[0] for one in self.evaluations if one.of_points}
         self.seen = {one.keys[0] for one in self.evaluations if one.of_points and one.characteristic.what not in FORMS}
@@ -164,7 +164,7 @@ class Evaluator:
                 if movement.whole is None
                 else self.best_fit.motion(self.base + movement.whole)
             )
-        measured = Measured(features, frames)
+        measured = MeasuredFeatures(features, frames)
         return np.column_stack([one(measured) for one in asked])
 
     def needed(self, movement: Movement, only: int) -> Movement:

@@ -24,7 +24,7 @@ _SIDEWAYS = 1e-6  # component of a normal below which an axis does not move into
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class PartPose:
     """A place on the table: coordinates of the machine = rotation · those of the part + translation."""
 
     rotation: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3), proper
@@ -50,7 +50,9 @@ class Pose:
         return np.asarray(vectors @ self.rotation)
 
 
-def around(pose: Pose, u_translation_mm: Floats, u_angles_rad: Floats, count: int, seed: int = 0) -> tuple[Pose, ...]:
+def around(
+    pose: PartPose, u_translation_mm: Floats, u_angles_rad: Floats, count: int, seed: int = 0
+) -> tuple[PartPose, ...]:
     """So many places where a part may lie that is put near one: normal in all six.
 
     ``u_translation_mm``: (3,) standard deviations. ``u_angles_rad``: (3,) of small rotations about the axes of the machine.
@@ -60,7 +62,7 @@ def around(pose: Pose, u_translation_mm: Floats, u_angles_rad: Floats, count: in
     random, poses = np.random.default_rng(seed), []
     for moved, turned in zip(random.standard_normal((count, 3)), random.standard_normal((count, 3)), strict=True):
         turn = Rotation.from_rotvec(turned * u_angles_rad).as_matrix()
-        poses.append(Pose(turn @ pose.rotation, pose.translation_mm + moved * u_translation_mm))
+        poses.append(PartPose(turn @ pose.rotation, pose.translation_mm + moved * u_translation_mm))
     return tuple(poses)
 
 
@@ -78,7 +80,7 @@ class WithStyli(Machine):
         return cls(**own | {"tip_on_every_carriage": True})
 
 
-def placed(plan: Plan, pose: Pose, machine: Machine, columns: Mapping[str, Floats | float] | None = None) -> Points:
+def placed(plan: Plan, pose: PartPose, machine: Machine, columns: Mapping[str, Floats | float] | None = None) -> Points:
     """The plan's points as the machine stands at them: the centres of the tip, with their normals, travel, tips and times.
 
     ``columns``: further columns of effects, by name, (n,) or a number for all: temperatures.

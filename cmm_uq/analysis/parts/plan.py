@@ -162,7 +162,7 @@ class CommonDatum:
 
 
 @dataclass(frozen=True)
-class Alignment:
+class PartAlignment:
     """How the coordinates of the part follow from measured points."""
 
     # names of features in order of precedence: each fixes of rotation and translation what those before it left free (ISO
@@ -216,7 +216,7 @@ class Plan:
     features: tuple[Feature, ...]
     characteristics: tuple[Characteristic, ...]
     styli: tuple[Stylus, ...] = (Stylus("stylus"),)
-    alignment: Alignment = field(default_factory=Alignment)
+    alignment: PartAlignment = field(default_factory=PartAlignment)
     order: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     times_s: Floats = field(default_factory=lambda: np.zeros(0))
     common: tuple[CommonDatum, ...] = ()

@@ -31,7 +31,7 @@ FEWEST = 500  # draws that are possible, from which on a probability is taken fr
 
 
 @dataclass(frozen=True)
-class Stated:
+class StatedCharacteristic:
     """One characteristic."""
 
     name: str
@@ -54,7 +54,7 @@ class Stated:
 
 def stated(
     simulated: Simulated, measured: Floats | None = None, plan: Plan | None = None, errors: Floats | None = None
-) -> tuple[Stated, ...]:
+) -> tuple[StatedCharacteristic, ...]:
     """Every characteristic, of its errors in virtual measurements and its measured values (c,).
 
     Parameters
@@ -78,7 +78,7 @@ def stated(
             value = max(0.0, value)
             low, high = interval
             k = max(k, 0.5 * (high - low) / u, (high - value) / u if low <= 0 else 0.0) if u else k
-        found.append(Stated(name, value, error, u, interval, k))
+        found.append(StatedCharacteristic(name, value, error, u, interval, k))
     return tuple(found)
 
 

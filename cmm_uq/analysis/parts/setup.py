@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Scatter
+from cmm_uq.analysis.parts.causes.cause import PartCause, PointScatter
 from cmm_uq.analysis.parts.causes.condensing import LARGE
-from cmm_uq.analysis.parts.causes.form import Form
+from cmm_uq.analysis.parts.causes.form import SurfaceForm
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState
-from cmm_uq.analysis.parts.placing import Pose, around, placed
-from cmm_uq.analysis.parts.plan import Alignment, Characteristic, CommonDatum, Feature, Nominal, Plan, Stylus
+from cmm_uq.analysis.parts.placing import PartPose, around, placed
+from cmm_uq.analysis.parts.plan import Characteristic, CommonDatum, Feature, Nominal, PartAlignment, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import Circumstances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine
@@ -45,7 +45,7 @@ def plan_of(job: PartJob) -> Plan:
         features,
         tuple(_characteristic(one) for one in facts.characteristic),
         tuple(_stylus(one) for one in facts.stylus),
-        Alignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
+        PartAlignment(tuple(facts.alignment.datums), facts.alignment.best_fit),
         rows.astype(np.int64),
         times,
         _common(job),
@@ -99,10 +99,10 @@ def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: in
     )  # fmt: skip
 
 
-def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[Pose, ...]:
+def poses_of(job: PartJob, count: int, machine: Machine) -> tuple[PartPose, ...]:
     """Where the part lies: the one place that is stated, or so many where it may lie."""
     given = job.facts.placing
-    pose = Pose(rotation(given), origin_of(job, machine))
+    pose = PartPose(rotation(given), origin_of(job, machine))
     if not (any(given.u_origin_mm) or any(given.u_rotation_deg)):
         return (pose,)
     return around(pose, np.array(given.u_origin_mm), np.radians(given.u_rotation_deg), count)
@@ -135,28 +135,28 @@ def surroundings_of(job: PartJob) -> Surroundings:
     return Surroundings(part, (x, y, z), np.array(given.u_gradient_k_per_m), given.u_drift_k)
 
 
-def forms_of(job: PartJob) -> tuple[Form, ...]:
+def forms_of(job: PartJob) -> tuple[SurfaceForm, ...]:
     """Form of each feature: its own, else that of all."""
     found = []
     for one in job.features:
         given = one.facts.form or job.facts.form
         lobed = one.facts.kind in _LOBED
         harmonics = tuple((int(count), size) for count, size in given.harmonics_um.items()) if lobed else ()
-        form = Form(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
+        form = SurfaceForm(one.facts.name, harmonics, given.field_um, given.correlation_mm, given.roughness_um)
         if form.field_um or form.harmonics_um or form.roughness_um:
             found.append(form)
     return tuple(found)
 
 
-def clamping_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+def clamping_of(job: PartJob, plan: Plan) -> tuple[PartCause, ...]:
     """What clamping does to each point on its own; none where nothing is stated."""
     size = MICROMETRE * job.facts.placing.u_fixture_um
-    return (Scatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
+    return (PointScatter.of("fixture", "fixture", np.full((len(plan.points), 3), size)),) if size else ()
 
 
-def operators_of(job: PartJob, plan: Plan) -> tuple[Cause, ...]:
+def operators_of(job: PartJob, plan: Plan) -> tuple[PartCause, ...]:
     """What who measures does to each point, and to characteristics; none where nothing is stated."""
-    found: list[Cause] = []
+    found: list[PartCause] = []
     if job.facts.probing.u_operator_um:
         found.append(of_points(plan, job.facts.probing.u_operator_um))
     stated = {

@@ -17,16 +17,16 @@ from functools import cache, cached_property, partial
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Common, Drawn, normal
+from cmm_uq.analysis.parts.causes.cause import CommonCause, Drawn, PartCause, normal
 from cmm_uq.analysis.parts.causes.condensing import LARGE, condensed
-from cmm_uq.analysis.parts.causes.form import Form, forms, whole_surfaces
+from cmm_uq.analysis.parts.causes.form import SurfaceForm, forms, whole_surfaces
 from cmm_uq.analysis.parts.causes.machine import mean_errors, modelled, noise, not_modelled
 from cmm_uq.analysis.parts.causes.stylus import Qualified, styli
-from cmm_uq.analysis.parts.causes.surroundings import Beside, Surroundings, mean_expansion, temperatures
+from cmm_uq.analysis.parts.causes.surroundings import Reproducibility, Surroundings, mean_expansion, temperatures
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.evaluation import Evaluator, Known, Movement, characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState
-from cmm_uq.analysis.parts.placing import Pose, placed
+from cmm_uq.analysis.parts.placing import PartPose, placed
 from cmm_uq.analysis.parts.plan import FORMS, Plan
 from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, trial_parts
 from cmm_uq.base.messages import Text
@@ -70,11 +70,11 @@ class Circumstances:
     """
 
     machine: MachineState
-    poses: tuple[Pose, ...] = (Pose(),)
+    poses: tuple[PartPose, ...] = (PartPose(),)
     surroundings: Surroundings = field(default_factory=Surroundings)
-    forms: tuple[Form, ...] = ()
+    forms: tuple[SurfaceForm, ...] = ()
     repeats: int = 1
-    further: tuple[Cause, ...] = ()
+    further: tuple[PartCause, ...] = ()
     measured: Floats | None = None
 
 
@@ -88,7 +88,7 @@ class AtPose:
     """
 
     def __init__(
-        self, plan: Plan, given: Circumstances, pose: Pose, known: Known | None = None, pilot: int = PILOT
+        self, plan: Plan, given: Circumstances, pose: PartPose, known: Known | None = None, pilot: int = PILOT
     ) -> None:
         surroundings = given.surroundings.since(given.machine.temperature_c)
         self.points = points = placed(plan, pose, given.machine.machine, surroundings.columns)
@@ -96,7 +96,7 @@ class AtPose:
         unmodelled, self.lacking = not_modelled(given.machine, qualified, pose)
         own, on_surface = forms(given.forms, plan)
         beside = None if given.measured is None else given.measured - plan.points
-        self.causes: list[Cause] = [
+        self.causes: list[PartCause] = [
             modelled(given.machine, qualified, pose, beside),
             *unmodelled,
             *noise(given.machine, points, pose, given.repeats, int(plan.order[0]) if len(plan.order) else 0),
@@ -126,7 +126,7 @@ class AtPose:
         self._known = known
         if drawn:
             true = whole_surfaces(plan)
-            still: list[Cause | None] = [None] * (len(self.causes) - len(own))
+            still: list[PartCause | None] = [None] * (len(self.causes) - len(own))
             self.true = Evaluator(true, np.zeros_like(true.points), [*still, *on_surface], known)
 
     def condensed(self) -> AtPose:
@@ -184,7 +184,7 @@ class AtPose:
         """(n, c) of causes that move no point."""
         found = np.zeros((len(coefficients[0]), len(self.still)))
         for cause, drawn in zip(self.causes, coefficients, strict=True):
-            if isinstance(cause, Beside):
+            if isinstance(cause, Reproducibility):
                 found += np.asarray(drawn) @ cause.adds
         return found
 
@@ -267,9 +267,9 @@ def _affordable(pilot: int, plan: Plan) -> int:
     return max(pilot // 4, min(pilot, pilot * LARGE // len(plan.points)))
 
 
-def _multiples(deviations: Floats) -> Common:
+def _multiples(deviations: Floats) -> CommonCause:
     """Deviations (n, 3) of a part, as often again as the coefficient says."""
-    return Common(name="part", factors=("deviations",), draw=normal(np.zeros(1)), basis=deviations[None])
+    return CommonCause(name="part", factors=("deviations",), draw=normal(np.zeros(1)), basis=deviations[None])
 
 
 def _made(block: _PilotBlock) -> tuple[Movement, Floats]:

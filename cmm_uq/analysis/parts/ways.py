@@ -11,7 +11,7 @@ import numpy as np
 
 from cmm_uq.analysis.parts.causes.machine import NOISE
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, OPERATOR
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances, Virtual, in_parts
 from cmm_uq.base.errors import CmmUqError
@@ -161,8 +161,8 @@ def _quick(place: AtPose, seed: int) -> Floats:
     return np.asarray(np.concatenate(errors).std(axis=0))
 
 
-def _turned(pose: Pose, turn: Floats, plan: Plan) -> Pose:
+def _turned(pose: PartPose, turn: Floats, plan: Plan) -> PartPose:
     """The part turned about its middle."""
     middle = pose.of(plan.points.mean(axis=0))
     rotation = turn @ pose.rotation
-    return Pose(rotation, middle - rotation @ plan.points.mean(axis=0))
+    return PartPose(rotation, middle - rotation @ plan.points.mean(axis=0))

@@ -219,13 +219,13 @@ def part(
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
     from cmm_uq.app.api.outcomes import Part
-    from cmm_uq.app.commands.parts.documents import Asked, found_of
+    from cmm_uq.app.commands.parts.documents import PartOptions, evaluate
     from cmm_uq.app.commands.parts.documents import in_language as told_in
     from cmm_uq.jobs.part.job import PartJob, read_part
 
     read = told_in(job if isinstance(job, PartJob) else read_part(Path(job)), language)
     trusted = None if trust is None else tuple(map(Path, trust))
-    return Part(found_of(read, Asked(seed, trials, digits, rerun, trusted, records)))
+    return Part(evaluate(read, PartOptions(seed, trials, digits, rerun, trusted, records)))
 
 
 def prove(
@@ -247,11 +247,10 @@ def prove(
     ------
     CmmUqError : the job has an analysis of its own, or neither recording nor stated noise.
     """
-    from cmm_uq.app.commands.prove import ProofOptions as Asked
-    from cmm_uq.app.commands.prove import prove_outcome
+    from cmm_uq.app.commands.prove import ProofOptions, prove_outcome
     from cmm_uq.laboratory.schedule.processes import processes
 
-    asked = Asked(cases, processes() if workers is None else workers, seed, alpha)
+    asked = ProofOptions(cases, processes() if workers is None else workers, seed, alpha)
     return Proof(prove_outcome(in_language(_job(job), language), asked))
 
 

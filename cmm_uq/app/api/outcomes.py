@@ -20,7 +20,7 @@ from cmm_uq.base.messages import html_table
 from cmm_uq.base.units import printed_unit
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.part.figures import part_summary
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import part_results
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
@@ -299,7 +299,7 @@ class Part:
     found : all of it.
     """
 
-    found: PartFound
+    found: PartMeasurement
 
     @property
     def job(self) -> PartJob:

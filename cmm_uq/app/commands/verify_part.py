@@ -202,7 +202,7 @@ def part_again(
     ------
     CmmUqError : they give nothing.
     """
-    from cmm_uq.app.commands.parts.documents import Asked, contents_of, found_of
+    from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, evaluate
     from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 
     said, simulation = data["machine"], data["simulation"]
@@ -215,11 +215,11 @@ def part_again(
         inquiry.notes.append(
             "The machine's changes since its calibration follow from its history inside, as records had it."
         )
-    asked = Asked(
+    asked = PartOptions(
         _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
         _asked_again(said), tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
-    found = found_of(job, asked, stage)
+    found = evaluate(job, asked, stage)
     return contents_of(found, stage, finished=finished), tuple(found.files)
 
 

@@ -13,8 +13,8 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.part.figures import Figures, by_margin, critical, figures_of
-from cmm_uq.certificate.part.measurement import PartFound, Unseen
+from cmm_uq.certificate.part.figures import CharacteristicFigures, by_margin, critical, figures_of
+from cmm_uq.certificate.part.measurement import PartMeasurement, UnseenError
 from cmm_uq.certificate.part.plots import shares_plots
 
 DETAILED = 10  # characteristics whose budgets are listed line by line: those of least margin
@@ -30,7 +30,7 @@ def line_words(line: str) -> Text:
     return line_in_words(line, {factor: title_of(factor)} if factor else {})
 
 
-def budget_section(found: PartFound) -> Section:
+def budget_section(found: PartMeasurement) -> Section:
     """Shares of the variance: a picture of all characteristics, and lines of those of least margin."""
     budget, every = found.budget, figures_of(found)
     if not budget.causes:
@@ -47,7 +47,7 @@ def budget_section(found: PartFound) -> Section:
     return Section(say("What the uncertainty is made of"), tuple(blocks))
 
 
-def by_family(found: PartFound) -> tuple[list[str], Floats]:
+def by_family(found: PartMeasurement) -> tuple[list[str], Floats]:
     """Names of the causes, largest over all first, and their total shares (g, c) over the sum of these."""
     budget = found.budget
     names = list(dict.fromkeys(family_of(line) for line in budget.causes))
@@ -60,7 +60,7 @@ def by_family(found: PartFound) -> tuple[list[str], Floats]:
     return [names[g] for g in order], shares[order]
 
 
-def largest_words(one: Figures) -> Text:
+def largest_words(one: CharacteristicFigures) -> Text:
     """The largest line of a budget, in a sentence."""
     budget = one.found.budget
     line = budget.worst(one.stated.name)
@@ -68,7 +68,7 @@ def largest_words(one: Figures) -> Text:
                name=one.called, cause=line_words(line), share=_percent(share_of(one, line)))  # fmt: skip
 
 
-def share_of(one: Figures, line: str) -> float:
+def share_of(one: CharacteristicFigures, line: str) -> float:
     """Share of a line, or of a factor of the machine, in the variance of a characteristic."""
     return one.found.budget.share(line, one.place)
 
@@ -78,7 +78,7 @@ def _percent(share: float) -> Number:
     return signed(100 * share, ".0f") if abs(share) >= 0.1 else signed(100 * share, ".2g")
 
 
-def _lines(detailed: list[Figures], count: int) -> Table:
+def _lines(detailed: list[CharacteristicFigures], count: int) -> Table:
     rows = [row for one in detailed for row in _budget(one)]
     columns = (
         Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Cause"), numeric=False),
@@ -96,14 +96,14 @@ def _lines(detailed: list[Figures], count: int) -> Table:
     return Table(say("Budget by cause"), columns, tuple(rows), tuple(notes))
 
 
-def _chosen(shown: list[Figures]) -> Text:
+def _chosen(shown: list[CharacteristicFigures]) -> Text:
     """Which characteristics are shown of more."""
     if shown[0].found.nearest is None:
         return say("Shown are the first {count} characteristics.", count=len(shown))
     return say("Shown are the {count} characteristics with the least margin.", count=len(shown))
 
 
-def _budget(one: Figures) -> Iterable[tuple[Text, ...]]:
+def _budget(one: CharacteristicFigures) -> Iterable[tuple[Text, ...]]:
     budget = one.found.budget
     first, total = budget.first[:, one.place], budget.total[:, one.place]
     order = np.argsort(-total, kind="stable").tolist()
@@ -130,7 +130,7 @@ def _above(shares: Floats) -> float:
     return float((np.floor(top / place) + 1) * place)
 
 
-def _factors(detailed: list[Figures]) -> Table:
+def _factors(detailed: list[CharacteristicFigures]) -> Table:
     """Within the machine, what hangs together by its calibration."""
     budget = detailed[0].found.budget
     rows: list[tuple[Text, ...]] = []
@@ -153,7 +153,7 @@ def _factors(detailed: list[Figures]) -> Table:
     return Table(say("Errors that are known together, by name"), columns, tuple(rows), (note,))
 
 
-def unseen_section(found: PartFound) -> Section:
+def unseen_section(found: PartMeasurement) -> Section:
     """What the calibration left free or did not see, named, with its share and what to measure."""
     if not found.unseen:
         return Section(say("What the calibration did not see"), ())
@@ -177,20 +177,20 @@ def unseen_section(found: PartFound) -> Section:
     return Section(say("What the calibration did not see"), tuple(blocks))
 
 
-def _by_effect(unseen: Iterable[Unseen]) -> list[list[Unseen]]:
+def _by_effect(unseen: Iterable[UnseenError]) -> list[list[UnseenError]]:
     """What is told of one effect together, each largest share first."""
-    found: dict[str, list[Unseen]] = {}
+    found: dict[str, list[UnseenError]] = {}
     for one in unseen:
         found.setdefault(one.line, []).append(one)
     each = [sorted(own, key=lambda one: -one.share) for own in found.values()]
     return sorted(each, key=lambda own: -own[0].share)
 
 
-def _called(one: Unseen) -> Text:
+def _called(one: UnseenError) -> Text:
     return say("characteristic {name}", name=Verbatim(one.characteristic))
 
 
-def _whose(own: list[Unseen]) -> Text:
+def _whose(own: list[UnseenError]) -> Text:
     first = _called(own[0])
     if len(own) == 1:
         return first
@@ -198,14 +198,14 @@ def _whose(own: list[Unseen]) -> Text:
                   many=say("{name}, and {count} more", name=first, count=len(own) - 1))  # fmt: skip
 
 
-def unseen_words(found: PartFound) -> Text:
+def unseen_words(found: PartMeasurement) -> Text:
     """The gravest of it in a sentence."""
     most = _by_effect(found.unseen)[0][0]
     return say("{share} % of the variance of {name} comes from {error:small}: {why}.", share=_percent(most.share),
                name=_called(most), error=most.title, why=most.why)  # fmt: skip
 
 
-def ways_section(found: PartFound) -> Section:
+def ways_section(found: PartMeasurement) -> Section:
     """What would make the uncertainties smaller, each way alone."""
     if len(found.ways) < 2:
         return Section(say("What would reduce it"), ())
@@ -229,7 +229,7 @@ def ways_section(found: PartFound) -> Section:
     return Section(say("What would reduce it"), (*told, Table(say("Ways to measure"), columns, rows, tuple(notes))))
 
 
-def best_words(one: Figures) -> Text:
+def best_words(one: CharacteristicFigures) -> Text:
     """The way that helps a characteristic most, in a sentence."""
     planned, *others = one.found.ways
     now = float(planned.u[one.place])

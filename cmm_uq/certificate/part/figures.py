@@ -14,11 +14,11 @@ import numpy as np
 from cmm_uq.analysis.conformity.limits import LimitDecision
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.in_words import CHARACTERISTICS
-from cmm_uq.analysis.parts.result import Stated
+from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, day, names, number, plural, say, signed
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.effect_words import titles
-from cmm_uq.certificate.part.measurement import Further, PartFound
+from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
 from cmm_uq.certificate.wording import Figure, Summary, probability
 from cmm_uq.certificate.wording import Headline as Verdict
 from cmm_uq.jobs.verdicts import standing_of
@@ -26,7 +26,7 @@ from cmm_uq.maths.uncertainty.rounding import rounded, significant
 
 
 @dataclass(frozen=True)
-class Scale:
+class PrintedUnits:
     """Units in which a value and its uncertainty are printed."""
 
     # value, small: units of values and limits, and of uncertainties
@@ -37,15 +37,15 @@ class Scale:
     per_small: float
 
 
-LENGTHS = Scale(unit("mm"), unit("µm"), 1.0, MICROMETRE)
-ANGLES = Scale(unit("°"), unit("″"), float(np.pi / 180), ARCSECOND)
+LENGTHS = PrintedUnits(unit("mm"), unit("µm"), 1.0, MICROMETRE)
+ANGLES = PrintedUnits(unit("°"), unit("″"), float(np.pi / 180), ARCSECOND)
 
 
-class Printed:
+class PrintedFigures:
     """How figures of one characteristic are printed: to the place of its U, in its units."""
 
     @property
-    def scale(self) -> Scale:
+    def scale(self) -> PrintedUnits:
         raise NotImplementedError
 
     @property
@@ -102,14 +102,14 @@ class Printed:
 
 
 @dataclass(frozen=True, eq=False)
-class Figures(Printed):
+class CharacteristicFigures(PrintedFigures):
     """One characteristic in figures."""
 
     place: int  # among those of the part, from 0
-    found: PartFound
+    found: PartMeasurement
 
     @property
-    def stated(self) -> Stated:
+    def stated(self) -> StatedCharacteristic:
         """What is stated of it."""
         return self.found.stated[self.place]
 
@@ -119,7 +119,7 @@ class Figures(Printed):
         return self.found.judged[self.place]
 
     @cached_property
-    def scale(self) -> Scale:
+    def scale(self) -> PrintedUnits:
         return ANGLES if self.angular else LENGTHS
 
     @property
@@ -213,12 +213,12 @@ class Figures(Printed):
         return say("{value} {unit}, {U}", value=self.at(self.stated.value), unit=self.scale.value, U=U)
 
 
-def figures_of(found: PartFound) -> list[Figures]:
+def figures_of(found: PartMeasurement) -> list[CharacteristicFigures]:
     """Every characteristic, in the order of the job."""
-    return [Figures(place, found) for place in range(len(found.stated))]
+    return [CharacteristicFigures(place, found) for place in range(len(found.stated))]
 
 
-def critical(found: PartFound) -> Figures:
+def critical(found: PartMeasurement) -> CharacteristicFigures:
     """What is told of first: the least margin; else what takes most of its tolerance; else the first."""
     every = figures_of(found)
     if found.nearest is not None:
@@ -227,14 +227,14 @@ def critical(found: PartFound) -> Figures:
     return every[int(np.argmax(taken))]
 
 
-def by_margin(found: PartFound) -> list[Figures]:
+def by_margin(found: PartMeasurement) -> list[CharacteristicFigures]:
     """Every characteristic, the least margin first; those without any margin last, in their order."""
     margins = np.where(np.isnan(found.margins), np.inf, found.margins)
     every = figures_of(found)
     return [every[int(place)] for place in np.argsort(margins, kind="stable")]
 
 
-def part_summary(found: PartFound) -> Summary:
+def part_summary(found: PartMeasurement) -> Summary:
     """What was found, in short."""
     facts = found.job.facts
     return Summary(
@@ -243,7 +243,7 @@ def part_summary(found: PartFound) -> Summary:
     )  # fmt: skip
 
 
-def _verdicts(found: PartFound) -> list[Verdict]:
+def _verdicts(found: PartMeasurement) -> list[Verdict]:
     told = []
     for i, judged in enumerate(found.judged):
         if judged is None or judged.outcome is None:
@@ -259,13 +259,13 @@ def _verdicts(found: PartFound) -> list[Verdict]:
     return told
 
 
-def _named(found: PartFound, i: int) -> Text:
+def _named(found: PartMeasurement, i: int) -> Text:
     one = found.characteristics[i]
     return say("{name}, {what} of {features}", name=Verbatim(one.name), what=CHARACTERISTICS[one.what],
                features=commas(Verbatim(name) for name in one.features))  # fmt: skip
 
 
-def _figure(found: PartFound, i: int) -> Figure:
+def _figure(found: PartMeasurement, i: int) -> Figure:
     """Value with U, or U alone where nothing was measured."""
     facts, stated = found.characteristics[i], found.stated[i]
     angle = facts.asks.limits == "angles"
@@ -282,7 +282,7 @@ def _figure(found: PartFound, i: int) -> Figure:
     return _named(found, i), say("{value} ± {u} {unit}", value=value, u=u, unit=own), k
 
 
-def _remarks(found: PartFound) -> list[Text]:
+def _remarks(found: PartMeasurement) -> list[Text]:
     told: list[Text] = [found.standing.path]
     largest: dict[str, tuple[float, Text, str]] = {}
     for one in found.unseen:
@@ -298,7 +298,7 @@ def _remarks(found: PartFound) -> list[Text]:
     return told
 
 
-def _further(further: Further) -> Text:
+def _further(further: FurtherSetUps) -> Text:
     """What to measure on the machine, its set-ups left to the page and to their file."""
     if not further.setups:
         return say("No further set-up of the artefact as it was recorded shows what the calibration did not see.")

@@ -12,10 +12,10 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import Outcome, rule_words
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.parts.budget import Budget, Displaced
-from cmm_uq.analysis.parts.methods.method import Comparison
+from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares
+from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.analysis.parts.result import Stated
+from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.messages import Text
@@ -31,7 +31,7 @@ MATTERS = 0.05  # share of a variance from which on what nobody saw is told by n
 
 
 @dataclass(frozen=True)
-class Checked:
+class VerificationCheck:
     """What the verification of the machine's certificate did, or could not do."""
 
     what: str  # in words
@@ -40,7 +40,7 @@ class Checked:
 
 
 @dataclass(frozen=True)
-class Standing:
+class CertificateStatus:
     """The machine's certificate on the day of the measurement."""
 
     source: Source  # what states the machine
@@ -56,7 +56,7 @@ class Standing:
     age: dt.timedelta  # of it on the day of the part's measurement
     valid_until: dt.date | None  # last day on which it holds; ``None`` where neither it nor the job says so
     verdict: str  # of the verification; ``ANALYSED`` of a job
-    checked: tuple[Checked, ...]  # what was verified, then what was not
+    checked: tuple[VerificationCheck, ...]  # what was verified, then what was not
     again: bool  # whether everything was computed again
     trusted: bool  # whether signatures were held to trusted certificates
     draft: bool  # whether nobody has issued it
@@ -71,7 +71,7 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class Unseen:
+class UnseenError:
     """An error that the calibration left free or did not see, and how much of a characteristic's variance it makes."""
 
     characteristic: str
@@ -83,7 +83,7 @@ class Unseen:
 
 
 @dataclass(frozen=True)
-class Further:
+class FurtherSetUps:
     """What to measure on the machine, so that what is unseen would be seen."""
 
     effects: tuple[str, ...]  # names of those that it is for, of the largest share first
@@ -95,7 +95,7 @@ class Further:
 
 
 @dataclass(frozen=True, eq=False)
-class PartFound:
+class PartMeasurement:
     """A part's measurement, with its uncertainty and what follows."""
 
     job: PartJob
@@ -105,21 +105,23 @@ class PartFound:
     # virtual, simulated: virtual measurements, and what they say of the errors
     virtual: Virtual
     simulated: Simulated
-    stated: tuple[Stated, ...]  # of each characteristic, in the order of the plan; mm and rad
+    stated: tuple[StatedCharacteristic, ...]  # of each characteristic, in the order of the plan; mm and rad
     # (c,) values of the measured points, before their mean error is taken off; ``None`` where nothing was measured
     measured: Floats | None
-    budget: Budget  # shares by cause
+    budget: VarianceShares  # shares by cause
     # what the calibration left free or did not see, by characteristic in the order of the plan, largest first
-    unseen: tuple[Unseen, ...]
-    further: Further | None  # what to measure on the machine for that
+    unseen: tuple[UnseenError, ...]
+    further: FurtherSetUps | None  # what to measure on the machine for that
     judged: tuple[LimitDecision | None, ...]  # by characteristic; ``None`` where the drawing has no limits
     together: float | None  # probability that all limits are kept at once; ``None`` without measured points or limits
     ways: tuple[Way, ...]  # as planned, then what would change u
-    displaced: Displaced  # contact points
+    displaced: PointErrors  # contact points
     # where the part's origin lies in coordinates of the machine, or about which place it does
     origin_mm: tuple[float, float, float]
-    standing: Standing  # the machine's certificate
-    methods: Comparison | None = None  # other methods on this part beside this one; ``None`` where the job has none
+    standing: CertificateStatus  # the machine's certificate
+    methods: MethodComparison | None = (
+        None  # other methods on this part beside this one; ``None`` where the job has none
+    )
     digits: int | None = None  # of u that were asked for; ``None`` where the number of draws was
     seed: int = 0  # of everything random
     asked: int = 0  # virtual measurements that were asked for, of which ``digits`` may need more

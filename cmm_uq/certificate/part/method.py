@@ -10,10 +10,10 @@ from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.origin import NAME
 from cmm_uq.certificate.part.figures import figures_of
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.measurement import PartMeasurement
 
 
-def method_section(found: PartFound) -> Section:
+def method_section(found: PartMeasurement) -> Section:
     """What was drawn, how often, and how to do it again."""
     simulated = found.simulated
     rows = (
@@ -61,12 +61,12 @@ _STANDARDS = (
 )
 
 
-def _drawn(found: PartFound) -> Text:
+def _drawn(found: PartMeasurement) -> Text:
     families = dict.fromkeys(family_of(line) for line in found.budget.causes)
     return commas(say("{cause:small}", cause=FAMILIES.get(one, Verbatim(one))) for one in families)
 
 
-def _temperatures(found: PartFound) -> Text:
+def _temperatures(found: PartMeasurement) -> Text:
     given = found.job.facts.environment
     x, y, z = (signed(each, "g") for each in given.scales_c)
     told = say("part {part} °C, scales of x, y, z {x}, {y}, {z} °C", part=signed(given.part_c, "g"), x=x, y=y, z=z)
@@ -75,7 +75,7 @@ def _temperatures(found: PartFound) -> Text:
     return say("{told}; lengths are not corrected to 20 °C", told=told)
 
 
-def _evaluated(found: PartFound) -> Text:
+def _evaluated(found: PartMeasurement) -> Text:
     if found.virtual.exact:
         return say("every feature by its association on the points of every draw")
     return say(
@@ -86,7 +86,7 @@ def _evaluated(found: PartFound) -> Text:
     )  # fmt: skip
 
 
-def _stable(found: PartFound) -> Text:
+def _stable(found: PartMeasurement) -> Text:
     if found.digits is None or found.simulated.stable is None:
         return NOTHING
     digits = plural(found.digits, one=say("one digit"), many=say("{count} digits", count=found.digits))
@@ -100,7 +100,7 @@ def program_words() -> Text:
     return say("{package} {version}", package=Verbatim(NAME), version=Verbatim(__version__))
 
 
-def again(found: PartFound) -> Text:
+def again(found: PartMeasurement) -> Text:
     """The command that gives this page again from the files that belong to it."""
     options = f" --seed {found.seed}" if found.seed else ""
     if found.digits is not None:
@@ -108,13 +108,13 @@ def again(found: PartFound) -> Text:
     return Verbatim(f"{NAME} part {found.job.facts.job.id}{options}")
 
 
-def not_covered_section(found: PartFound) -> Section:
+def not_covered_section(found: PartMeasurement) -> Section:
     """What must not be read out of the figures."""
     blocks: list[Block] = [Paragraph(text) for text in not_covered(found)]
     return Section(say("What is not covered"), tuple(blocks))
 
 
-def not_covered(found: PartFound) -> tuple[Text, ...]:
+def not_covered(found: PartMeasurement) -> tuple[Text, ...]:
     """Left out of this job, then of every one."""
     facts, told = found.job.facts, list[Text]()
     if facts.part.not_measured:
@@ -146,7 +146,7 @@ def not_covered(found: PartFound) -> tuple[Text, ...]:
     return tuple(told)
 
 
-def _unstated(found: PartFound) -> list[Text]:
+def _unstated(found: PartMeasurement) -> list[Text]:
     facts = found.job.facts
     surroundings = facts.environment
     lacking = (
@@ -163,7 +163,7 @@ def _unstated(found: PartFound) -> list[Text]:
     return [what for stated, what in lacking if not stated]
 
 
-def _operators(found: PartFound) -> bool:
+def _operators(found: PartMeasurement) -> bool:
     """Whether anything is stated of what operators do differently."""
     facts = found.job.facts
     return bool(facts.probing.u_operator_um) or any(

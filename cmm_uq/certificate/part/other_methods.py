@@ -11,7 +11,14 @@ from typing import Any
 
 from cmm_uq.analysis.parts.in_words import FAMILIES
 from cmm_uq.analysis.parts.methods.comparison import METHODS
-from cmm_uq.analysis.parts.methods.method import ByMethod, Compared, Comparison, Figure, Method, Seen
+from cmm_uq.analysis.parts.methods.method import (
+    ComparedCharacteristic,
+    Method,
+    MethodComparison,
+    MethodFigure,
+    MethodResult,
+    Seen,
+)
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, number, plural, say, sentences, signed
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
@@ -42,7 +49,7 @@ SEEN: Mapping[Seen, Text] = {
 }  # fmt: skip
 
 
-def methods_section(comparison: Comparison | None) -> Section:
+def methods_section(comparison: MethodComparison | None) -> Section:
     """All of it; a section of no blocks where the job has no other method."""
     title = say("Other methods beside it")
     if comparison is None or not comparison.characteristics:
@@ -75,14 +82,14 @@ _APART = say(
 )
 
 
-def _angle(comparison: Comparison, one: Compared) -> bool:
+def _angle(comparison: MethodComparison, one: ComparedCharacteristic) -> bool:
     return any(found.angle for method in comparison.methods if (found := method.of(one.name)) is not None)
 
 
-def _most_apart(comparison: Comparison) -> list[Compared]:
+def _most_apart(comparison: MethodComparison) -> list[ComparedCharacteristic]:
     """Those whose uncertainties differ by the largest factor, in the order of the plan."""
 
-    def factor(one: Compared) -> float:
+    def factor(one: ComparedCharacteristic) -> float:
         positive = [stated.u for stated in one.stated if stated.u > 0]
         return log(max(positive) / min(positive)) if positive else 0.0
 
@@ -96,7 +103,7 @@ def _units(*, angle: bool) -> tuple[Unit, Unit, float, float]:
     return (unit("°"), unit("″"), radians(1.0), ARCSECOND) if angle else (unit("mm"), unit("µm"), 1.0, MICROMETRE)
 
 
-def _figures(own: Sequence[Compared], *, angle: bool) -> Table:
+def _figures(own: Sequence[ComparedCharacteristic], *, angle: bool) -> Table:
     large, small, per_large, per_small = _units(angle=angle)
     columns = (
         Column(say("Characteristic"), numeric=False), Column(say("Method"), numeric=False), Column(say("Value"), large),
@@ -123,7 +130,7 @@ def _figures(own: Sequence[Compared], *, angle: bool) -> Table:
     )
 
 
-def _seen(methods: Sequence[ByMethod]) -> Table:
+def _seen(methods: Sequence[MethodResult]) -> Table:
     columns = (
         Column(say("Cause"), numeric=False), Column(say("{method:capital}", method=METHODS["virtual"]), numeric=False),
         *(Column(say("{method:capital}", method=METHODS[one.method]), numeric=False) for one in methods),
@@ -135,7 +142,7 @@ def _seen(methods: Sequence[ByMethod]) -> Table:
     return Table(say("How each method takes hold of a cause"), columns, rows)
 
 
-def _conditions(methods: Sequence[ByMethod]) -> Table:
+def _conditions(methods: Sequence[MethodResult]) -> Table:
     met = {True: say("met"), False: say("not met"), None: say("not stated")}
     columns = (
         Column(say("Method"), numeric=False),
@@ -150,7 +157,7 @@ def _conditions(methods: Sequence[ByMethod]) -> Table:
     return Table(say("Conditions of the tests"), columns, rows)
 
 
-def _budgets(method: ByMethod, told: Sequence[str]) -> Table:
+def _budgets(method: MethodResult, told: Sequence[str]) -> Table:
     """Budgets of some characteristics line by line."""
     columns = (
         Column(say("Characteristic"), numeric=False), Column(say("Contribution"), numeric=False),
@@ -161,7 +168,7 @@ def _budgets(method: ByMethod, told: Sequence[str]) -> Table:
     return Table(caption, columns, tuple(rows), tuple(_notes(method, told)))
 
 
-def _lines(one: Figure) -> list[tuple[Text, ...]]:
+def _lines(one: MethodFigure) -> list[tuple[Text, ...]]:
     _, small, _, per_small = _units(angle=one.angle)
     rows: list[tuple[Text, ...]] = []
     for depth, line, share in one.budget.flat():
@@ -180,7 +187,7 @@ def _freedom(line: Line) -> Text:
     return figure(line.dof, 3) if isfinite(line.dof) else Number("∞")
 
 
-def _notes(method: ByMethod, told: Sequence[str]) -> list[Text]:
+def _notes(method: MethodResult, told: Sequence[str]) -> list[Text]:
     """Systematic errors that were found, and what became of them."""
     notes: list[Text] = []
     for one in (found for name in told if (found := method.of(name)) is not None):
@@ -199,7 +206,7 @@ def _notes(method: ByMethod, told: Sequence[str]) -> list[Text]:
     return notes
 
 
-def methods_data(comparison: Comparison | None) -> dict[str, Any] | None:
+def methods_data(comparison: MethodComparison | None) -> dict[str, Any] | None:
     """All of it; ``None`` where the job has no other method."""
     if comparison is None:
         return None
@@ -209,7 +216,7 @@ def methods_data(comparison: Comparison | None) -> dict[str, Any] | None:
     }
 
 
-def _method(one: ByMethod) -> dict[str, Any]:
+def _method(one: MethodResult) -> dict[str, Any]:
     return {
         "method": one.method,
         "characteristics": [_figure(each) for each in one.figures],
@@ -218,7 +225,7 @@ def _method(one: ByMethod) -> dict[str, Any]:
     }
 
 
-def _figure(one: Figure) -> dict[str, Any]:
+def _figure(one: MethodFigure) -> dict[str, Any]:
     def given(value: float | None) -> float | None:
         return degrees(value) if one.angle and value is not None else value
 
@@ -235,7 +242,7 @@ def _figure(one: Figure) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _compared(one: Compared) -> dict[str, Any]:
+def _compared(one: ComparedCharacteristic) -> dict[str, Any]:
     return {
         "name": one.name,
         "normalised_errors": [{"one": pair.one, "other": pair.other, "E_n": pair.normalised} for pair in one.pairs],

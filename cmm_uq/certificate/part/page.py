@@ -43,8 +43,8 @@ from cmm_uq.certificate.part.budget_section import (
     unseen_words,
     ways_section,
 )
-from cmm_uq.certificate.part.figures import Figures, critical, figures_of
-from cmm_uq.certificate.part.measurement import PartFound, Source, Standing
+from cmm_uq.certificate.part.figures import CharacteristicFigures, critical, figures_of
+from cmm_uq.certificate.part.measurement import CertificateStatus, PartMeasurement, Source
 from cmm_uq.certificate.part.method import method_section, not_covered_section, program_words
 from cmm_uq.certificate.part.other_methods import methods_section
 from cmm_uq.certificate.part.part_section import errors_section, part_section
@@ -56,7 +56,7 @@ from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import gravest, standing_of
 
 
-def overview_of(found: PartFound) -> Overview:
+def overview_of(found: PartMeasurement) -> Overview:
     """The first thing on the page."""
     one = critical(found)
     rows = (
@@ -107,7 +107,7 @@ def verdict_words(outcomes: Sequence[Outcome], *, measured: bool) -> Text:
 _UNMEASURED = say("Uncertainty of a planned measurement: nothing was measured")
 
 
-def part_words(found: PartFound) -> Text:
+def part_words(found: PartMeasurement) -> Text:
     """Name, drawing, serial number."""
     part = found.job.facts.part
     drawing = say("drawing {number}", number=Verbatim(part.drawing)) if part.drawing else NOTHING
@@ -115,7 +115,7 @@ def part_words(found: PartFound) -> Text:
     return commas(text for text in (Verbatim(part.name), drawing, serial) if text)
 
 
-def _least(one: Figures) -> Text:
+def _least(one: CharacteristicFigures) -> Text:
     """The characteristic nearest to a limit, or that takes most of its tolerance, with its figures."""
     if not one.allowed:
         return NOTHING
@@ -131,14 +131,14 @@ def _least(one: Figures) -> Text:
                share=signed(200 * one.expanded / one.width, ".0f"))  # fmt: skip
 
 
-def _together(found: PartFound) -> Text:
+def _together(found: PartMeasurement) -> Text:
     limited = sum(one is not None for one in found.judged)
     if found.together is None or limited < 2:
         return NOTHING
     return say("{chance} that all {count} limits are kept", chance=probability(found.together), count=limited)
 
 
-def _not_covered(found: PartFound) -> Text:
+def _not_covered(found: PartMeasurement) -> Text:
     told: list[Text] = []
     left = found.job.facts.part.not_measured
     if left:
@@ -156,7 +156,7 @@ _SOURCES: Mapping[Source, Text] = {
 }
 
 
-def machine_section(found: PartFound) -> Section:
+def machine_section(found: PartMeasurement) -> Section:
     """What states the machine, and what of it was verified."""
     standing = found.standing
     rows = (
@@ -175,7 +175,7 @@ def machine_section(found: PartFound) -> Section:
     )
 
 
-def certificate_rows(standing: Standing) -> tuple[tuple[Text, Text], ...]:
+def certificate_rows(standing: CertificateStatus) -> tuple[tuple[Text, Text], ...]:
     """Machine, number, issuer, date with its age, validity of the certificate."""
     serial = say("serial number {serial}", serial=Verbatim(standing.serial)) if standing.serial else NOTHING
     number_of = (
@@ -190,7 +190,7 @@ def certificate_rows(standing: Standing) -> tuple[tuple[Text, Text], ...]:
     )
 
 
-def _calibrated(standing: Standing) -> Text:
+def _calibrated(standing: CertificateStatus) -> Text:
     days, date = standing.age.days, day(standing.date)
     if not days:
         return say("{date}, the day of the measurement", date=date)
@@ -198,7 +198,7 @@ def _calibrated(standing: Standing) -> Text:
     return say("{date}, {age} before", date=date, age=age)
 
 
-def verified_words(standing: Standing) -> Text:
+def verified_words(standing: CertificateStatus) -> Text:
     """What was compared and what was not."""
     done = [one for one in standing.checked if one.count]
     if not done:
@@ -215,7 +215,7 @@ def _celsius(value: float | None) -> Text:
     return NOTHING if value is None else say("{value} °C", value=number(value, ".2f"))
 
 
-def _noise(found: PartFound) -> Text:
+def _noise(found: PartMeasurement) -> Text:
     usual = found.given.machine.noise.usual_mm * 1e3
     if not usual.any():
         return NOTHING
@@ -227,7 +227,7 @@ TITLE = say("Measurement report")
 PLANNED = say("Measurement uncertainty")
 
 
-def part_document(found: PartFound) -> Document:
+def part_document(found: PartMeasurement) -> Document:
     """Its page."""
     facts = found.job.facts
     measured = found.measured is not None
@@ -269,7 +269,7 @@ def part_document(found: PartFound) -> Document:
     ))  # fmt: skip
 
 
-def lacking_of(found: PartFound) -> tuple[Requirement, ...]:
+def lacking_of(found: PartMeasurement) -> tuple[Requirement, ...]:
     """What ISO/IEC 17025:2017, 7.8 asks of every report and the job does not state; nothing is asked where nobody measured."""
     facts = found.job.facts
     if found.measured is None or facts.job.origin != MEASURED:
@@ -282,7 +282,7 @@ def lacking_of(found: PartFound) -> tuple[Requirement, ...]:
     return tuple(one for one in every if one.status == "missing")
 
 
-def _particulars(found: PartFound) -> tuple[Facts, ...]:
+def _particulars(found: PartMeasurement) -> tuple[Facts, ...]:
     facts = found.job.facts
     job, part = facts.job, facts.part
     expansion: Text = NOTHING

@@ -13,7 +13,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
 from cmm_uq.maths.uncertainty.rounding import nominal
 
@@ -27,7 +27,7 @@ def lettered_names(plan: Plan) -> list[Text]:
     return [number(i + 1) for i in range(len(plan.features))]
 
 
-def part_section(found: PartFound) -> Section:
+def part_section(found: PartMeasurement) -> Section:
     """What is probed, with which styli, and where the part lies."""
     plan = found.plan
     several = len(plan.styli) > 1
@@ -54,7 +54,7 @@ _UM = unit("µm")
 _FEATURES = say("Association: how a feature is made of its points, where a characteristic says nothing else.")
 
 
-def _lies(found: PartFound) -> list[tuple[Text, Text]]:
+def _lies(found: PartMeasurement) -> list[tuple[Text, Text]]:
     facts, given = found.job.facts, found.job.facts.placing
     varied = len(found.given.poses)
     placed = say("origin at {origin} mm, turned by {angles}° about x, y, z of the machine",
@@ -81,7 +81,7 @@ def _three(values: Sequence[float]) -> Text:
     return in_a_row(nominal(value) for value in values)
 
 
-def errors_section(found: PartFound) -> Section:
+def errors_section(found: PartMeasurement) -> Section:
     """The errors of the points, and the form that was measured."""
     blocks: list[Block] = [errors_picture(found.plan, found.displaced)]
     deviations = None if found.job.measured is None else deviations_of(found.plan, found.job.measured)

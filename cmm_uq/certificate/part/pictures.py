@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cmm_uq.analysis.parts.budget import Displaced
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.budget import PointErrors
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.messages import NOTHING, Text, after, number, plural, say, sentences, signed
 from cmm_uq.base.points import Floats
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _NORMAL, _STEM = 0.05, 0.22  # of the largest span: how long a normal is drawn, and a stylus at most
 
 
-def part_picture(plan: Plan, pose: Pose, names: Sequence[Text]) -> Plot:
+def part_picture(plan: Plan, pose: PartPose, names: Sequence[Text]) -> Plot:
     """Four views of the part with all of its points."""
     points, normals = plan.points, plan.normals
     largest = span_of(plan)
@@ -66,7 +66,7 @@ def part_picture(plan: Plan, pose: Pose, names: Sequence[Text]) -> Plot:
         return drawn(figure, caption, alternative)
 
 
-def _stems(plan: Plan, pose: Pose, largest: float) -> tuple[Floats, Floats]:
+def _stems(plan: Plan, pose: PartPose, largest: float) -> tuple[Floats, Floats]:
     """(f, 3) of each feature: the tip's centre at its first point, and where the stylus is cut off."""
     tips, roots = [], []
     for feature in plan.features:
@@ -85,7 +85,7 @@ _SEEN = 0.02  # of the longest, an arrow that can be seen as one
 MOST = 150  # ellipses in one view: more run into each other
 
 
-def errors_picture(plan: Plan, errors: Displaced) -> Plot:
+def errors_picture(plan: Plan, errors: PointErrors) -> Plot:
     """The expected error of each point as an arrow, its standard uncertainty as an ellipse about the arrow's end."""
     mean, covariance = errors.mean / MICROMETRE, errors.covariance / MICROMETRE**2
     u = np.sqrt(np.linalg.eigvalsh(covariance)[:, -1].clip(0))

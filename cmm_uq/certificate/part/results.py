@@ -20,7 +20,7 @@ from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.origin import NAME
-from cmm_uq.certificate.part.measurement import Further, PartFound, Standing, Unseen
+from cmm_uq.certificate.part.measurement import CertificateStatus, FurtherSetUps, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.other_methods import methods_data
 from cmm_uq.certificate.results.keys import RESULTS
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
@@ -31,7 +31,7 @@ from cmm_uq.jobs.verdicts import Verdicts
 SCHEMA = "cmm-uq/part/1"
 
 
-def part_results(found: PartFound) -> dict[str, Any]:
+def part_results(found: PartMeasurement) -> dict[str, Any]:
     """Contents of ``results.json``."""
     simulated, facts = found.simulated, found.job.facts
     names = [one.name for one in found.characteristics]
@@ -76,7 +76,7 @@ def unit_of(one: CharacteristicFacts) -> str:
     return "°" if one.asks.limits == "angles" else "mm"
 
 
-def standing_data(one: Standing) -> dict[str, Any]:
+def standing_data(one: CertificateStatus) -> dict[str, Any]:
     """The machine's certificate."""
     return {
         "source": one.source, "files": list(one.files), "number": one.number or None, "laboratory": one.laboratory or None,
@@ -103,7 +103,7 @@ def _job(job: PartJob) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _characteristic(found: PartFound, i: int) -> dict[str, Any]:
+def _characteristic(found: PartMeasurement, i: int) -> dict[str, Any]:
     facts, stated, judged = found.characteristics[i], found.stated[i], found.judged[i]
     low, high = (_in(facts, end) for end in stated.interval)
     return {
@@ -131,7 +131,7 @@ def _limits(facts: CharacteristicFacts, judged: LimitDecision) -> dict[str, Any]
     }  # fmt: skip
 
 
-def _budget(found: PartFound) -> dict[str, Any]:
+def _budget(found: PartMeasurement) -> dict[str, Any]:
     shares = found.budget
     return {
         "characteristics": list(shares.characteristics),
@@ -145,21 +145,21 @@ def _budget(found: PartFound) -> dict[str, Any]:
     }
 
 
-def _unseen(one: Unseen) -> dict[str, Any]:
+def _unseen(one: UnseenError) -> dict[str, Any]:
     return {
         "characteristic": one.characteristic, "effect": one.effect or None, "line": one.line, "title": _plain(one.title),
         "share": one.share, "why": _plain(one.why),
     }  # fmt: skip
 
 
-def _further(one: Further) -> dict[str, Any]:
+def _further(one: FurtherSetUps) -> dict[str, Any]:
     return {
         "effects": list(one.effects), "setups": one.setups, "text": _plain(one.text), "command": one.command or None,
         "file": one.file or None, "missed": list(one.missed),
     }  # fmt: skip
 
 
-def _covariance(found: PartFound) -> Floats:
+def _covariance(found: PartMeasurement) -> Floats:
     factor = [degrees(1.0) if one.asks.limits == "angles" else 1.0 for one in found.characteristics]
     matrix: Floats = found.simulated.covariance * factor
     return matrix * [[each] for each in factor]

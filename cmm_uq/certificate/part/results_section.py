@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.base.messages import DASH, Text, number, say, signed
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.certificate.part.figures import Figures, figures_of
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.figures import CharacteristicFigures, figures_of
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.plots import Margin, correlation_plot, margin_plots
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 
 FEW = 8  # characteristics up to which their correlations are a table
 
 
-def results_section(found: PartFound) -> Section:
+def results_section(found: PartMeasurement) -> Section:
     """Every characteristic with its value, if anything was measured, and its uncertainty."""
     every = figures_of(found)
     parts = [
@@ -30,7 +30,7 @@ _UNMEASURED = say(
 )
 
 
-def _table(every: Sequence[Figures], *, measured: bool) -> Table:
+def _table(every: Sequence[CharacteristicFigures], *, measured: bool) -> Table:
     scale = every[0].scale
     columns = (
         Column(say("No.")), Column(say("Characteristic"), numeric=False),
@@ -43,7 +43,7 @@ def _table(every: Sequence[Figures], *, measured: bool) -> Table:
     return Table(say("Angles") if every[0].angular else say("Lengths, forms and places"), columns, rows, _notes(every))
 
 
-def _row(one: Figures, *, measured: bool) -> tuple[Text, ...]:
+def _row(one: CharacteristicFigures, *, measured: bool) -> tuple[Text, ...]:
     value = () if one.stated.value is None else (one.at(one.stated.value),)
     error = () if measured else (one.error(one.stated.error),)
     return (
@@ -56,7 +56,7 @@ def _row(one: Figures, *, measured: bool) -> tuple[Text, ...]:
     )
 
 
-def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
+def _notes(every: Sequence[CharacteristicFigures]) -> tuple[Text, ...]:
     notes: list[Text] = [
         say(
             "95 % interval: the shortest that holds 95 % of the virtual measurements. U = k · u is half of it, u the standard "
@@ -77,7 +77,7 @@ def _notes(every: Sequence[Figures]) -> tuple[Text, ...]:
     return tuple(notes)
 
 
-def conformity_section(found: PartFound) -> Section:
+def conformity_section(found: PartMeasurement) -> Section:
     """Limits, what the rule accepts, decisions, and their picture; nothing where the drawing has no limits."""
     limited = [one for one in figures_of(found) if one.judged is not None]
     if not limited:
@@ -92,7 +92,7 @@ def conformity_section(found: PartFound) -> Section:
     return Section(say("Conformity with the drawing"), tuple(blocks))
 
 
-def _rule(found: PartFound, limited: Sequence[Figures]) -> Text:
+def _rule(found: PartMeasurement, limited: Sequence[CharacteristicFigures]) -> Text:
     told = say("Decision rule: {rule}.", rule=found.judged_by)
     if found.together is None or len(limited) < 2:
         return told
@@ -102,7 +102,7 @@ def _rule(found: PartFound, limited: Sequence[Figures]) -> Text:
     )  # fmt: skip
 
 
-def _decisions(every: Sequence[Figures], nominal: Sequence[float], *, measured: bool) -> Table:
+def _decisions(every: Sequence[CharacteristicFigures], nominal: Sequence[float], *, measured: bool) -> Table:
     scale = every[0].scale
     columns = (
         Column(say("No.")), Column(say("Characteristic"), numeric=False), Column(say("Nominal"), scale.value),
@@ -126,7 +126,7 @@ def _caption(*, angular: bool, measured: bool) -> Text:
     return say("Angles that the rule will accept") if angular else say("What the rule will accept")
 
 
-def _decision(one: Figures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
+def _decision(one: CharacteristicFigures, nominal: float, *, measured: bool) -> tuple[Text, ...]:
     judged, (low, high) = one.judged, one.limits
     decided: tuple[Text, ...] = ()
     if measured and judged is not None:
@@ -146,7 +146,7 @@ def _decision(one: Figures, nominal: float, *, measured: bool) -> tuple[Text, ..
     )
 
 
-def _margin(one: Figures) -> Margin:
+def _margin(one: CharacteristicFigures) -> Margin:
     judged, (low, high) = one.judged, one.limits
     low = 0.0 if one.zone else low
     stated, accepted = one.stated, None if judged is None else judged.accepted
@@ -158,7 +158,7 @@ def _margin(one: Figures) -> Margin:
     )
 
 
-def correlation_section(found: PartFound) -> Section:
+def correlation_section(found: PartMeasurement) -> Section:
     """What characteristics have in common: a table of few, a picture of many; nothing of one."""
     every = figures_of(found)
     if len(every) < 2:

@@ -15,7 +15,7 @@ from cmm_uq.jobs.part.job import PartJob
 
 if TYPE_CHECKING:
     from cmm_uq.base.points import Floats
-    from cmm_uq.certificate.part.measurement import Standing
+    from cmm_uq.certificate.part.measurement import CertificateStatus
 
 _OF_THE_MACHINE = (
     "source", "files", "number", "laboratory", "machine", "serial", "origin", "date", "age_days", "valid_until", "draft",
@@ -80,7 +80,7 @@ def check_part_job(
     _compare(inquiry, asked, file, f"is not what {JOB} says")
 
 
-def check_standing(inquiry: Inquiry, standing: Standing, data: Mapping[str, Any], file: str) -> None:
+def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
     """Keep what the machine's certificate says otherwise.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Any
 
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Text
-from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, Printed, Scale
+from cmm_uq.certificate.part.figures import ANGLES, LENGTHS, PrintedFigures, PrintedUnits
 from cmm_uq.certificate.part.page import verdict_words
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.views_agree import squashed
@@ -20,13 +20,13 @@ from cmm_uq.certificate.wording import OUTCOME_WORDS, probability
 
 
 @dataclass(frozen=True, eq=False)
-class _One(Printed):
+class _One(PrintedFigures):
     """A characteristic of results.json."""
 
     data: Mapping[str, Any]
 
     @property
-    def scale(self) -> Scale:
+    def scale(self) -> PrintedUnits:
         return ANGLES if self.angular else LENGTHS
 
     @property

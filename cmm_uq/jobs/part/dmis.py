@@ -24,12 +24,12 @@ from cmm_uq.jobs.importing.dmis import statements
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
 from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.datums import BETWEEN
-from cmm_uq.jobs.part.dmis_frames import Frame, numbers_of, reference, words_of
+from cmm_uq.jobs.part.dmis_frames import DmisFrame, numbers_of, reference, words_of
 from cmm_uq.jobs.part.drawing import (
     Drawing,
     Facts,
+    NotUnderstood,
     NotUnderstoodError,
-    Unknown,
     all_there,
     limits,
     refuse_other_kind,
@@ -145,7 +145,7 @@ class _Program:
 
     def __init__(self, where: str) -> None:
         self.where, self.drawing = where, Drawing(PROGRAM)
-        self.frame = Frame()
+        self.frame = DmisFrame()
         self.nominal: dict[str, Facts] = {}
         self.tolerances: dict[str, tuple[int, list[str]]] = {}
         self.datums: dict[str, str] = {}
@@ -181,7 +181,7 @@ class _Program:
                 raise NotUnderstoodError("is no statement of DMIS that is read")
         except NotUnderstoodError as error:
             name = labelled["name"].strip() if labelled else statement[:60]
-            self.drawing.unknown.append(Unknown(name, str(error), place))
+            self.drawing.unknown.append(NotUnderstood(name, str(error), place))
 
     def _labelled(self, found: re.Match[str], line: int, place: str) -> None:
         of, name, major = found["of"].upper(), found["name"].strip(), found["major"].upper()
@@ -290,7 +290,7 @@ class _Program:
         if not self.stylus:
             self.stylus = "stylus"
             self.styli[self.stylus] = {"name": self.stylus, "diameter_mm": 0.0}
-            self.drawing.unknown.append(Unknown("stylus", "is not said: its tip is taken as a point", place))
+            self.drawing.unknown.append(NotUnderstood("stylus", "is not said: its tip is taken as a point", place))
         self.measuring = (name, line, [])
 
     def _point(self, words: list[str], line: int, place: str) -> None:
@@ -306,7 +306,7 @@ class _Program:
         name, _, points = self.measuring
         self.measuring = None
         if name in self.scanned or self.scanning:
-            self.drawing.unknown.append(Unknown(name, SCANNED, place))
+            self.drawing.unknown.append(NotUnderstood(name, SCANNED, place))
             return
         found: Facts = {**self.nominal[name], "stylus": self.stylus}
         if found["kind"] == "point":
@@ -335,7 +335,7 @@ class _Program:
 
     def _constructed(self, words: list[str], line: int, place: str) -> None:
         _, name = reference(words[1] if len(words) > 1 else "")
-        self.drawing.unknown.append(Unknown(name, "is constructed of other features, which is not read", place))
+        self.drawing.unknown.append(NotUnderstood(name, "is constructed of other features, which is not read", place))
 
     def _output(self, words: list[str], line: int, place: str) -> None:
         references = [reference(word) for word in words]
@@ -359,19 +359,19 @@ class _Program:
             name = tolerance if tolerance not in same else f"{tolerance} {feature}"
             self.drawing.characteristics.append({"name": name, **found})
         except NotUnderstoodError as error:
-            self.drawing.unknown.append(Unknown(tolerance, str(error), place))
+            self.drawing.unknown.append(NotUnderstood(tolerance, str(error), place))
 
     def _left_over(self) -> None:
         """Features that are never measured, and tolerances that are never given to a feature."""
         told = {one.name for one in self.drawing.unknown} | {one["name"] for one in self.drawing.features}
         for name in self.nominal:
             if name not in told:
-                self.drawing.unknown.append(Unknown(name, "is a feature that is not measured", self.where))
+                self.drawing.unknown.append(NotUnderstood(name, "is a feature that is not measured", self.where))
         given = {tolerance for _, _, tolerance in self.given}
         for name, (line, _) in self.tolerances.items():
             if name not in given:
                 self.drawing.unknown.append(
-                    Unknown(name, "is a tolerance without a feature", f"{self.where} line {line}")
+                    NotUnderstood(name, "is a tolerance without a feature", f"{self.where} line {line}")
                 )
 
     def _frame(self, major: str, words: list[str], place: str) -> None:

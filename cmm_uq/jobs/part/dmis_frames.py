@@ -21,7 +21,7 @@ _DIGITS = 9  # decimals of a place, mm: a picometre
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class DmisFrame:
     """The frame in which a program speaks, in that of the part."""
 
     axes: Floats = field(default_factory=lambda: np.eye(3))  # (3, 3) unit vectors, a row each
@@ -41,7 +41,7 @@ class Frame:
         """A direction that the program gives, in the frame of the part."""
         return [float(value) for value in np.round(np.array(number) @ self.axes, _DIGITS) + 0.0]
 
-    def changed(self, major: str, words: list[str], nominal: Nominals, datum: str) -> Frame:
+    def changed(self, major: str, words: list[str], nominal: Nominals, datum: str) -> DmisFrame:
         """The frame after ``D(…)=MAJOR/WORDS``."""
         if major == "DATSET":
             return self._set(words, nominal, datum)
@@ -51,7 +51,7 @@ class Frame:
             return self._turned(words, nominal)
         raise NotUnderstoodError(f"is {major}")
 
-    def _set(self, words: list[str], nominal: Nominals, datum: str) -> Frame:
+    def _set(self, words: list[str], nominal: Nominals, datum: str) -> DmisFrame:
         """One axis along the direction of a datum, by the shortest way."""
         if words and words[0].upper() == "MCS":
             if nominal:
@@ -68,7 +68,7 @@ class Frame:
         rotation = np.eye(3) + skew + skew @ skew / (1 + cosine)
         return replace(self, axes=self.axes @ rotation.T)
 
-    def _shifted(self, words: list[str], nominal: Nominals) -> Frame:
+    def _shifted(self, words: list[str], nominal: Nominals) -> DmisFrame:
         if not words or len(words) % 2:
             raise NotUnderstoodError("is shifted without saying by what")
         origin = self.origin
@@ -84,7 +84,7 @@ class Frame:
             origin = origin + along * self.axes[axis]
         return replace(self, origin=origin)
 
-    def _turned(self, words: list[str], nominal: Nominals) -> Frame:
+    def _turned(self, words: list[str], nominal: Nominals) -> DmisFrame:
         """About one of its axes, by an angle or so that another axis lies along a feature."""
         if len(words) < 2:
             raise NotUnderstoodError("is turned without saying by what")

@@ -33,7 +33,7 @@ class NotUnderstoodError(Exception):
 
 
 @dataclass(frozen=True)
-class Unknown:
+class NotUnderstood:
     """Something that is not understood."""
 
     name: str  # of the feature or characteristic, or of the statement
@@ -51,7 +51,7 @@ class Drawing:
     characteristics: list[Facts] = field(default_factory=list)
     styli: list[Facts] = field(default_factory=list)
     datums: list[str] = field(default_factory=list)  # names of features, of the alignment
-    unknown: list[Unknown] = field(default_factory=list)  # what was not understood
+    unknown: list[NotUnderstood] = field(default_factory=list)  # what was not understood
     # by the name of a feature, keys that the file leaves open, whose values are examples
     open_keys: dict[str, list[str]] = field(default_factory=dict)
 
@@ -87,7 +87,7 @@ class Drawing:
         for one in list(self.characteristics):
             if not (there.issuperset(one["features"]) and all_there(one.get("datums", ()), there)):
                 self.characteristics.remove(one)
-                self.unknown.append(Unknown(one["name"], "is of a feature that was left out", ""))
+                self.unknown.append(NotUnderstood(one["name"], "is of a feature that was left out", ""))
         self.datums[:] = self.datums if all_there(self.datums, there) else []
 
 
@@ -140,7 +140,7 @@ def set_aside_unsound(drawing: Drawing, where: str) -> None:
             features[given["name"]] = probed_of(given)
         except CmmUqError as error:
             drawing.features.remove(given)
-            drawing.unknown.append(Unknown(given["name"], _unsound(error.problem), where))
+            drawing.unknown.append(NotUnderstood(given["name"], _unsound(error.problem), where))
     for given in list(drawing.characteristics):
         try:
             facts = CharacteristicFacts.model_validate(dict(given))
@@ -153,7 +153,7 @@ def set_aside_unsound(drawing: Drawing, where: str) -> None:
             problem = ""
         if problem:
             drawing.characteristics.remove(given)
-            drawing.unknown.append(Unknown(given["name"], _unsound(problem), where))
+            drawing.unknown.append(NotUnderstood(given["name"], _unsound(problem), where))
 
 
 def _unsound(problem: str) -> str:

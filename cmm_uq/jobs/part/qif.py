@@ -20,8 +20,8 @@ from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.drawing import (
     Drawing,
     Facts,
+    NotUnderstood,
     NotUnderstoodError,
-    Unknown,
     limits,
     refuse_other_kind,
     usual_strategy,
@@ -134,7 +134,7 @@ class _Document:
                 raise NotUnderstoodError(f"is the name of two {what}s")
             taken.append(read(item, name, place))
         except NotUnderstoodError as error:
-            self.drawing_.unknown.append(Unknown(name, str(error), place))
+            self.drawing_.unknown.append(NotUnderstood(name, str(error), place))
 
     def _feature(self, item: Element, name: str, place: str) -> Facts:
         sort = local(item).removesuffix("FeatureItem").removesuffix("FeatureNominal")

@@ -114,7 +114,7 @@ class Repeats:
 
 
 @dataclass(frozen=True, eq=False)
-class Read:
+class StandardReadings:
     """A standard as it was measured: (n,) values in mm, and the orientation of each."""
 
     values: Floats
@@ -127,8 +127,8 @@ class OtherReadings:
 
     calibrated: Repeats | None = None
     orientations: Repeats | None = None
-    length: Read | None = None
-    tips: Mapping[str, Read] = field(default_factory=dict)
+    length: StandardReadings | None = None
+    tips: Mapping[str, StandardReadings] = field(default_factory=dict)
 
 
 def other_readings(
@@ -136,7 +136,7 @@ def other_readings(
 ) -> OtherReadings:
     """Read and check the recordings that ``[by_calibrated_part]`` and ``[by_orientations]`` name; problems are gathered."""
     calibrated = orientations = length = None
-    tips: dict[str, Read] = {}
+    tips: dict[str, StandardReadings] = {}
     if (one := facts.by_calibrated_part) is not None:
         _check_calibrated(one, facts, places, wrong)
         with wrong.going_on():
@@ -259,7 +259,7 @@ def _of_points(cells: Cells, where: str, group: str, features: Sequence[Probed])
     return Repeats(np.array([key[0] for key in measured], dtype=np.int64), {}, np.array(found))
 
 
-def _standard(content: bytes, where: str, column: str, calibrated: float) -> Read:
+def _standard(content: bytes, where: str, column: str, calibrated: float) -> StandardReadings:
     cells = _cells(content, where)
     keys = _keys(cells, where, "orientation")
     values = _column_of_by_readings(cells, column, where)
@@ -274,7 +274,7 @@ def _standard(content: bytes, where: str, column: str, calibrated: float) -> Rea
             wrong.add(CmmUqError(f"{value:g} mm is not the standard of {calibrated:g} mm", where=at,
                                  fix="Give it in mm, as the machine read it"))  # fmt: skip
     wrong.refuse()
-    found = Read(values, np.array([key[0] for key in keys], dtype=np.int64))
+    found = StandardReadings(values, np.array([key[0] for key in keys], dtype=np.int64))
     _refuse_unequal(found, where)
     return found
 
@@ -282,7 +282,7 @@ def _standard(content: bytes, where: str, column: str, calibrated: float) -> Rea
 _FAR = 0.01  # share of a standard's size beyond which a reading is of another one, or in another unit
 
 
-def _refuse_unequal(one: Repeats | Read, where: str) -> None:
+def _refuse_unequal(one: Repeats | StandardReadings, where: str) -> None:
     names, counts = np.unique(one.group, return_counts=True)
     if len(names) < 2:
         raise CmmUqError("was measured in one orientation alone", where=where, fix="Measure in four, two at least")

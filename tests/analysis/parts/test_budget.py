@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.budget import PLACE, budget, displaced
+from cmm_uq.analysis.parts.budget import PLACE, point_errors, variance_shares
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
 from cmm_uq.analysis.parts.machine.state import unmodelled_errors
-from cmm_uq.analysis.parts.placing import Pose, around
+from cmm_uq.analysis.parts.placing import PartPose, around
 from cmm_uq.analysis.parts.plan import Characteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances, Virtual
 from cmm_uq.analysis.parts.ways import mean_of_places, ways
@@ -27,7 +27,7 @@ def test_shares_of_a_sum_are_those_of_its_variances() -> None:
     """Scale 10 ppm and temperature 0.5 K of steel over 300 mm, noise of 1 µm at both ends: 9, 2.976 and 2 µm²."""
     draws = 10.0 * np.random.default_rng(1).standard_normal((20_000, 1))
     part = Surroundings(Expansion(11.5e-6, u_temperature_k=0.5))
-    found = budget(Virtual(PAIR, Circumstances(machine(["scale_x"], draws, 1.0), (POSE,), part)))
+    found = variance_shares(Virtual(PAIR, Circumstances(machine(["scale_x"], draws, 1.0), (POSE,), part)))
     parts = np.array([9.0, 2.0, (300 * 11.5e-6 * 0.5 * 1e3) ** 2])
     assert found.causes == ("machine: scale_x", "noise: reading", "temperature: part")
     assert found.u[0] * 1e3 == pytest.approx(np.sqrt(parts.sum()), rel=0.02)
@@ -43,7 +43,7 @@ def test_what_the_calibration_did_not_see_is_told_with_its_share() -> None:
     diagonal = Plan((spot("o", [0, 0, 0]), spot("xy", [100, 100, 0])), (Characteristic("d", "distance", ("o", "xy")),))
     state = machine(["scale_x"], free, 5.0, prior_share={"scale_x": 0.99}, unmodelled=bow)
     virtual = Virtual(diagonal, Circumstances(state, (POSE,)))
-    told = budget(virtual).told("d", virtual.named)
+    told = variance_shares(virtual).told("d", virtual.named)
     why = {line: words for line, _, words in told}
     assert why.keys() == {"machine: scale_x", "machine: straightness_x_y"}
     assert why["machine: scale_x"] == "the calibration left it to what physics allows"
@@ -58,7 +58,7 @@ def test_shares_of_tied_errors_are_what_knowing_one_alone_would_take_away(correl
     arcsec = 1 / 4.84813681
     V = 25.0 * np.array([[1.0, correlation], [correlation, 1.0]])  # in ppm, and in seconds of as many microradians
     draws = np.random.default_rng(2).multivariate_normal([0, 0], V, 20_000) * [1.0, 0.5 * arcsec]
-    found = budget(Virtual(diagonal, Circumstances(machine(["scale_x", "squareness_xy"], draws), (POSE,))))
+    found = variance_shares(Virtual(diagonal, Circumstances(machine(["scale_x", "squareness_xy"], draws), (POSE,))))
     c = np.array([-1.0, 0.5])  # −s·x² and S·x·y over the diagonal, S drawn half as large
     shares = (V @ c) ** 2 / np.diagonal(V) / (c @ V @ c)
     assert found.factors == ("machine: scale_x", "machine: squareness_xy")
@@ -72,7 +72,7 @@ def test_a_position_has_more_in_total_than_alone() -> None:
     features, _ = block()
     plan = Plan(features, (Characteristic("position", "position", ("h1",), ("A", "B", "C")),))
     state = machine(unmodelled=tuple(u for u in unmodelled_errors([], {}) if u.effect.name.startswith("hysteresis")))
-    found = budget(Virtual(plan, Circumstances(state, (POSE,))), 2**15)
+    found = variance_shares(Virtual(plan, Circumstances(state, (POSE,))), 2**15)
     x, weights = np.polynomial.hermite_e.hermegauss(200)
     weights /= weights.sum()
     r = np.hypot(x[:, None], x)
@@ -93,8 +93,8 @@ def test_the_place_on_the_table_is_a_cause() -> None:
         plane("B", [-1, 0, 0], [0, 0, 0], [[0, 50, 0], [0, 0, -20]]),
     )
     plan = Plan(features, (Characteristic("corner", "angle", ("A", "B")),))
-    poses = around(Pose(np.eye(3), np.array([400.0, 200, -300])), np.array([150.0, 0, 0]), np.zeros(3), 12)
-    found = budget(Virtual(plan, Circumstances(machine(["straightness_x_z"], bow), poses)), 4096)
+    poses = around(PartPose(np.eye(3), np.array([400.0, 200, -300])), np.array([150.0, 0, 0]), np.zeros(3), 12)
+    found = variance_shares(Virtual(plan, Circumstances(machine(["straightness_x_z"], bow), poses)), 4096)
     assert dict(zip(found.causes, found.total[:, 0], strict=True))[PLACE] > 0.2
     assert dict(zip(found.causes, found.first[:, 0], strict=True))[PLACE] == pytest.approx(0, abs=0.05)
 
@@ -107,7 +107,7 @@ def test_a_part_turned_round_loses_what_the_turn_reverses() -> None:
     )
     plan = Plan(features, (Characteristic("corner", "angle", ("B", "C")),))
     state = machine(["squareness_xy"], 5.0 * np.random.default_rng(4).standard_normal((1000, 1)))
-    quarter = Pose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), POSE.translation_mm)
+    quarter = PartPose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), POSE.translation_mm)
     places = [AtPose(plan, Circumstances(state), pose) for pose in (POSE, quarter)]
     errors = mean_of_places(places, np.random.default_rng(5), 2000)
     assert (
@@ -142,7 +142,7 @@ def test_a_part_goes_where_the_guideway_is_straightest() -> None:
         plane("B", [-1, 0, 0], [0, 0, 0], [[0, 50, 0], [0, 0, -20]]),
     )
     plan = Plan(features, (Characteristic("corner", "angle", ("A", "B")),))
-    given = Circumstances(machine(["straightness_x_z"], bow), (Pose(np.eye(3), np.array([100.0, 200, -300])),))
+    given = Circumstances(machine(["straightness_x_z"], bow), (PartPose(np.eye(3), np.array([100.0, 200, -300])),))
     found = {str(way.name): way.u[0] for way in ways(plan, given, 2000)}
     (moved,) = [name for name in found if name.startswith("part moved by +300 mm along X")]
     assert found[moved] < 0.01 * found["as planned"]
@@ -174,7 +174,7 @@ def test_operators_scatter_by_what_is_stated_and_anew_in_each_set_up() -> None:
     assert found["as planned"] == pytest.approx([np.sqrt(11) * 1e-3, np.sqrt(2) * 1e-3], rel=0.02)
     anew = found["mean of four measurements, the part set up anew in its place each time"]
     assert anew == pytest.approx(found["as planned"] / 2, rel=0.02)
-    shares = budget(Virtual(plan, given), 4096)
+    shares = variance_shares(Virtual(plan, given), 4096)
     at = shares.causes.index(f"operator: reproducibility of {name}")
     assert shares.first[at] == pytest.approx([9 / 11, 0.0], abs=0.03)
     with pytest.raises(CmmUqError, match="there is no characteristic 'lenght'"):
@@ -184,14 +184,14 @@ def test_operators_scatter_by_what_is_stated_and_anew_in_each_set_up() -> None:
 ENDS = Plan(
     (spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), (Characteristic("apart", "distance", ("one", "other")),)
 )
-TURNED = Pose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([400.0, 100.0, -300.0]))
+TURNED = PartPose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([400.0, 100.0, -300.0]))
 
 
 @pytest.mark.parametrize(("scale", "pose"), [("scale_x", POSE), ("scale_y", TURNED)])
-def test_a_scale_stretches_the_part_about_its_middle(scale: str, pose: Pose) -> None:
+def test_a_scale_stretches_the_part_about_its_middle(scale: str, pose: PartPose) -> None:
     """10 ppm of 300 mm are 3 µm, half at either end and against each other; in the frame of the part along its x."""
     draws = 10.0 * np.random.default_rng(1).standard_normal((4000, 1))
-    found = displaced(Virtual(ENDS, Circumstances(machine([scale], draws), (pose,))))
+    found = point_errors(Virtual(ENDS, Circumstances(machine([scale], draws), (pose,))))
     u = 1e3 * np.sqrt(np.einsum("nii->ni", found.covariance))
     np.testing.assert_allclose(u, [[1.5, 0, 0], [1.5, 0, 0]], atol=0.06)
     np.testing.assert_allclose(found.mean, 0, atol=2e-4)
@@ -199,7 +199,7 @@ def test_a_scale_stretches_the_part_about_its_middle(scale: str, pose: Pose) -> 
 
 def test_readings_keep_what_is_not_common() -> None:
     """Noise of 2 µm in x of both ends: √2 µm is left of each about their mean; in y and z a shift and a turn take all."""
-    found = displaced(Virtual(ENDS, Circumstances(machine(noise_um=2.0), (POSE,))))
+    found = point_errors(Virtual(ENDS, Circumstances(machine(noise_um=2.0), (POSE,))))
     u = 1e3 * np.sqrt(np.einsum("nii->ni", found.covariance.clip(0)))
     np.testing.assert_allclose(u, [[np.sqrt(2), 0, 0]] * 2, atol=0.07)
 
@@ -207,12 +207,12 @@ def test_readings_keep_what_is_not_common() -> None:
 def test_a_warm_part_that_is_not_corrected_is_found_larger() -> None:
     """Steel at 25 °C over 300 mm: 11.5e-6 · 5 · 300 mm = 17.25 µm, outwards at either end."""
     warm = Surroundings(Expansion(11.5e-6, temperature_c=25.0, corrected=False))
-    found = displaced(Virtual(ENDS, Circumstances(machine(), (POSE,), warm)), 10)
+    found = point_errors(Virtual(ENDS, Circumstances(machine(), (POSE,), warm)), 10)
     np.testing.assert_allclose(1e3 * found.mean, [[-8.625, 0, 0], [8.625, 0, 0]], atol=1e-9)
     np.testing.assert_allclose(found.covariance, 0, atol=1e-15)
 
 
 def test_where_the_part_was_measured_is_no_error_of_it() -> None:
     measured = ENDS.points + np.array([[0.0, 0, 0], [0.05, 0.02, 0]])
-    found = displaced(Virtual(ENDS, Circumstances(machine(), (POSE,), measured=measured)), 10)
+    found = point_errors(Virtual(ENDS, Circumstances(machine(), (POSE,), measured=measured)), 10)
     np.testing.assert_allclose(found.mean, 0, atol=1e-12)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.analysis.parts.association import ProbedFeature
 from cmm_uq.analysis.parts.evaluation import Evaluator
-from cmm_uq.analysis.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, PartAlignment, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association
@@ -217,11 +217,11 @@ def test_frames_of_datums_in_order(datums: tuple[str, ...], moves: dict[str, Mov
 def test_a_best_fit_takes_back_the_motion_of_all_points_and_shares_out_the_rest() -> None:
     """The block moved as a whole has no error; one of its two end faces, alike, 8 µm out moves it by half of it."""
     one = Characteristic("", "x", ("h1",))
-    plan = Plan(BLOCK, (one,), alignment=Alignment(best_fit=True))
+    plan = Plan(BLOCK, (one,), alignment=PartAlignment(best_fit=True))
     turn = Rotation.from_rotvec([1e-3, -2e-3, 1e-3]).as_matrix()
     whole = plan.points @ turn.T + [0.3, -0.2, 0.1] - plan.points
     assert Evaluator(plan, whole, [])([], exact=True)[0, 0] == pytest.approx(30.0, abs=NANOMETRE)
-    ends = Plan(BLOCK[:4], (Characteristic("", "position", ("C",)),), alignment=Alignment(best_fit=True))
+    ends = Plan(BLOCK[:4], (Characteristic("", "position", ("C",)),), alignment=PartAlignment(best_fit=True))
     base = np.zeros_like(ends.points)
     base[ends.rows["D"], 0] = 0.008
     assert Evaluator(ends, base, [])([], exact=True)[0, 0] == pytest.approx(2 * 0.004, abs=NANOMETRE)
@@ -230,7 +230,7 @@ def test_a_best_fit_takes_back_the_motion_of_all_points_and_shares_out_the_rest(
 def test_a_best_fit_of_one_face_is_refused() -> None:
     with pytest.raises(CmmUqError, match="leave the part free to move by their best fit"):
         Evaluator(
-            Plan(BLOCK[:1], (Characteristic("", "x", ("A",)),), alignment=Alignment(best_fit=True)),
+            Plan(BLOCK[:1], (Characteristic("", "x", ("A",)),), alignment=PartAlignment(best_fit=True)),
             np.zeros((16, 3)),
             [],
         )

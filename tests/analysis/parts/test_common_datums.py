@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.analysis.parts.causes.cause import Scatter
+from cmm_uq.analysis.parts.causes.cause import PointScatter
 from cmm_uq.analysis.parts.common_datums import ProbedCommon
 from cmm_uq.analysis.parts.evaluation import Evaluator
 from cmm_uq.analysis.parts.plan import Characteristic, CommonDatum, Feature, Nominal, Plan
@@ -158,7 +158,7 @@ def test_first_order_is_the_derivative_of_the_whole() -> None:
     plan = plan_of(shaft(COLLAR), Characteristic("c", "coaxiality", ("collar",), ("A-B",)))
     base, off = moved(plan, collar=np.array([0.05, 0, 0])), []
     for size in (0.02, 0.002):
-        noise = Scatter.of("noise", "noise", np.full((len(plan.points), 3), size))
+        noise = PointScatter.of("noise", "noise", np.full((len(plan.points), 3), size))
         evaluator, given = Evaluator(plan, base, [noise]), noise.draw(np.random.default_rng(1), 50)
         off.append(float(np.abs(evaluator([given]) - evaluator([given], exact=True)).max()))
     assert off[1] < 0.015 * off[0]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cmm_uq.analysis.conformity.limits import RARE, SCARCE, LimitDecision, Limits, judge
 from cmm_uq.analysis.parts.plan import Characteristic, Plan
-from cmm_uq.analysis.parts.result import Stated, conforming, middle, stated
+from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, middle, stated
 from cmm_uq.app.commands.parts.part import _together
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
@@ -39,7 +39,7 @@ limits_of = st.one_of(st.none(), numbers)
 
 def all_of(
     errors: Floats, measured: Floats, plan: Plan
-) -> tuple[tuple[Stated, ...], Floats, float, list[LimitDecision]]:  # fmt: skip
+) -> tuple[tuple[StatedCharacteristic, ...], Floats, float, list[LimitDecision]]:  # fmt: skip
     names = [one.name for one in plan.characteristics]
     simulated = from_source(Source(names, lambda random, n: errors.T.copy()), N)
     each, together = conforming(plan, errors, measured)
@@ -96,7 +96,9 @@ def test_what_is_stated_does_not_contradict_itself(
         assert max(0.0, 1 - np.sum(1 - least)) - 1e-12 <= every <= least.min() + 1e-12
 
 
-def _agrees_with_its_decision(one: Stated, asked: Characteristic, judged: LimitDecision, draws: Floats) -> None:
+def _agrees_with_its_decision(
+    one: StatedCharacteristic, asked: Characteristic, judged: LimitDecision, draws: Floats
+) -> None:
     (low, high), upper, probability = one.interval, float(asked.upper or 0.0), float(judged.probability or 0.0)
     assert one.value is not None
     # decision and probability

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, PartAlignment, Plan
 from cmm_uq.base.errors import CmmUqError
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -49,7 +49,7 @@ def test_names_that_lead_nowhere_are_refused(
     features: tuple[str, ...], characteristics: tuple[Characteristic, ...], alignment: tuple[str, ...], words: str
 ) -> None:
     with pytest.raises(CmmUqError, match=words):
-        Plan(tuple(plane(name) for name in features), characteristics, alignment=Alignment(alignment))
+        Plan(tuple(plane(name) for name in features), characteristics, alignment=PartAlignment(alignment))
 
 
 def test_points_of_all_features_stand_in_their_order() -> None:

@@ -14,7 +14,7 @@ from scipy import stats
 from cmm_uq.analysis.conformity.limits import Limits
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
-from cmm_uq.analysis.parts.result import Stated, conforming, deviations_of, stated
+from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, deviations_of, stated
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
 from tests.parts_drawn import UP, block, circle, plane, spot
 
@@ -27,7 +27,7 @@ DRAWS = np.random.default_rng(11).standard_normal((200_000, 1)) + 0.25
 ERRORS = np.repeat(DRAWS, 2, axis=1)
 
 
-def of(value: float) -> tuple[Stated, ...]:
+def of(value: float) -> tuple[StatedCharacteristic, ...]:
     """What is stated of a zone and a size of the same value, measured 0.25 above it."""
     blocks = iter(np.split(ERRORS.T, 20, axis=1))
     simulated = from_source(Source(["zone", "size"], lambda random, n: next(blocks).copy()), len(ERRORS))

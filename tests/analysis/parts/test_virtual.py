@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from scipy.stats import ncx2
 
-from cmm_uq.analysis.parts.causes.cause import Rows, Scatter
+from cmm_uq.analysis.parts.causes.cause import PointScatter, Rows
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
-from cmm_uq.analysis.parts.placing import Pose, placed
-from cmm_uq.analysis.parts.plan import Alignment, Characteristic, Nominal, Plan, Stylus
+from cmm_uq.analysis.parts.placing import PartPose, placed
+from cmm_uq.analysis.parts.plan import Characteristic, Nominal, PartAlignment, Plan, Stylus
 from cmm_uq.analysis.parts.result import conforming, evaluated, stated
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances, Virtual
 from cmm_uq.base.errors import CmmUqError
@@ -30,7 +30,7 @@ def pair(one: object = (0, 0, 0), other: object = (300, 0, 0)) -> Plan:
     return Plan((spot("one", one), spot("other", other)), APART)  # type: ignore[arg-type]
 
 
-def errors(plan: Plan, given: Circumstances, pose: Pose = POSE, *, exact: bool = True, n: int = 200) -> np.ndarray:
+def errors(plan: Plan, given: Circumstances, pose: PartPose = POSE, *, exact: bool = True, n: int = 200) -> np.ndarray:
     at = AtPose(plan, given, pose)
     return at.errors(at.drawn(np.random.default_rng(0), n), exact=exact)
 
@@ -156,7 +156,9 @@ def test_a_free_body_in_a_gradient_of_temperature_bends_to_a_circle() -> None:
     ends = [spot("a", [0, 0, 0]), spot("middle", [200, 0, 0]), spot("b", [length, 0, 0])]
     plan = Plan(tuple(ends), (Characteristic("z", "distance", ("a", "b")),))
     warm = Surroundings(Expansion(alpha), u_gradient_k_per_m=np.array([0.0, 0.0, gradient]))
-    at = AtPose(plan, Circumstances(machine(), surroundings=warm), Pose(np.eye(3), np.array([100.0, 100.0, -100.0])))
+    at = AtPose(
+        plan, Circumstances(machine(), surroundings=warm), PartPose(np.eye(3), np.array([100.0, 100.0, -100.0]))
+    )
     bent = at.causes[-1].moved(np.array([[0.0, 0.0, gradient]]), slice(None))[0, :, 2]
     sagitta = bent[1] - 0.5 * (bent[0] + bent[2])
     assert sagitta == pytest.approx(alpha * gradient * 1e-3 * length**2 / 8, rel=1e-9)
@@ -167,7 +169,7 @@ def test_a_free_body_in_a_gradient_of_temperature_bends_to_a_circle() -> None:
 def test_where_the_part_lies_is_no_error_of_it(numbers: list[float]) -> None:
     """A part moved and turned a little, as a whole, has the characteristics that it had; within 0.1 nm."""
     features, characteristics = block()
-    plan = Plan(features, characteristics, alignment=Alignment(("A", "B", "C")))
+    plan = Plan(features, characteristics, alignment=PartAlignment(("A", "B", "C")))
     turn = Rotation.from_rotvec(1e-3 * np.array(numbers[:3])).as_matrix()
     moved = Evaluator(plan, plan.points @ turn.T + np.array(numbers[3:]) - plan.points, [])
     off = moved([], exact=True) - characteristics_of(plan, plan.points)
@@ -182,7 +184,7 @@ def test_first_order_is_the_exact_measurement_to_a_hundredth_of_u(best_fit: bool
     if best_fit:
         characteristics = tuple(replace(c, datums=()) if len(c.datums) == 3 else c for c in characteristics)
     styli = (Stylus("stylus", np.array([0, 0, -100.0]), 4.0, 0.5, np.zeros(3), 0.8),)
-    plan = Plan(features, characteristics, styli, Alignment(best_fit=best_fit))
+    plan = Plan(features, characteristics, styli, PartAlignment(best_fit=best_fit))
     virtual = Virtual(plan, Circumstances(machine(names, draws, 1.0), (POSE,)))
     assert virtual.off.max() < 0.003
     assert not virtual.exact
@@ -209,7 +211,7 @@ def test_linear_characteristics_have_the_covariance_of_the_law_of_propagation() 
     draws = np.random.default_rng(6).multivariate_normal(np.zeros(3), correlated, 100_000)
     noise = 1.5e-3
     state = machine(["scale_x", "scale_y", "squareness_xy"], draws, 1e3 * noise)
-    pose = Pose(np.eye(3), np.array([100.0, 100.0, -300.0]))
+    pose = PartPose(np.eye(3), np.array([100.0, 100.0, -300.0]))
     found = Virtual(plan, Circumstances(state, (pose,))).simulated(200_000, seed=7).covariance
     diagonal = np.hypot(400.0, 250.0)
     unit = {"x": np.array([1.0, 0, 0]), "y": np.array([0, 1.0, 0]), "xy": np.array([400, 250, 0]) / diagonal}
@@ -226,7 +228,7 @@ def test_a_part_beyond_the_travel_is_refused() -> None:
     with pytest.raises(
         CmmUqError, match=r"X would have to read 950.0 mm at feature 'other', beyond its travel of 0 to 900"
     ):
-        errors(pair(), Circumstances(machine()), Pose(np.eye(3), np.array([650.0, 0, -10])))
+        errors(pair(), Circumstances(machine()), PartPose(np.eye(3), np.array([650.0, 0, -10])))
 
 
 @pytest.mark.parametrize(("datums", "words"), [
@@ -245,7 +247,7 @@ def test_a_mean_error_of_the_machine_is_that_of_its_place() -> None:
     state = machine(["scale_x"], [[1000.0]], corrected=False)
     plan = Plan((spot("one", [0, 0, 0]), spot("other", [100, 0, 0])), APART)
     far = Machine("m", travel_mm=MACHINE.travel_mm, origin_mm=np.array([50.0, 0, 0]))
-    at = AtPose(plan, Circumstances(replace(state, machine=far)), Pose(np.eye(3), np.array([650.0, 10, -10])))
+    at = AtPose(plan, Circumstances(replace(state, machine=far)), PartPose(np.eye(3), np.array([650.0, 10, -10])))
     np.testing.assert_allclose(at.measured.base[:, 0], -np.array([700.0, 800.0]) * 1e-3 / 1.001, rtol=1e-9)
 
 
@@ -354,7 +356,7 @@ def test_where_a_hole_truly_is_follows_from_where_it_was_measured(common: float,
                 (Characteristic("p", "position", ("hole",), ("o", "a", "up")),), (Stylus("stylus"), tip))  # fmt: skip
     of_hole = np.tile((plan.stylus_of == 1)[:, None], (1, 3))
     # the centre is the mean of two of four points along each axis with weight 1/2: u of each reading over √2
-    noise = Scatter.of("noise", "reading", np.sqrt(2) * 1e-3 * own * of_hole)
+    noise = PointScatter.of("noise", "reading", np.sqrt(2) * 1e-3 * own * of_hole)
     measured = plan.points + 1e-3 * off_um * of_hole * [1, 0, 0]
     given = Circumstances(machine(), (POSE,), further=(noise,), measured=measured)
     true = evaluated(plan, measured) - Virtual(plan, given).errors(np.random.default_rng(0), 100_000)

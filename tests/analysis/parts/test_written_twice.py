@@ -14,7 +14,7 @@ from benchmarks.parts import truth
 from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, joined, parted, plan
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.placing import Pose, WithStyli
+from cmm_uq.analysis.parts.placing import PartPose, WithStyli
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.machine.physics.catalogue import effects
@@ -27,7 +27,7 @@ NAMES = (
 )  # fmt: skip
 EFFECTS = effects(NAMES)
 TURN = np.array([[np.cos(0.7), -np.sin(0.7), 0], [np.sin(0.7), np.cos(0.7), 0], [0, 0, 1]])
-POSE = Pose(TURN, np.array([400.0, 200.0, -300.0]))
+POSE = PartPose(TURN, np.array([400.0, 200.0, -300.0]))
 
 
 def coefficients(of: truth.Truth) -> Floats:

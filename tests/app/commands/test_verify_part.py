@@ -16,13 +16,13 @@ import pytest
 from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.commands.parts.documents import Asked, contents_of, write_part, written
-from cmm_uq.app.commands.parts.machine import machine_found
-from cmm_uq.app.commands.parts.part import part_found
+from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, write_part, written
+from cmm_uq.app.commands.parts.machine import state_machine
+from cmm_uq.app.commands.parts.part import evaluate_part
 from cmm_uq.app.commands.verify import Verification, verify
 from cmm_uq.app.commands.verify_part import _asked_again
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import standing_data
 from cmm_uq.certificate.verify.pdf_file import PdfFile
 from tests.conftest import ROOT
@@ -50,7 +50,7 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests whose report was made by :func:`plate_found`, that computing again has no part in."""
-    monkeypatch.setattr("cmm_uq.app.commands.parts.documents.found_of", found_again_once)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.documents.evaluate", found_again_once)
 
 
 def found_in(folder: Path, files: Mapping[str, bytes], *names: str, rerun: bool = False) -> Verification:
@@ -128,7 +128,7 @@ def test_another_expanded_uncertainty_in_one_document_is_found_without(tmp_path:
     assert {"characteristics[0].U", "characteristics[0].k", "results of 1"} <= set(places(found)), told(found)
 
 
-def moved(found: PartFound) -> bytes:
+def moved(found: PartMeasurement) -> bytes:
     """The recording with one point of the bore moved by 10 µm."""
     lines = found.job.inputs["points.csv"].decode().splitlines()
     *rest, last = lines
@@ -177,14 +177,14 @@ def test_the_machines_own_job_goes_with_the_report(tmp_path: Path, monkeypatch: 
     (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
     files = plate_files({}, np.zeros((60, 3)), machine_state={"job": "../machine"})
     put(tmp_path / "plate", files)
-    write_part(tmp_path / "plate", tmp_path / "out", asked=Asked(trials=TRIALS))
+    write_part(tmp_path / "plate", tmp_path / "out", asked=PartOptions(trials=TRIALS))
     found = verify([tmp_path / "out" / PDF])
     assert found.inquiry.word == "VERIFIED", told(found)
     assert any("was analysed, and is inside" in note for note in found.inquiry.notes)
 
 
 def test_nothing_measured_is_verified_too(tmp_path: Path) -> None:
-    files = contents_of(part_found(plate_of(by_results(), **THERE), trials=1000))
+    files = contents_of(evaluate_part(plate_of(by_results(), **THERE), trials=1000))
     found = found_in(tmp_path, files)
     assert not found.inquiry.findings, told(found)
 
@@ -210,6 +210,6 @@ def test_exit_codes_are_those_of_a_machines_certificate(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rerun", [False, True])
 def test_a_report_that_was_to_compute_its_machine_again_is_made_again_so(rerun: bool) -> None:
     """Whether or not that could be done: the report says of both what was asked."""
-    said = standing_data(machine_found(plate_of(by_results(), **THERE), rerun=rerun).standing)
+    said = standing_data(state_machine(plate_of(by_results(), **THERE), rerun=rerun).standing)
     assert not said["computed_again"]
     assert _asked_again(said) == rerun

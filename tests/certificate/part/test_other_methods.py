@@ -8,8 +8,14 @@ from math import degrees, sqrt
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.methods.comparison import compared
-from cmm_uq.analysis.parts.methods.method import ByMethod, Compared, Comparison, Figure, Stating
+from cmm_uq.analysis.parts.methods.comparison import compare_methods
+from cmm_uq.analysis.parts.methods.method import (
+    ComparedCharacteristic,
+    MethodComparison,
+    MethodFigure,
+    MethodResult,
+    MethodStatement,
+)
 from cmm_uq.analysis.parts.methods.of_job import methods_of
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import ARCSECOND, unit
@@ -23,16 +29,16 @@ from tests.jobs.part.other_methods import SIZE, with_methods
 
 
 @pytest.fixture(scope="module")
-def comparison() -> Comparison:
+def comparison() -> MethodComparison:
     job = with_methods()
     found = found_of(job, points=measured_points(job), draws=1000)
-    one = compared(found.stated, found.budget, methods_of(found.job, found.plan, found.measured))
+    one = compare_methods(found.stated, found.budget, methods_of(found.job, found.plan, found.measured))
     assert one is not None
     return one
 
 
 @pytest.fixture(scope="module")
-def section(comparison: Comparison) -> Section:
+def section(comparison: MethodComparison) -> Section:
     return methods_section(comparison)
 
 
@@ -45,7 +51,7 @@ def test_a_job_without_other_methods_has_no_such_section() -> None:
     assert methods_data(None) is None
 
 
-def test_each_method_has_a_row_with_value_u_and_U(comparison: Comparison, section: Section) -> None:  # noqa: N802
+def test_each_method_has_a_row_with_value_u_and_U(comparison: MethodComparison, section: Section) -> None:  # noqa: N802
     rows = [row for row in table(section, "Lengths by each method").rows if row[0] == SIZE]
     assert [row[1] for row in rows] == ["The virtual measurements", "The calibrated part", "Several orientations"]
     u = 1e3 * sqrt(0.4e-3**2 + 1e-3**2 * 20 / 19 + 0.3e-3**2)
@@ -57,7 +63,7 @@ def test_each_method_has_a_row_with_value_u_and_U(comparison: Comparison, sectio
     assert float(rows[2][5].replace("−", "-")) == pytest.approx(pairs["orientations"], abs=0.006)
 
 
-def test_why_is_said_for_each_characteristic(comparison: Comparison, section: Section) -> None:
+def test_why_is_said_for_each_characteristic(comparison: MethodComparison, section: Section) -> None:
     told = [block.text for block in section.blocks if isinstance(block, Paragraph)]
     for one in comparison.characteristics:
         assert f"Characteristic {one.name}: {' '.join(one.why)}" in told
@@ -86,7 +92,7 @@ def test_it_says_which_descriptions_it_follows(section: Section) -> None:
     assert "public summary of ISO/DTS 15530-2" in told
 
 
-def test_it_stands_on_the_part_s_page(comparison: Comparison) -> None:
+def test_it_stands_on_the_part_s_page(comparison: MethodComparison) -> None:
     job = with_methods()
     found = replace(found_of(job, points=measured_points(job), draws=500), methods=comparison)
     assert any(one.title == "Other methods beside it" for one in part_document(found).sections)
@@ -96,9 +102,11 @@ def test_angles_are_in_degrees_and_seconds() -> None:
     budget = Budget(
         say("b"), [Line(say("all"), 2 * ARCSECOND, REPEATS, unit=unit("rad"))], 0.0, unit("rad"), factor=2.0
     )
-    figure = Figure("a", budget, float(np.radians(30.0)))
-    stating = Stating("orientations", figure.value, figure.u, figure.U)
-    one = Comparison((ByMethod("orientations", (figure,), (), {}),), (Compared("a", (stating,), (), ()),))
+    figure = MethodFigure("a", budget, float(np.radians(30.0)))
+    stating = MethodStatement("orientations", figure.value, figure.u, figure.U)
+    one = MethodComparison(
+        (MethodResult("orientations", (figure,), (), {}),), (ComparedCharacteristic("a", (stating,), (), ()),)
+    )
     (row,) = table(methods_section(one), "Angles by each method").rows
     assert row[2:5] == ("30.0000", "2.0", "4.0")
     (data,) = methods_data(one)["methods"][0]["characteristics"]  # type: ignore[index]
@@ -111,15 +119,18 @@ def test_of_many_characteristics_those_are_explained_whose_methods_differ_most()
     many = []
     for i in range(8):
         apart = 1.0 if i < 2 else 2.0 + i
-        stated = (Stating("virtual", None, 1e-3, 2e-3), Stating("calibrated_part", None, apart * 1e-3, 3e-3))
-        many.append(Compared(f"c{i}", stated, (), (say("Because."),)))
-    section = methods_section(Comparison((ByMethod("calibrated_part", (), (), {}),), tuple(many)))
+        stated = (
+            MethodStatement("virtual", None, 1e-3, 2e-3),
+            MethodStatement("calibrated_part", None, apart * 1e-3, 3e-3),
+        )
+        many.append(ComparedCharacteristic(f"c{i}", stated, (), (say("Because."),)))
+    section = methods_section(MethodComparison((MethodResult("calibrated_part", (), (), {}),), tuple(many)))
     told = [block.text for block in section.blocks if isinstance(block, Paragraph) and "Because" in block.text]
     assert told == [f"Characteristic c{i}: Because." for i in range(2, 8)]
     assert any("6 characteristics whose methods differ most" in getattr(block, "text", "") for block in section.blocks)
 
 
-def test_results_have_every_figure(comparison: Comparison) -> None:
+def test_results_have_every_figure(comparison: MethodComparison) -> None:
     data = methods_data(comparison)
     assert data is not None
     one = data["methods"][0]["characteristics"][0]

@@ -20,14 +20,14 @@ import pytest
 
 from cmm_uq.analysis.conformity.decision import Outcome
 from cmm_uq.analysis.conformity.limits import LimitDecision
-from cmm_uq.analysis.parts.budget import Displaced
+from cmm_uq.analysis.parts.budget import PointErrors
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.document import Document, Overview, Section, Table
 from cmm_uq.certificate.effect_words import title_of
 from cmm_uq.certificate.part.budget_section import by_family, unseen_section, ways_section
 from cmm_uq.certificate.part.figures import _remarks
-from cmm_uq.certificate.part.measurement import Further, PartFound, Unseen
+from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement, UnseenError
 from cmm_uq.certificate.part.method import method_section
 from cmm_uq.certificate.part.page import lacking_of, machine_section, overview_of, part_document
 from cmm_uq.certificate.part.part_section import errors_section
@@ -70,12 +70,12 @@ CHARACTERISTICS = [
 
 
 @pytest.fixture(scope="module")
-def planned() -> PartFound:
+def planned() -> PartMeasurement:
     return found_of()
 
 
 @pytest.fixture(scope="module")
-def measured() -> PartFound:
+def measured() -> PartMeasurement:
     """The bore 20 µm off in x and 10 µm in y; the job says all that is asked for, and that a thread was left out."""
     stated = {
         "id": "plate", "date": dt.date(2026, 5, 31), "number": "P-77", "issued": dt.date(2026, 6, 1), "customer": "Customer",
@@ -88,7 +88,7 @@ def measured() -> PartFound:
 
 
 @pytest.fixture(scope="module")
-def every_kind() -> PartFound:
+def every_kind() -> PartMeasurement:
     """Angles beside lengths, limits on one side and on none, long names, two styli, features of every other kind."""
     planes = [{**one, "stylus": "down"} for one in TABLES["feature"][:3]]
     job = plate(feature=[*planes, *KINDS], stylus=STYLI, characteristic=CHARACTERISTICS)
@@ -96,11 +96,11 @@ def every_kind() -> PartFound:
 
 
 @cache
-def page(found: PartFound) -> Document:
+def page(found: PartMeasurement) -> Document:
     return part_document(found)
 
 
-def row_of(found: PartFound, label: str) -> str:
+def row_of(found: PartMeasurement, label: str) -> str:
     """A row of the overview."""
     return next(text for what, text in overview_of(found).rows if what == label)
 
@@ -132,7 +132,7 @@ def agrees(text: str, value: float) -> bool:
     return abs(float(shown) - value) <= 1.0001 * half or (value > 0 and 0 <= float(shown) / value - 1 < 0.06)
 
 
-def test_every_figure_of_the_results_is_what_was_found(measured: PartFound) -> None:
+def test_every_figure_of_the_results_is_what_was_found(measured: PartMeasurement) -> None:
     (table,) = tables(page(measured), "Results")
     assert [column.unit for column in table.columns] == ["", "", "mm", "µm", "", "mm"]
     for i, (row, one) in enumerate(zip(table.rows, measured.stated, strict=True)):
@@ -155,7 +155,7 @@ def test_every_figure_of_the_results_is_what_was_found(measured: PartFound) -> N
             assert figure(value).as_tuple().exponent == min(figure(U).as_tuple().exponent - 3, figure(U).adjusted() - 4)  # type: ignore[operator]
 
 
-def test_angles_are_stated_in_degrees_and_seconds(every_kind: PartFound) -> None:
+def test_angles_are_stated_in_degrees_and_seconds(every_kind: PartMeasurement) -> None:
     lengths, angles = tables(page(every_kind), "Results")
     assert [column.unit for column in angles.columns] == ["", "", "°", "″", "", "°"]
     assert [int(row[0]) for row in angles.rows] == [1, 2]
@@ -167,7 +167,7 @@ def test_angles_are_stated_in_degrees_and_seconds(every_kind: PartFound) -> None
     assert agrees(angles.rows[0][5].split(" to ")[0], np.degrees(one.interval[0]))
 
 
-def test_of_a_planned_measurement_only_its_uncertainty_is_stated(planned: PartFound) -> None:
+def test_of_a_planned_measurement_only_its_uncertainty_is_stated(planned: PartMeasurement) -> None:
     document = page(planned)
     (table,) = tables(document, "Results")
     assert [column.heading for column in table.columns] == [
@@ -191,7 +191,7 @@ def test_of_a_planned_measurement_only_its_uncertainty_is_stated(planned: PartFo
     assert "Decision" not in [column.heading for table in tables(document) for column in table.columns]
 
 
-def test_limits_nominals_and_what_is_accepted(measured: PartFound) -> None:
+def test_limits_nominals_and_what_is_accepted(measured: PartMeasurement) -> None:
     (table,) = tables(page(measured), "Conformity with the drawing")
     rows = {str.__str__(row[0]): row for row in table.rows}
     assert rows["1"][2:5] == ("30", "29.95", "30.05")
@@ -206,7 +206,7 @@ def test_limits_nominals_and_what_is_accepted(measured: PartFound) -> None:
     assert [row[6] for row in table.rows] == [one and one.outcome for one in measured.judged]
 
 
-def test_limits_on_one_side_and_on_none(every_kind: PartFound) -> None:
+def test_limits_on_one_side_and_on_none(every_kind: PartMeasurement) -> None:
     lengths, angles = tables(page(every_kind), "Conformity with the drawing")
     assert [row[0] for row in angles.rows] == ["1", "2"]
     assert [row[0] for row in lengths.rows] == ["3", "4"]
@@ -216,7 +216,7 @@ def test_limits_on_one_side_and_on_none(every_kind: PartFound) -> None:
     assert lengths.rows[0][5].startswith("up to 2")
 
 
-def judged_as(found: PartFound, outcomes: Iterable[Outcome | None]) -> Overview:
+def judged_as(found: PartMeasurement, outcomes: Iterable[Outcome | None]) -> Overview:
     """The overview, had the rule decided otherwise."""
     judged = tuple(
         None if outcome is None or one is None else replace(one, outcome=outcome)
@@ -238,14 +238,14 @@ def judged_as(found: PartFound, outcomes: Iterable[Outcome | None]) -> Overview:
     ((None,) * 5, "Measured: no limits to decide on", "unknown"),
 ])  # fmt: skip
 def test_the_verdict_is_that_of_all_decisions(
-    measured: PartFound, outcomes: tuple[Outcome | None, ...], verdict: str, standing: str
+    measured: PartMeasurement, outcomes: tuple[Outcome | None, ...], verdict: str, standing: str
 ) -> None:
     overview = judged_as(measured, outcomes)
     assert overview.verdict == verdict
     assert overview.standing == standing
 
 
-def test_the_least_margin_is_told_first(measured: PartFound) -> None:
+def test_the_least_margin_is_told_first(measured: PartMeasurement) -> None:
     told = row_of(measured, "Least margin")
     place = measured.nearest
     assert place is not None
@@ -260,7 +260,7 @@ def test_the_least_margin_is_told_first(measured: PartFound) -> None:
     assert "3.0 u outside of the limit" in row_of(replace(measured, stated=stated), "Least margin")
 
 
-def test_what_is_planned_is_told_by_the_share_of_its_tolerance(planned: PartFound) -> None:
+def test_what_is_planned_is_told_by_the_share_of_its_tolerance(planned: PartMeasurement) -> None:
     told = row_of(planned, "Tightest")
     widths = np.array([0.1, 0.1, 0.05, 0.02, 0.1])
     taken = np.array([one.interval[1] - one.interval[0] for one in planned.stated]) / widths
@@ -270,7 +270,7 @@ def test_what_is_planned_is_told_by_the_share_of_its_tolerance(planned: PartFoun
     assert agrees(share[1], 100 * float(taken.max()))
 
 
-def test_shares_of_a_characteristic_are_those_of_its_budget(measured: PartFound) -> None:
+def test_shares_of_a_characteristic_are_those_of_its_budget(measured: PartMeasurement) -> None:
     budget = measured.budget
     table = tables(page(measured), "What the uncertainty is made of")[0]
     lines = {str.__str__(row[2]): row for row in table.rows if row[0] == "1"}
@@ -281,7 +281,7 @@ def test_shares_of_a_characteristic_are_those_of_its_budget(measured: PartFound)
     assert next(iter(lines)) == "Hysteresis of Y"
 
 
-def test_families_share_the_variance_among_them(measured: PartFound) -> None:
+def test_families_share_the_variance_among_them(measured: PartMeasurement) -> None:
     names, shares = by_family(measured)
     np.testing.assert_allclose(shares.sum(axis=0), 1.0)
     stylus = [g for g, line in enumerate(measured.budget.causes) if line.startswith("stylus: ")]
@@ -290,12 +290,23 @@ def test_families_share_the_variance_among_them(measured: PartFound) -> None:
     assert list(shares.sum(axis=1)) == sorted(shares.sum(axis=1), reverse=True)
 
 
-def test_what_the_calibration_did_not_see_is_named_with_its_share_and_what_to_measure(measured: PartFound) -> None:
+def test_what_the_calibration_did_not_see_is_named_with_its_share_and_what_to_measure(
+    measured: PartMeasurement,
+) -> None:
     unseen = (
-        Unseen("2", "machine: roll", "rotation_x_x", title_of("rotation_x_x"), 0.73, say("the calibration did not model it")),
-        Unseen("1", "machine: roll", "rotation_x_x", title_of("rotation_x_x"), 0.2, say("the calibration did not model it")),
-    )  # fmt: skip
-    further = Further(("rotation_x_x",), 4, say("Four set-ups of the ballbar would show it."), "cmm-uq plan roll")
+        UnseenError(
+            "2",
+            "machine: roll",
+            "rotation_x_x",
+            title_of("rotation_x_x"),
+            0.73,
+            say("the calibration did not model it"),
+        ),
+        UnseenError(
+            "1", "machine: roll", "rotation_x_x", title_of("rotation_x_x"), 0.2, say("the calibration did not model it")
+        ),
+    )
+    further = FurtherSetUps(("rotation_x_x",), 4, say("Four set-ups of the ballbar would show it."), "cmm-uq plan roll")
     found = replace(measured, unseen=unseen, further=further)
     told = said(unseen_section(found).blocks)
     assert f"73 % of the variance of characteristic 2 comes from {title_of('rotation_x_x')[0].lower()}" in told
@@ -307,7 +318,7 @@ def test_what_the_calibration_did_not_see_is_named_with_its_share_and_what_to_me
     assert unseen_section(replace(measured, unseen=())).blocks == ()
 
 
-def test_the_best_way_is_the_one_that_makes_u_smallest(measured: PartFound) -> None:
+def test_the_best_way_is_the_one_that_makes_u_smallest(measured: PartMeasurement) -> None:
     place = measured.nearest
     assert place is not None
     planned, first, *others = measured.ways
@@ -322,19 +333,19 @@ def test_the_best_way_is_the_one_that_makes_u_smallest(measured: PartFound) -> N
         assert all(agrees(cell, 1e3 * float(size)) for cell, size in zip(row[1:], u, strict=True))
 
 
-def test_no_way_is_praised_that_gains_nothing(measured: PartFound) -> None:
+def test_no_way_is_praised_that_gains_nothing(measured: PartMeasurement) -> None:
     same = tuple(replace(way, u=measured.ways[0].u) for way in measured.ways)
     assert row_of(replace(measured, ways=same), "To reduce it").startswith("None of the ways")
 
 
-def test_correlations_are_those_of_the_errors(measured: PartFound) -> None:
+def test_correlations_are_those_of_the_errors(measured: PartMeasurement) -> None:
     (table,) = tables(page(measured), "Correlations")
     for i, row in enumerate(table.rows):
         for j, cell in enumerate(row[2:]):
             assert cell == "–" if j > i else agrees(cell, float(measured.correlation[i, j]))
 
 
-def test_the_machine_s_certificate_and_what_of_it_was_verified(measured: PartFound) -> None:
+def test_the_machine_s_certificate_and_what_of_it_was_verified(measured: PartMeasurement) -> None:
     told = said(section(page(measured), "The machine and its certificate").blocks)
     for text in ("K-2031", "Portal 7, serial number 1102", "2026-03-01, 91 days before", "2027-02-28", "20.10 °C",
                  "55 comparisons of 2 sorts", "not computed again", "All errors are drawn", "1, 1, 1 µm"):  # fmt: skip
@@ -350,7 +361,7 @@ def test_the_machine_s_certificate_and_what_of_it_was_verified(measured: PartFou
         assert text in told
 
 
-def test_a_complete_report_is_no_draft_and_what_another_lacks_is_named(measured: PartFound) -> None:
+def test_a_complete_report_is_no_draft_and_what_another_lacks_is_named(measured: PartMeasurement) -> None:
     whole = page(measured)
     assert not whole.draft
     assert whole.number == "P-77"
@@ -363,7 +374,7 @@ def test_a_complete_report_is_no_draft_and_what_another_lacks_is_named(measured:
     assert lacking_of(measured) == ()
 
 
-def test_what_is_not_measured_and_not_stated_is_said(measured: PartFound) -> None:
+def test_what_is_not_measured_and_not_stated_is_said(measured: PartMeasurement) -> None:
     told = said(section(page(measured), "What is not covered").blocks)
     assert "these are not measured here: M6 thread" in told
     assert "clamping" in told
@@ -371,7 +382,7 @@ def test_what_is_not_measured_and_not_stated_is_said(measured: PartFound) -> Non
     assert "M6 thread" in row_of(measured, "Not covered")
 
 
-def test_the_method_says_how_often_and_how_to_do_it_again(measured: PartFound) -> None:
+def test_the_method_says_how_often_and_how_to_do_it_again(measured: PartMeasurement) -> None:
     told = said(method_section(replace(measured, seed=11, digits=2)).blocks)
     assert "cmm-uq part plate --seed 11 --digits 2" in told
     assert "4000" in told
@@ -379,14 +390,14 @@ def test_the_method_says_how_often_and_how_to_do_it_again(measured: PartFound) -
         assert standard in told
 
 
-def test_pictures_show_what_was_found_of_the_points(measured: PartFound) -> None:
+def test_pictures_show_what_was_found_of_the_points(measured: PartMeasurement) -> None:
     n = len(measured.plan.points)
     covariance = np.tile(np.diag([9e-6, 1e-6, 1e-6]), (n, 1, 1))
-    found = replace(measured, displaced=Displaced(np.zeros((n, 3)), covariance))
+    found = replace(measured, displaced=PointErrors(np.zeros((n, 3)), covariance))
     assert "standard uncertainties of up to 3.0 µm" in said(errors_section(found).blocks)
 
 
-def test_what_no_cause_moves_has_no_uncertainty_and_a_page_all_the_same(measured: PartFound) -> None:
+def test_what_no_cause_moves_has_no_uncertainty_and_a_page_all_the_same(measured: PartMeasurement) -> None:
     still = replace(measured.stated[0], u=0.0, interval=(30.0, 30.0), k=float("nan"), value=30.0)
     judged = LimitDecision(29.95, 30.05, "pass", 1.0, 0.0, (29.95, 30.05), say("rule"))
     found = replace(measured, stated=(still, *measured.stated[1:]), judged=(judged, *measured.judged[1:]))
@@ -396,7 +407,7 @@ def test_what_no_cause_moves_has_no_uncertainty_and_a_page_all_the_same(measured
 
 @pytest.mark.parametrize("which", ["planned", "measured", "every_kind"])
 def test_every_text_can_be_translated(which: str, request: pytest.FixtureRequest) -> None:
-    found: PartFound = request.getfixturevalue(which)
+    found: PartMeasurement = request.getfixturevalue(which)
     effects = " ".join([*ERRORS, "straightness_x_y", "hysteresis_y"])
     own = " ".join([f.name for f in found.plan.features] + [c.name for c in found.plan.characteristics])
     known = "\n".join([
@@ -422,7 +433,7 @@ def test_nothing_runs_into_anything_on_a_screen_or_a_phone(
         opened.close()
 
 
-def test_the_pdf_is_made_of_the_same(every_kind: PartFound) -> None:
+def test_the_pdf_is_made_of_the_same(every_kind: PartMeasurement) -> None:
     import io
 
     from pypdf import PdfReader
@@ -433,7 +444,7 @@ def test_the_pdf_is_made_of_the_same(every_kind: PartFound) -> None:
         assert row[2] in text
 
 
-def test_a_machine_that_was_calibrated_on_the_same_day(measured: PartFound) -> None:
+def test_a_machine_that_was_calibrated_on_the_same_day(measured: PartMeasurement) -> None:
     same = replace(CERTIFICATE, age=dt.timedelta(0))
     assert "2026-03-01, the day of the measurement" in said(machine_section(replace(measured, standing=same)).blocks)
 
@@ -457,7 +468,7 @@ def test_of_many_characteristics_those_nearest_to_their_limits_are_told_of_in_de
 
 
 def test_no_key_of_a_job_file_stands_on_the_report_of_a_part(
-    planned: PartFound, measured: PartFound, every_kind: PartFound
+    planned: PartMeasurement, measured: PartMeasurement, every_kind: PartMeasurement
 ) -> None:
     """Nor where the job does not state what every report must: the page says it in words, without ``[part] serial``."""
     job = plate()
@@ -467,18 +478,18 @@ def test_no_key_of_a_job_file_stands_on_the_report_of_a_part(
     assert all("[part]" not in text for text in leaves(page(bare)))
 
 
-def remark(further: Further) -> str:
+def remark(further: FurtherSetUps) -> str:
     found: Any = SimpleNamespace(standing=SimpleNamespace(path=say("drawn")), unseen=(), further=further)
     return str(_remarks(found)[-1])
 
 
 def test_what_further_set_ups_show_is_named_and_what_they_do_not_is_left_out() -> None:
-    further = Further(
+    further = FurtherSetUps(
         ("scale_x", "rotation_x_x"), 2, say("all"), "cmm-uq plan further", "further/job.toml", ("rotation_x_x",)
     )
     assert remark(further) == "2 further set-ups of the artefact show Scale error of X: further/job.toml."
 
 
 def test_where_none_shows_anything_that_is_said() -> None:
-    said = remark(Further(("rotation_x_x",), 0, say("all"), missed=("rotation_x_x",)))
+    said = remark(FurtherSetUps(("rotation_x_x",), 0, say("all"), missed=("rotation_x_x",)))
     assert said == "No further set-up of the artefact as it was recorded shows what the calibration did not see."

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.budget import Displaced
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.budget import PointErrors
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.base.messages import Verbatim, number, say
 from cmm_uq.base.points import Floats
@@ -79,7 +79,7 @@ def test_panels_are_to_one_scale_and_views_stand_below_each_other(spans: tuple[f
 
 
 def test_every_point_its_normal_and_its_stylus_are_drawn() -> None:
-    plot = part_picture(PLATE, Pose(), [Verbatim("A"), Verbatim("b")])
+    plot = part_picture(PLATE, PartPose(), [Verbatim("A"), Verbatim("b")])
     count = len(PLATE.points)
     accent = paths(plot.svg, "#0b5c7a")
     assert sum(len(path) == 2 * count for path in accent) == 2 * len(VIEWS)  # normals and dots, each a path a view
@@ -90,7 +90,7 @@ def test_every_point_its_normal_and_its_stylus_are_drawn() -> None:
 
 def test_a_stylus_goes_up_from_its_tip_to_the_ram() -> None:
     """In the view from the front straight up, from the right to the left: the tip is 30 mm behind the ram's point."""
-    plot = part_picture(PLATE, Pose(), [Verbatim("A"), Verbatim("b")])
+    plot = part_picture(PLATE, PartPose(), [Verbatim("A"), Verbatim("b")])
     _, _, front, side = paths(plot.svg, "#a84e08")
     for stem in (front[:2], front[2:]):
         assert stem[0, 0] == pytest.approx(stem[1, 0], abs=0.02)
@@ -101,15 +101,15 @@ def test_a_stylus_goes_up_from_its_tip_to_the_ram() -> None:
 
 def test_a_part_that_is_turned_in_the_machine_is_reached_from_there() -> None:
     """On its side: what is up in the machine is y of the part, so that the stylus from behind the ram comes along −z."""
-    turned = Pose(np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]))
+    turned = PartPose(np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]))
     _, _, _, side = paths(part_picture(PLATE, turned, [Verbatim("A"), Verbatim("b")]).svg, "#a84e08")
     assert side[1, 0] > side[0, 0]
     assert (side[1, 0] - side[0, 0]) / (side[0, 1] - side[1, 1]) == pytest.approx(150 / 30, abs=0.05)
 
 
-def errors(mean_um: Floats, sd_um: Floats) -> Displaced:
+def errors(mean_um: Floats, sd_um: Floats) -> PointErrors:
     covariance = 1e-6 * np.einsum("ni,ij->nij", sd_um**2, np.eye(3))
-    return Displaced(1e-3 * mean_um, covariance)
+    return PointErrors(1e-3 * mean_um, covariance)
 
 
 def test_ellipses_and_arrows_are_magnified_as_the_caption_says() -> None:

@@ -51,7 +51,7 @@ _ROUNDING = 1e-15  # of the largest, a square of components that is rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Cause(ABC):
+class PartCause(ABC):
     """What moves points in proportion to coefficients."""
 
     name: str  # of the cause: ``machine``, ``stylus``, …
@@ -73,7 +73,7 @@ class Cause(ABC):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Common(Cause):
+class CommonCause(PartCause):
     """What points have in common."""
 
     basis: Floats  # (K, n, 3) displacements of the points for one unit of each coefficient, mm
@@ -99,7 +99,7 @@ class Common(Cause):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Scatter(Cause):
+class PointScatter(PartCause):
     """What moves each coordinate of each point on its own: a coefficient a coordinate, in standard deviations."""
 
     size: Floats  # (n, 3) standard deviations along three axes, mm
@@ -109,7 +109,9 @@ class Scatter(Cause):
     scale: Draw | None = None
 
     @classmethod
-    def of(cls, name: str, factor: str, size: Floats, turn: Floats | None = None, scale: Draw | None = None) -> Scatter:
+    def of(
+        cls, name: str, factor: str, size: Floats, turn: Floats | None = None, scale: Draw | None = None
+    ) -> PointScatter:
         """A normal one; with draws (N, 3) of a factor on the size along each axis, common to all points, a mixture."""
 
         def draw(random: np.random.Generator, n: int) -> Floats:
@@ -153,11 +155,11 @@ def components(kernel: Floats) -> Floats:
     return np.asarray((vectors[:, kept] * np.sqrt(values[kept])).T)
 
 
-def field_along(name: str, factor: str, kernel: Floats, along: Floats) -> Common:
+def field_along(name: str, factor: str, kernel: Floats, along: Floats) -> CommonCause:
     """A random field on the points along one direction (n, 3) of each, of covariance (n, n), mm²."""
     shapes = components(kernel)
     draw = normal(np.ones(len(shapes)))
-    return Common(name=name, factors=(factor,) * len(shapes), draw=draw, basis=shapes[:, :, None] * along)
+    return CommonCause(name=name, factors=(factor,) * len(shapes), draw=draw, basis=shapes[:, :, None] * along)
 
 
 MANY = 1000  # points up to which the eigenvectors of the whole covariance are quickly found

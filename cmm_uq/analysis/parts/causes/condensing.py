@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Draw, Scatter
+from cmm_uq.analysis.parts.causes.cause import Draw, PartCause, PointScatter
 from cmm_uq.analysis.parts.causes.form import Rough
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.points import Floats, Ints
@@ -22,7 +22,7 @@ LARGE = 1000  # points of a feature from which on its points are not drawn one c
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Condensed(Cause):
+class CondensedCause(PartCause):
     """A cause that moves each point on its own along a axes, by fewer coefficients."""
 
     vectors: Floats  # (a, n, 3) displacements of each point for one standard deviation along each axis, mm
@@ -76,14 +76,14 @@ class Condensed(Cause):
         return coefficients[:, skipped + first : skipped + last] * self._sizes[first:last], self.single[first:last]
 
 
-def condensed(cause: Cause, plan: Plan, on_points: Collection[str], derivative: Floats) -> Cause:
+def condensed(cause: PartCause, plan: Plan, on_points: Collection[str], derivative: Floats) -> PartCause:
     """A cause by fewer coefficients, where it moves each point of a large feature on its own; else itself.
 
     ``derivative``: (p, n, 3) of all that follows to first order.
     """
     scale: Draw | None = None
     vectors = np.zeros((1, *plan.points.shape))
-    if isinstance(cause, Scatter):
+    if isinstance(cause, PointScatter):
         scale, vectors = cause.scale, cause.size.T[:, :, None] * cause.turn[:, None, :]
     elif isinstance(cause, Rough):
         vectors[0, cause.rows] = cause.along
@@ -109,7 +109,7 @@ def condensed(cause: Cause, plan: Plan, on_points: Collection[str], derivative: 
             drawn[:, a * w + s :] *= np.repeat(times, r, axis=1)
         return drawn
 
-    return Condensed(
+    return CondensedCause(
         name=cause.name, factors=(cause.factors[0],) * (a * w + s + a * r), draw=draw, named=cause.named, vectors=vectors,
         whole=whole, single=single, normals=plan.normals, sums=sums,
     )  # fmt: skip

@@ -11,7 +11,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Common, field_components, normal
+from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, field_components, normal
 from cmm_uq.analysis.parts.plan import DIRECTED, Feature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -22,7 +22,7 @@ FORM = "form"
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
+class SurfaceForm:
     """What is known of a feature's form, along its normals."""
 
     feature: str
@@ -59,13 +59,13 @@ class Form:
 
 
 @lru_cache(maxsize=2)
-def forms(known: tuple[Form, ...], plan: Plan) -> tuple[list[Cause], list[Cause | None]]:
+def forms(known: tuple[SurfaceForm, ...], plan: Plan) -> tuple[list[PartCause], list[PartCause | None]]:
     """Form of the points that are probed, and of whole surfaces: the same wherever the part lies, and so looked up.
 
     Returns ``causes``: of the plan's points. ``whole``: as many, with the same coefficients, of the points of
     :func:`whole_surfaces`; ``None`` for roughness.
     """
-    causes, whole = list[Cause](), list[Cause | None]()
+    causes, whole = list[PartCause](), list[PartCause | None]()
     true = whole_surfaces(plan)
     for one in known:
         feature, rows, true_rows = plan.feature(one.feature), plan.rows[one.feature], true.rows[one.feature]
@@ -75,9 +75,9 @@ def forms(known: tuple[Form, ...], plan: Plan) -> tuple[list[Cause], list[Cause 
             shapes = one.components(feature, both)
             draw, factors = normal(np.ones(len(shapes))), (factor,) * len(shapes)
             basis = _placed(shapes[:, :count], plan, rows)
-            causes.append(Common(name=FORM, factors=factors, draw=draw, basis=basis))
+            causes.append(CommonCause(name=FORM, factors=factors, draw=draw, basis=basis))
             on_surface = shapes[:, count:] if len(feature.surface) else np.zeros((len(shapes), count))
-            whole.append(Common(name=FORM, factors=factors, draw=draw, basis=_placed(on_surface, true, true_rows)))
+            whole.append(CommonCause(name=FORM, factors=factors, draw=draw, basis=_placed(on_surface, true, true_rows)))
         if one.roughness_um:
             causes.append(_rough(one, plan, rows))
             whole.append(None)
@@ -93,7 +93,7 @@ def whole_surfaces(plan: Plan) -> Plan:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Rough(Cause):
+class Rough(PartCause):
     """What moves each point of a feature on its own along its normal, in standard deviations."""
 
     along: Floats  # (m, 3) displacements of its points for one unit of each coefficient, mm
@@ -113,7 +113,7 @@ class Rough(Cause):
         return found
 
 
-def _rough(one: Form, plan: Plan, rows: slice) -> Cause:
+def _rough(one: SurfaceForm, plan: Plan, rows: slice) -> PartCause:
     along = MICROMETRE * one.roughness_um * plan.normals[rows]
     factors = (f"roughness of {one.feature}",) * len(along)
     return Rough(

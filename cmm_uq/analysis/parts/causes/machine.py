@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Common, Draw, Drawn, Rows, Scatter, field_along
+from cmm_uq.analysis.parts.causes.cause import CommonCause, Draw, Drawn, PartCause, PointScatter, Rows, field_along
 from cmm_uq.analysis.parts.causes.stylus import Qualified
 from cmm_uq.analysis.parts.machine.periods import GivenPeriod
 from cmm_uq.analysis.parts.machine.state import MachineState, Unmodelled
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.superposition import About, Superposition
@@ -21,7 +21,7 @@ _SETTLED = 1e-7
 _ROUNDS = 12
 
 
-def mean_errors(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None = None) -> Floats:
+def mean_errors(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> Floats:
     """(n, 3) by how much the machine displaces points without any draw, in the frame of the part, mm.
 
     Solves indicated + e(indicated) = true for the mean of what is known, and adds what the machine corrects.
@@ -48,7 +48,7 @@ def _plain(state: MachineState) -> tuple[Superposition, Floats, Floats]:
     return Superposition(effects, state.shapes), state.mean[kept], state.corrects[kept]
 
 
-def _mean_periodic(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Floats:
+def _mean_periodic(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None) -> Floats:
     """(n, 3) displacements by the means of errors with a period, which no machine corrects."""
     given = [isinstance(effect, GivenPeriod) for effect in state.effects]
     if not any(given):
@@ -74,7 +74,7 @@ def _as_read(about: About, read: Points) -> About:
     return replace(about, points=replace(read, directions=about.points.directions))
 
 
-def _read(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None) -> Points:
+def _read(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None) -> Points:
     """Points of part and spheres as the scales read them: what was measured less what the machine corrected."""
     points, n = qualified.both, len(qualified.part)
     shown = points.xyz.copy()
@@ -89,7 +89,7 @@ def _read(state: MachineState, qualified: Qualified, pose: Pose, measured: Float
     return points.at(indicated)
 
 
-def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Floats | None = None) -> Common:
+def modelled(state: MachineState, qualified: Qualified, pose: PartPose, measured: Floats | None = None) -> CommonCause:
     """What the calibration modelled: differences of whole draws of its posterior from their mean, and drift since then.
 
     The columns are those of small changes about the mean (:meth:`Superposition.about`), axes leaning as they do.
@@ -119,16 +119,16 @@ def modelled(state: MachineState, qualified: Qualified, pose: Pose, measured: Fl
         return np.asarray(drawn) + random.standard_normal((n, len(drift))) * drift
 
     why = dict.fromkeys(state.free, say("the calibration left it to what physics allows"))
-    return Common(name=MACHINE, factors=tuple(factors), draw=draw, named=why,
+    return CommonCause(name=MACHINE, factors=tuple(factors), draw=draw, named=why,
                   basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
 
 
-def not_modelled(state: MachineState, qualified: Qualified, pose: Pose) -> tuple[list[Cause], dict[str, str]]:
+def not_modelled(state: MachineState, qualified: Qualified, pose: PartPose) -> tuple[list[PartCause], dict[str, str]]:
     """What the calibration did not model, an independent cause each; and what cannot be drawn, with the column it lacks.
 
     Of an effect with a period, draws have one of its trial periods each, as its prior has them: evenly in their logarithm.
     """
-    causes, lacking = list[Cause](), dict[str, str]()
+    causes, lacking = list[PartCause](), dict[str, str]()
     for one in state.unmodelled:
         missing = [name for name in one.effect.columns if name not in qualified.part.columns]
         if missing:
@@ -138,7 +138,7 @@ def not_modelled(state: MachineState, qualified: Qualified, pose: Pose) -> tuple
     return causes, lacking
 
 
-def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
+def _unmodelled(one: Unmodelled, qualified: Qualified, pose: PartPose) -> CommonCause:
     trials = list(one.effect.trials())
     columns = np.concatenate([About(qualified.both).columns(one.effect, shape) for shape in trials], axis=2)
     k, count = len(one.sd), len(trials)
@@ -154,21 +154,21 @@ def _unmodelled(one: Unmodelled, qualified: Qualified, pose: Pose) -> Common:
         if one.bounded
         else say("the calibration did not model it; as large as physics allows")
     }
-    return Common(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why,
+    return CommonCause(name=MACHINE, factors=(name,) * (k * count), draw=draw, named=why,
                   basis=-_in_part(qualified.left(columns), pose))  # fmt: skip
 
 
-def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1, first: int = 0) -> list[Cause]:
+def noise(state: MachineState, points: Points, pose: PartPose, repeats: int = 1, first: int = 0) -> list[PartCause]:
     """Noise of readings, what a set-up adds to each point, what grows with distance, and slow noise where times are known.
 
     ``repeats``: of each point, of whose readings the mean is taken; they share the set-up and the moment.
     """
-    stated, n, found = state.noise, len(points), list[Cause]()
+    stated, n, found = state.noise, len(points), list[PartCause]()
     usual = stated.usual_mm
     if usual.any():
         ratio = np.atleast_2d(stated.coordinate_mm) / np.where(usual > 0, usual, 1.0)
         size = np.tile(usual / np.sqrt(repeats), (n, 1))
-        found.append(Scatter.of(NOISE, "reading", size, pose.back(np.eye(3)), _one_of(ratio)))
+        found.append(PointScatter.of(NOISE, "reading", size, pose.back(np.eye(3)), _one_of(ratio)))
     found += _scattered("set-up", stated.placing_mm, np.ones(n))
     far = (
         np.linalg.norm(points.xyz - points.xyz[first], axis=1) / stated.longest_mm if stated.longest_mm else np.ones(n)
@@ -180,14 +180,14 @@ def noise(state: MachineState, points: Points, pose: Pose, repeats: int = 1, fir
     return found
 
 
-def _scattered(factor: str, size_mm: Floats | float, part: Floats) -> list[Cause]:
+def _scattered(factor: str, size_mm: Floats | float, part: Floats) -> list[PartCause]:
     """Every coordinate on its own, by parts (n,) of a size of which draws are given; none where it is zero."""
     drawn = np.atleast_1d(np.asarray(size_mm, dtype=np.float64))
     usual = float(np.sqrt(np.mean(drawn**2)))
     if not usual:
         return []
     size = np.repeat(usual * part[:, None], 3, axis=1)
-    return [Scatter.of(NOISE, factor, size, scale=_one_of(np.repeat(drawn[:, None] / usual, 3, axis=1)))]
+    return [PointScatter.of(NOISE, factor, size, scale=_one_of(np.repeat(drawn[:, None] / usual, 3, axis=1)))]
 
 
 def _one_of(ratio: Floats) -> Draw | None:
@@ -197,6 +197,6 @@ def _one_of(ratio: Floats) -> Draw | None:
     return lambda random, count: np.asarray(ratio[random.integers(len(ratio), size=count)])
 
 
-def _in_part(columns: Floats, pose: Pose) -> Floats:
+def _in_part(columns: Floats, pose: PartPose) -> Floats:
     """Columns (n, 3, k) of the machine as displacements (k, n, 3) in the frame of the part."""
     return pose.back(np.moveaxis(columns, 2, 0))

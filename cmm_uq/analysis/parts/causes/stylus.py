@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import eval_legendre
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Common, field_components, normal
-from cmm_uq.analysis.parts.placing import OWN_COLUMNS, Pose, probed
+from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, field_components, normal
+from cmm_uq.analysis.parts.placing import OWN_COLUMNS, PartPose, probed
 from cmm_uq.analysis.parts.plan import Plan, Stylus
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE
@@ -33,28 +33,28 @@ STYLUS = "stylus"
 DEGREES = (2, 3, 4, 5, 6)
 
 
-def styli(plan: Plan, pose: Pose) -> list[Cause]:
+def styli(plan: Plan, pose: PartPose) -> list[PartCause]:
     """Size, offset and lobing of every stylus that leaves some open.
 
     A tip that is effectively larger than thought finds every surface by half of the difference outside.
     """
-    found: list[Cause] = []
+    found: list[PartCause] = []
     for place, stylus in enumerate(plan.styli):
         its = plan.stylus_of == place
         if stylus.u_diameter_um:
             basis = (0.5 * MICROMETRE * its[:, None] * plan.normals)[None]
             size = (f"tip size {stylus.name}",)
-            found.append(Common(name=STYLUS, factors=size, draw=normal([stylus.u_diameter_um]), basis=basis))
+            found.append(CommonCause(name=STYLUS, factors=size, draw=normal([stylus.u_diameter_um]), basis=basis))
         if np.any(stylus.u_offset_um):
             basis = MICROMETRE * its[:, None] * pose.back(np.eye(3))[:, None, :]
             factors = (f"tip offset {stylus.name}",) * len(AXES)
-            found.append(Common(name=STYLUS, factors=factors, draw=normal(stylus.u_offset_um), basis=basis))
+            found.append(CommonCause(name=STYLUS, factors=factors, draw=normal(stylus.u_offset_um), basis=basis))
         if stylus.lobing_um:
             found.append(_lobing(stylus, plan, its))
     return found
 
 
-def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> Common:
+def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> CommonCause:
     variance = (MICROMETRE * stylus.lobing_um) ** 2
 
     def covariance(some: slice) -> Floats:
@@ -64,7 +64,7 @@ def _lobing(stylus: Stylus, plan: Plan, its: NDArray[np.bool_]) -> Common:
 
     shapes = field_components(covariance, np.where(its, variance, 0.0))
     draw, factors = normal(np.ones(len(shapes))), (f"lobing {stylus.name}",) * len(shapes)
-    return Common(name=STYLUS, factors=factors, draw=draw, basis=shapes[:, :, None] * plan.normals)
+    return CommonCause(name=STYLUS, factors=factors, draw=draw, basis=shapes[:, :, None] * plan.normals)
 
 
 SPHERE_MM = 25.0  # diameter of the reference sphere; errors hardly change over it

@@ -23,8 +23,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cmm_uq.analysis.parts.causes.cause import Cause, Common, Scatter, normal
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, PointScatter, normal
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats, Points
@@ -33,14 +33,14 @@ from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATUR
 FIXTURE = "fixture"
 
 
-def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> Common:
+def moving_part(plan: Plan, u_shift_um: float, u_turn_arcsec: float = 0.0) -> CommonCause:
     """A part that has shifted and turned evenly by the end of its measurement."""
     about = plan.points - plan.points.mean(axis=0)
     done = elapsed(plan)[:, None]
     shifts = [MICROMETRE * done * axis for axis in np.eye(3)]
     turns = [ARCSECOND * done * np.cross(axis, about) for axis in np.eye(3)]
     sd = np.repeat([u_shift_um, u_turn_arcsec], 3)
-    return Common(
+    return CommonCause(
         name=FIXTURE, factors=("movement of the part",) * 6, draw=normal(sd), basis=np.array([*shifts, *turns])
     )
 
@@ -119,21 +119,21 @@ class Surroundings:
         return replace(self, scales=(x, y, z))
 
 
-def mean_expansion(surroundings: Surroundings, plan: Plan, points: Points, pose: Pose) -> Floats:
+def mean_expansion(surroundings: Surroundings, plan: Plan, points: Points, pose: PartPose) -> Floats:
     """(n, 3) displacements by what is not corrected of temperatures, without any draw, mm."""
     scales = np.array([scale.left for scale in surroundings.scales])
     return surroundings.part.left * _about(plan) - pose.back(scales * points.carriages)
 
 
-def temperatures(surroundings: Surroundings, plan: Plan, points: Points, pose: Pose) -> list[Cause]:
+def temperatures(surroundings: Surroundings, plan: Plan, points: Points, pose: PartPose) -> list[PartCause]:
     """Expansion of part and scales, and bending of the part in a gradient."""
-    part, found = surroundings.part, list[Cause]()
+    part, found = surroundings.part, list[PartCause]()
     if part.uncertain:
 
         def of_part(random: np.random.Generator, n: int) -> Floats:
             return part.drawn(random.standard_normal(n), random.standard_normal(n))[:, None]
 
-        found.append(Common(name=TEMPERATURE, factors=("part",), draw=of_part, basis=_about(plan)[None]))
+        found.append(CommonCause(name=TEMPERATURE, factors=("part",), draw=of_part, basis=_about(plan)[None]))
     if any(scale.uncertain for scale in surroundings.scales):
 
         def of_scales(random: np.random.Generator, n: int) -> Floats:
@@ -142,22 +142,22 @@ def temperatures(surroundings: Surroundings, plan: Plan, points: Points, pose: P
 
         along = np.stack([-points.carriages[:, [i]] * np.eye(3)[i] for i in range(len(AXES))])
         factors = tuple(f"scale {axis}" for axis in AXES)
-        found.append(Common(name=TEMPERATURE, factors=factors, draw=of_scales, basis=pose.back(along)))
+        found.append(CommonCause(name=TEMPERATURE, factors=factors, draw=of_scales, basis=pose.back(along)))
     if np.any(surroundings.u_gradient_k_per_m) and part.cte_per_k:
         basis = part.cte_per_k * _bent(_about(plan), pose.back(np.eye(3))) / METRE
         draw = normal(surroundings.u_gradient_k_per_m)
-        found.append(Common(name=TEMPERATURE, factors=("gradient in the part",) * 3, draw=draw, basis=basis))
+        found.append(CommonCause(name=TEMPERATURE, factors=("gradient in the part",) * 3, draw=draw, basis=basis))
     return [*found, *_warming(surroundings, plan, points, pose)]
 
 
-def _warming(surroundings: Surroundings, plan: Plan, points: Points, pose: Pose) -> list[Cause]:
+def _warming(surroundings: Surroundings, plan: Plan, points: Points, pose: PartPose) -> list[PartCause]:
     """Expansion of part and scales while points are probed: what is probed later is warmer."""
     kelvin, done = surroundings.u_drift_k, elapsed(plan)[:, None]
     bases = {"warming of the part": surroundings.part.cte_per_k * done * _about(plan)}
     for i, (axis, scale) in enumerate(zip(AXES, surroundings.scales, strict=True)):
         bases[f"warming of scale {axis}"] = pose.back(-scale.cte_per_k * done * points.carriages[:, [i]] * np.eye(3)[i])
     return [
-        Common(name=TEMPERATURE, factors=(factor,), draw=normal([kelvin]), basis=basis[None])
+        CommonCause(name=TEMPERATURE, factors=(factor,), draw=normal([kelvin]), basis=basis[None])
         for factor, basis in bases.items()
         if kelvin and np.any(basis)
     ]
@@ -181,7 +181,7 @@ OPERATOR = "operator"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Beside(Cause):
+class Reproducibility(PartCause):
     """What changes characteristics and moves no point."""
 
     adds: Floats  # (K, c) change of each characteristic for one unit of each coefficient, mm or rad
@@ -194,7 +194,7 @@ class Beside(Cause):
         return np.zeros((len(coefficients), len(range(*rows.indices(self.count))), 3))
 
 
-def reproducibility(plan: Plan, u: Mapping[str, float]) -> Beside:
+def reproducibility(plan: Plan, u: Mapping[str, float]) -> Reproducibility:
     """A standard uncertainty of some characteristics, each on its own.
 
     ``u``: by name of the characteristic, mm or rad.
@@ -207,10 +207,15 @@ def reproducibility(plan: Plan, u: Mapping[str, float]) -> Beside:
             )
     adds = np.zeros((len(u), len(names)))
     adds[np.arange(len(u)), [names.index(name) for name in u]] = 1.0
-    return Beside(name=OPERATOR, factors=tuple(f"reproducibility of {name}" for name in u), draw=normal(list(u.values())),
-                  adds=adds, count=len(plan.points))  # fmt: skip
+    return Reproducibility(
+        name=OPERATOR,
+        factors=tuple(f"reproducibility of {name}" for name in u),
+        draw=normal(list(u.values())),
+        adds=adds,
+        count=len(plan.points),
+    )
 
 
-def of_points(plan: Plan, u_um: float) -> Scatter:
+def of_points(plan: Plan, u_um: float) -> PointScatter:
     """A standard uncertainty of each coordinate of each point, common to its repeats."""
-    return Scatter.of(OPERATOR, "reproducibility of points", np.full((len(plan.points), 3), MICROMETRE * u_um))
+    return PointScatter.of(OPERATOR, "reproducibility of points", np.full((len(plan.points), 3), MICROMETRE * u_um))

@@ -41,7 +41,7 @@ from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.inference.sampling import sample_with_noise
 
 
-class AtEach(Effect):
+class PointwiseEffect(Effect):
     """One millimetre of an error along the motion of an axis at each point by itself."""
 
     def __init__(self, effect: Effect) -> None:
@@ -57,7 +57,7 @@ class AtEach(Effect):
 def shown(model: MeasurementModel, effect: Effect) -> Floats:
     """(m, n) of the model's used observations, of a millimetre of error at each of its points."""
     about = model.estimate().about
-    return model.seen(model.columns(AtEach(effect), (), about), about)
+    return model.seen(model.columns(PointwiseEffect(effect), (), about), about)
 
 
 # of the scatter of the residuals: what a combination of errors adds to the observations below which they do not show it
@@ -69,7 +69,7 @@ _ROWS = 1000  # draws at once
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """An error that was left out, with what a recording says of it: its part of :class:`Together`."""
+    """An error that was left out, with what a recording says of it: its part of :class:`JointModel`."""
 
     effect: Effect
     sd: Floats
@@ -125,7 +125,7 @@ def _left(own: LinearModel, columns: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class JointModel:
     """The linear model of a calibration with what it left out."""
 
     # of the calibration's unknowns, then of combinations of what it left out, standard normal beforehand
@@ -138,7 +138,7 @@ class Together:
     gain: Floats  # (r, f) what a combination that is larger by one says of each coefficient
 
     @classmethod
-    def of(cls, model: MeasurementModel, further: Sequence[Unmodelled]) -> Together:
+    def of(cls, model: MeasurementModel, further: Sequence[Unmodelled]) -> JointModel:
         """Of a calibration and of what it left out; what needs columns that were not recorded takes no part."""
         recorded = model.artefact.points.columns
         which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
@@ -246,7 +246,7 @@ def joint_posterior(
     Returns ``which``: places in ``further`` of those that take part. ``mean, covariance``: (k,) and (k, k) of the
     coefficients of the model's effects, then of those.
     """
-    whole = Together.of(model, further)
+    whole = JointModel.of(model, further)
     mean, root = whole.white(sigma_mm)
     covariance = root.T @ root
     k = sum(len(effect.coefficients) for effect in model.effects)
@@ -258,7 +258,7 @@ def joint_posterior(
     return whole.which, into @ mean[at], into @ covariance[np.ix_(at, at)] @ into.T + free @ free.T
 
 
-def draws_given(whole: Together, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
+def draws_given(whole: JointModel, components: Components, sizes: Sizes, random: np.random.Generator) -> Floats:
     """Exact draws (N, k + f) of all errors, one for each of N sizes of the noise; no finite ones where a size is open."""
     return whole.coefficients(Marginal(whole.linear, components, whole.estimate).draw(sizes, random), random)
 
@@ -277,7 +277,7 @@ def given_recording(
     ``model``: of the calibration, without the observations that its certificate set aside. ``sigma_mm``: standard deviation
     of one recorded coordinate, where the noise is known and white; else it is sampled.
     """
-    whole, random = Together.of(model, state.unmodelled), np.random.default_rng(seed)
+    whole, random = JointModel.of(model, state.unmodelled), np.random.default_rng(seed)
     if sigma_mm is not None:
         noise = replace(state.noise, coordinate_mm=state.noise.usual_mm)
         mean, root = whole.white(sigma_mm)
@@ -298,7 +298,7 @@ def given_recording(
 
 
 def _with(
-    state: MachineState, model: MeasurementModel, whole: Together, drawn: Floats, noise: StatedNoise
+    state: MachineState, model: MeasurementModel, whole: JointModel, drawn: Floats, noise: StatedNoise
 ) -> MachineState:
     """The state with draws (N, k + f) of all errors together."""
     if not np.isfinite(drawn).all():

@@ -8,10 +8,19 @@ from math import hypot, sqrt
 
 from scipy.special import gammaincinv
 
-from cmm_uq.analysis.parts.budget import Budget
+from cmm_uq.analysis.parts.budget import VarianceShares
 from cmm_uq.analysis.parts.in_words import FAMILIES, family_of
-from cmm_uq.analysis.parts.methods.method import ByMethod, Compared, Comparison, Figure, Method, Pair, Seen, Stating
-from cmm_uq.analysis.parts.result import Stated
+from cmm_uq.analysis.parts.methods.method import (
+    ComparedCharacteristic,
+    Method,
+    MethodComparison,
+    MethodFigure,
+    MethodPair,
+    MethodResult,
+    MethodStatement,
+    Seen,
+)
+from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import Text, Verbatim, listed, number, say
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
 from cmm_uq.maths.uncertainty.rounding import significant
@@ -26,7 +35,9 @@ METHODS: Mapping[Method, Text] = {
 }  # fmt: skip
 
 
-def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMethod]) -> Comparison | None:
+def compare_methods(
+    stated: Sequence[StatedCharacteristic], shares: VarianceShares, methods: Sequence[MethodResult]
+) -> MethodComparison | None:
     """Other methods beside the virtual measurement; ``None`` where there are none."""
     if not methods:
         return None
@@ -35,17 +46,20 @@ def compared(stated: Sequence[Stated], shares: Budget, methods: Sequence[ByMetho
         figures = [(other, figure) for other in methods if (figure := other.of(one.name)) is not None]
         if not figures:
             continue
-        virtual = Stating("virtual", one.value, one.u, one.U, one.error)
-        all_stated = (virtual, *(Stating(other.method, figure.value, figure.u, figure.U) for other, figure in figures))
+        virtual = MethodStatement("virtual", one.value, one.u, one.U, one.error)
+        all_stated = (
+            virtual,
+            *(MethodStatement(other.method, figure.value, figure.u, figure.U) for other, figure in figures),
+        )
         pairs = tuple(_pairs(all_stated))
         by_family = family_shares(shares, one.name)
         why = [words for other, figure in figures for words in _why(virtual, other, figure, by_family)]
         why += [_apart(pair) for pair in pairs if abs(pair.normalised) > 1]
-        found.append(Compared(one.name, all_stated, pairs, tuple(why)))
-    return Comparison(tuple(methods), tuple(found))
+        found.append(ComparedCharacteristic(one.name, all_stated, pairs, tuple(why)))
+    return MethodComparison(tuple(methods), tuple(found))
 
 
-def family_shares(shares: Budget, name: str) -> dict[str, float]:
+def family_shares(shares: VarianceShares, name: str) -> dict[str, float]:
     """Share of the variance of a characteristic by family of causes; they add up to one."""
     column = shares.characteristics.index(name)
     found: dict[str, float] = {}
@@ -55,14 +69,16 @@ def family_shares(shares: Budget, name: str) -> dict[str, float]:
     return {family: share / whole for family, share in found.items()} if whole else {}
 
 
-def _pairs(stated: Sequence[Stating]) -> Iterable[Pair]:
+def _pairs(stated: Sequence[MethodStatement]) -> Iterable[MethodPair]:
     for one, other in combinations(stated, 2):
         expanded = hypot(one.U, other.U)
         if one.value is not None and other.value is not None and expanded:
-            yield Pair(one.method, other.method, (one.value - other.value) / expanded)
+            yield MethodPair(one.method, other.method, (one.value - other.value) / expanded)
 
 
-def _why(virtual: Stating, method: ByMethod, figure: Figure, shares: Mapping[str, float]) -> Iterable[Text]:
+def _why(
+    virtual: MethodStatement, method: MethodResult, figure: MethodFigure, shares: Mapping[str, float]
+) -> Iterable[Text]:
     """Sentences on why one method's uncertainty is another than the virtual measurement's."""
     if not virtual.u:
         return
@@ -85,7 +101,7 @@ def _why(virtual: Stating, method: ByMethod, figure: Figure, shares: Mapping[str
     yield from _scatter(name, virtual, figure, sum(grouped.get("varied", {}).values()))
 
 
-def _zone(name: Text, method: ByMethod, figure: Figure) -> Iterable[Text]:
+def _zone(name: Text, method: MethodResult, figure: MethodFigure) -> Iterable[Text]:
     """What errors do to the width of a zone, which is a size without direction."""
     if not figure.zone:
         return
@@ -113,12 +129,12 @@ def _named(families: Mapping[str, float]) -> Text:
     return listed([say("{family:small}", family=FAMILIES[family]) for family in kept])
 
 
-def _unseen(name: Text, families: Text, share: Text, figure: Figure) -> Text:
+def _unseen(name: Text, families: Text, share: Text, figure: MethodFigure) -> Text:
     return say("{method:capital} does not show {families}: {share} % of the variance of the virtual measurements.",
                method=name, families=families, share=share)  # fmt: skip
 
 
-def _systematic(name: Text, families: Text, share: Text, figure: Figure) -> Text:
+def _systematic(name: Text, families: Text, share: Text, figure: MethodFigure) -> Text:
     bias = small(abs(figure.systematic or 0.0), angle=figure.angle)
     told = say(
         "{method:capital} has {families}, {share} % of the variance of the virtual measurements, in its systematic error of "
@@ -128,7 +144,7 @@ def _systematic(name: Text, families: Text, share: Text, figure: Figure) -> Text
     return told if figure.corrected else say("{told} It is not corrected, and is added to U.", told=told)
 
 
-def _corrected(name: Text, families: Text, share: Text, figure: Figure) -> Text:
+def _corrected(name: Text, families: Text, share: Text, figure: MethodFigure) -> Text:
     return say(
         "Standards correct {method} for {families}, {share} % of the variance of the virtual measurements: by {bias}.",
         families=families, share=share, method=name,
@@ -136,7 +152,7 @@ def _corrected(name: Text, families: Text, share: Text, figure: Figure) -> Text:
     )  # fmt: skip
 
 
-def _scatter(name: Text, virtual: Stating, figure: Figure, share: float) -> Iterable[Text]:
+def _scatter(name: Text, virtual: MethodStatement, figure: MethodFigure, share: float) -> Iterable[Text]:
     """What scattered, beside what the virtual measurement expects to scatter."""
     expected = sqrt(share) * virtual.u
     if share < MATTERS or not expected:
@@ -161,7 +177,7 @@ def _scatter(name: Text, virtual: Stating, figure: Figure, share: float) -> Iter
         yield say("{told}, which chance explains.", told=told)
 
 
-def _apart(pair: Pair) -> Text:
+def _apart(pair: MethodPair) -> Text:
     return say(
         "{one:capital} and {other} differ by more than their uncertainties allow (Eₙ = {value}): one of them leaves "
         "something out.",

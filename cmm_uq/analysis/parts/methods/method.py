@@ -47,7 +47,7 @@ Seen = Literal["drawn", "varied", "systematic", "corrected", "stated", "unseen"]
 
 
 @dataclass(frozen=True)
-class Condition:
+class TestCondition:
     """What a method asks of its test."""
 
     text: Text  # of what is asked, in words
@@ -55,7 +55,7 @@ class Condition:
 
 
 @dataclass(frozen=True, eq=False)
-class Figure:
+class MethodFigure:
     """One characteristic by one method, mm or rad."""
 
     name: str  # of the characteristic
@@ -87,22 +87,22 @@ class Figure:
 
 
 @dataclass(frozen=True, eq=False)
-class ByMethod:
+class MethodResult:
     """All that a method says of a part."""
 
     method: Method
-    figures: tuple[Figure, ...]  # one a characteristic; those that were not tested are missing
-    conditions: tuple[Condition, ...]  # of the test
+    figures: tuple[MethodFigure, ...]  # one a characteristic; those that were not tested are missing
+    conditions: tuple[TestCondition, ...]  # of the test
     # by family of causes (:data:`cmm_uq.analysis.parts.in_words.FAMILIES`), how the method takes hold of it.
     seen: Mapping[str, Seen]
 
-    def of(self, name: str) -> Figure | None:
+    def of(self, name: str) -> MethodFigure | None:
         """The figure of a characteristic; ``None`` where it was not tested."""
         return next((one for one in self.figures if one.name == name), None)
 
 
 @dataclass(frozen=True)
-class Stating:
+class MethodStatement:
     """What one method states of a characteristic, mm or rad."""
 
     method: Method
@@ -114,7 +114,7 @@ class Stating:
 
 
 @dataclass(frozen=True)
-class Pair:
+class MethodPair:
     """Two methods on one characteristic: Eₙ = (x₁ − x₂)/√(U₁² + U₂²) (ISO/IEC 17043:2023)."""
 
     one: Method
@@ -123,28 +123,28 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedCharacteristic:
     """One characteristic by all methods."""
 
     name: str  # of the characteristic
-    stated: tuple[Stating, ...]  # by each method that says something of it, the virtual measurement first
-    pairs: tuple[Pair, ...]  # Eₙ of each two that have a value
+    stated: tuple[MethodStatement, ...]  # by each method that says something of it, the virtual measurement first
+    pairs: tuple[MethodPair, ...]  # Eₙ of each two that have a value
     why: tuple[Text, ...]  # they differ, in sentences that follow from the figures
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class MethodComparison:
     """The methods beside each other; what a part's page and its ``results.json`` say of them."""
 
-    methods: tuple[ByMethod, ...]  # the others, not the virtual measurement
-    characteristics: tuple[Compared, ...]  # those that another method tested, in the order of the plan
+    methods: tuple[MethodResult, ...]  # the others, not the virtual measurement
+    characteristics: tuple[ComparedCharacteristic, ...]  # those that another method tested, in the order of the plan
 
 
 FEWEST_CYCLES = 10  # set-ups of the calibrated part that descriptions of the method ask for
 
 
 @dataclass(frozen=True)
-class Calibrated:
+class CalibratedCharacteristic:
     """A characteristic of the calibrated part, mm or rad."""
 
     # value, u: by its certificate
@@ -165,9 +165,9 @@ class Warmth:
 
 
 def by_calibrated_part(
-    name: str, readings: Floats, cycle: Ints, calibrated: Calibrated, warmth: Warmth | None = None,
+    name: str, readings: Floats, cycle: Ints, calibrated: CalibratedCharacteristic, warmth: Warmth | None = None,
     *, measured: float | None = None, corrected: bool = True,
-) -> Figure:  # fmt: skip
+) -> MethodFigure:  # fmt: skip
     """One characteristic by the repeats of a calibrated part.
 
     ``readings``: (n,) of the calibrated part, mm or rad. ``cycle``: (n,) number of the set-up of each. ``measured``: value
@@ -190,7 +190,7 @@ def by_calibrated_part(
     bias = float(np.mean(readings)) - calibrated.value
     value = None if measured is None else measured - (bias if corrected else 0.0)
     scatter = float(np.std(readings, ddof=1))
-    return Figure(name, budget, value, bias, corrected, scatter=scatter, scatter_dof=len(readings) - 1.0)
+    return MethodFigure(name, budget, value, bias, corrected, scatter=scatter, scatter_dof=len(readings) - 1.0)
 
 
 STATEMENT = say(
@@ -202,7 +202,7 @@ _ORIENTATIONS, _REPEATS = say("between orientations"), say("between repeats in o
 
 
 @dataclass(frozen=True, eq=False)
-class Standard:
+class CalibratedStandard:
     """A standard as it was measured beside the part."""
 
     # calibrated, u: length or diameter by its certificate, mm
@@ -227,12 +227,12 @@ class Standard:
 
 
 @dataclass(frozen=True, eq=False)
-class Standards:
+class CalibratedStandards:
     """What was measured beside the part."""
 
     # standard of length; ``None`` where there was none, and the common scale is then not known
-    length: Standard | None = None
-    tips: Mapping[str, Standard] = field(default_factory=dict)  # standard of each tip, by stylus
+    length: CalibratedStandard | None = None
+    tips: Mapping[str, CalibratedStandard] = field(default_factory=dict)  # standard of each tip, by stylus
 
     @property
     def scale(self) -> float:
@@ -264,9 +264,15 @@ class PartWarmth:
 
 
 def by_orientations(
-    name: str, readings: Floats, orientation: Ints, slopes: Slopes, standards: Standards, warmth: PartWarmth | None = None,
-    *, angle: bool = False,
-) -> Figure:  # fmt: skip
+    name: str,
+    readings: Floats,
+    orientation: Ints,
+    slopes: Slopes,
+    standards: CalibratedStandards,
+    warmth: PartWarmth | None = None,
+    *,
+    angle: bool = False,
+) -> MethodFigure:
     """One characteristic by measurements of the part in several orientations.
 
     ``readings``: (n,) of it, mm or rad; as many in each orientation. ``orientation``: (n,) number of the orientation of
@@ -287,7 +293,7 @@ def by_orientations(
         lines += _of_standard(standards.tips[stylus], which, slopes.tips[stylus])
     lines += _of_warmth(slopes.scale, warmth or PartWarmth())
     budget = Budget(say("mean over all orientations"), lines, found.mean - error, own, statement=STATEMENT)
-    return Figure(name, budget, found.mean - error, error, single=_single(budget, found), scatter=found.u_single,
+    return MethodFigure(name, budget, found.mean - error, error, single=_single(budget, found), scatter=found.u_single,
                   scatter_dof=found.dof_single)  # fmt: skip
 
 
@@ -296,11 +302,11 @@ def _single(budget: Budget, found: OneWay) -> float:
     return float(np.sqrt(budget.variance - found.u_mean**2 + found.u_single**2))
 
 
-def _sign(tip: Standard) -> float:
+def _sign(tip: CalibratedStandard) -> float:
     return -1.0 if tip.inner else 1.0
 
 
-def _of_standard(one: Standard, name: Text, slope: float) -> list[Line]:
+def _of_standard(one: CalibratedStandard, name: Text, slope: float) -> list[Line]:
     mm = unit("mm")
     return [
         Line(say("{standard}: calibration", standard=name), one.u, CERTIFICATE, unit=mm, sensitivity=slope),

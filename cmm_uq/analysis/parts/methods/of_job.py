@@ -14,14 +14,14 @@ from cmm_uq.analysis.parts.causes.stylus import STYLUS
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, TEMPERATURE
 from cmm_uq.analysis.parts.methods.method import (
     FEWEST_CYCLES,
-    ByMethod,
-    Calibrated,
-    Condition,
+    CalibratedCharacteristic,
+    CalibratedStandard,
+    CalibratedStandards,
+    MethodResult,
     PartWarmth,
     Seen,
     Slopes,
-    Standard,
-    Standards,
+    TestCondition,
     Warmth,
     by_calibrated_part,
     by_orientations,
@@ -34,7 +34,7 @@ from cmm_uq.base.messages import Text, listed, names, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 from cmm_uq.jobs.part.job import PartJob
-from cmm_uq.jobs.part.readings import Read, Repeats
+from cmm_uq.jobs.part.readings import Repeats, StandardReadings
 from cmm_uq.jobs.part.tables import CalibratedFacts, CalibratedPartFacts, OrientationsFacts
 from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS
 
@@ -73,7 +73,7 @@ _NO_LENGTH = (*ZONES, "angle")  # characteristics that are none or deviations: t
 _FELT = 1e-6
 
 
-def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[ByMethod, ...]:
+def methods_of(job: PartJob, plan: Plan, measured: Floats | None) -> tuple[MethodResult, ...]:
     """What other methods say of a part's characteristics; empty where the job has none.
 
     ``measured``: (c,) values of the part; ``None`` where nothing was measured.
@@ -112,7 +112,7 @@ def _values(repeats: Repeats, plan: Plan) -> Mapping[str, Floats]:
 
 def _calibrated(
     job: PartJob, facts: CalibratedPartFacts, repeats: Repeats, plan: Plan, slopes: Sensitivities, measured: Floats | None
-) -> ByMethod:  # fmt: skip
+) -> MethodResult:  # fmt: skip
     values, figures = _values(repeats, plan), []
     warm = Warmth(facts.temperature_c, facts.u_cte_per_k, job.facts.part.u_cte_per_k)
     place = {one.name: i for i, one in enumerate(plan.characteristics)}
@@ -134,38 +134,54 @@ def _calibrated(
         else "unseen", FIXTURE: "varied", "operator": "varied" if facts.conditions_varied else "unseen",
         PLACE: "varied" if facts.place_varied else "unseen",
     }  # fmt: skip
-    return ByMethod("calibrated_part", tuple(figures), _conditions_calibrated(facts, repeats), seen)
+    return MethodResult("calibrated_part", tuple(figures), _conditions_calibrated(facts, repeats), seen)
 
 
-def _certified(one: CalibratedFacts, length: float) -> Calibrated:
+def _certified(one: CalibratedFacts, length: float) -> CalibratedCharacteristic:
     if one.value_deg is not None:
-        return Calibrated(
+        return CalibratedCharacteristic(
             float(np.radians(one.value_deg)), ARCSECOND * (one.u_arcsec or 0.0), ARCSECOND * one.u_part_arcsec, angle=True
         )  # fmt: skip
-    return Calibrated(
+    return CalibratedCharacteristic(
         one.value_mm or 0.0, MICROMETRE * (one.u_um or 0.0), MICROMETRE * one.u_part_um, expanding_mm=length
     )
 
 
-def _conditions_calibrated(facts: CalibratedPartFacts, repeats: Repeats) -> tuple[Condition, ...]:
+def _conditions_calibrated(facts: CalibratedPartFacts, repeats: Repeats) -> tuple[TestCondition, ...]:
     cycles = len(np.unique(repeats.group))
     return (
-        Condition(say("{count} measurements or more of the calibrated part, in {cycles} set-ups or more",
-                      count=FEWEST_READINGS, cycles=FEWEST_CYCLES),
-                  len(repeats.group) >= FEWEST_READINGS and cycles >= FEWEST_CYCLES),
-        Condition(say("The calibrated part is measured as the part is: points, styli, clamping"), facts.same_procedure),
-        Condition(say("The calibrated part is like the part: size within 10 % (25 mm below 250 mm), angles within 5°, form, "
-                      "roughness and material alike"), facts.similar),
-        Condition(say("The part is measured in place of the calibrated part, or both lie in many places"),
-                  True if facts.place_varied else facts.substitution),
-        Condition(say("The repeats show what varies in use: times of day, temperatures, operators"), facts.conditions_varied),
-        Condition(say("The calibrated part has a certificate that the job names"), bool(facts.certificate)),
-    )  # fmt: skip
+        TestCondition(
+            say(
+                "{count} measurements or more of the calibrated part, in {cycles} set-ups or more",
+                count=FEWEST_READINGS,
+                cycles=FEWEST_CYCLES,
+            ),
+            len(repeats.group) >= FEWEST_READINGS and cycles >= FEWEST_CYCLES,
+        ),
+        TestCondition(
+            say("The calibrated part is measured as the part is: points, styli, clamping"), facts.same_procedure
+        ),
+        TestCondition(
+            say(
+                "The calibrated part is like the part: size within 10 % (25 mm below 250 mm), angles within 5°, form, "
+                "roughness and material alike"
+            ),
+            facts.similar,
+        ),
+        TestCondition(
+            say("The part is measured in place of the calibrated part, or both lie in many places"),
+            True if facts.place_varied else facts.substitution,
+        ),
+        TestCondition(
+            say("The repeats show what varies in use: times of day, temperatures, operators"), facts.conditions_varied
+        ),
+        TestCondition(say("The calibrated part has a certificate that the job names"), bool(facts.certificate)),
+    )
 
 
 def _orientations(
     job: PartJob, facts: OrientationsFacts, repeats: Repeats, plan: Plan, slopes: Sensitivities
-) -> ByMethod:
+) -> MethodResult:
     values, standards = _values(repeats, plan), _standards(job, facts)
     room, part = job.facts.environment, job.facts.part
     warm = PartWarmth(room.part_c, room.u_part_k, part.cte_per_k, part.u_cte_per_k)
@@ -178,20 +194,24 @@ def _orientations(
             )
             figures.append(replace(figure, zone=one.what in ZONES))
     seen: dict[str, Seen] = {
-        MACHINE: "varied", NOISE: "varied",
+        MACHINE: "varied",
+        NOISE: "varied",
         STYLUS: "corrected" if facts.probe_standard else "varied" if facts.qualified_anew else "unseen",
-        TEMPERATURE: "stated", FORM: "varied" if facts.points_varied else "unseen", FIXTURE: "varied",
-        "operator": "unseen", PLACE: "varied" if facts.place_varied else "unseen",
-    }  # fmt: skip
+        TEMPERATURE: "stated",
+        FORM: "varied" if facts.points_varied else "unseen",
+        FIXTURE: "varied",
+        "operator": "unseen",
+        PLACE: "varied" if facts.place_varied else "unseen",
+    }
     conditions = _conditions_orientations(facts, repeats, plan, slopes, [figure.name for figure in figures])
-    return ByMethod("orientations", tuple(figures), conditions, seen)
+    return MethodResult("orientations", tuple(figures), conditions, seen)
 
 
 def _felt(slope: float) -> float:
     return 0.0 if abs(slope) < _FELT else float(slope)
 
 
-def _standards(job: PartJob, facts: OrientationsFacts) -> Standards:
+def _standards(job: PartJob, facts: OrientationsFacts) -> CalibratedStandards:
     length = None
     if facts.length_standard is not None and job.others.length is not None:
         one = facts.length_standard
@@ -202,39 +222,45 @@ def _standards(job: PartJob, facts: OrientationsFacts) -> Standards:
         name = probe.stylus or job.facts.stylus[0].name
         if name in job.others.tips:
             tips[name] = _standard(probe.diameter_mm, probe.u_um, job.others.tips[name], inner=probe.inner)
-    return Standards(length, tips)
+    return CalibratedStandards(length, tips)
 
 
-def _standard(size_mm: float, u_um: float, read: Read, **more: float) -> Standard:
+def _standard(size_mm: float, u_um: float, read: StandardReadings, **more: float) -> CalibratedStandard:
     inner = bool(more.pop("inner", False))
-    return Standard(size_mm, MICROMETRE * u_um, read.values, read.group, inner, **more)
+    return CalibratedStandard(size_mm, MICROMETRE * u_um, read.values, read.group, inner, **more)
 
 
 def _conditions_orientations(
     facts: OrientationsFacts, repeats: Repeats, plan: Plan, slopes: Sensitivities, tested: Sequence[str]
-) -> tuple[Condition, ...]:
+) -> tuple[TestCondition, ...]:
     counts = np.unique(repeats.group, return_counts=True)[1]
     rows = [i for i, one in enumerate(plan.characteristics) if one.name in tested]
     styli = [name for name, slope in slopes.tips.items() if np.any(np.abs(slope[rows]) >= _FELT)]
     without = [name for name in styli if name not in {one.stylus or plan.styli[0].name for one in facts.probe_standard}]
     found = [
-        Condition(say("{count} orientations or more, with {repeats} measurements or more in each", count=ORIENTATIONS_ASKED,
-                      repeats=REPEATS_ASKED), len(counts) >= ORIENTATIONS_ASKED and int(counts.min()) >= REPEATS_ASKED),
-    ]  # fmt: skip
+        TestCondition(
+            say(
+                "{count} orientations or more, with {repeats} measurements or more in each",
+                count=ORIENTATIONS_ASKED,
+                repeats=REPEATS_ASKED,
+            ),
+            len(counts) >= ORIENTATIONS_ASKED and int(counts.min()) >= REPEATS_ASKED,
+        ),
+    ]
     if np.any(np.abs(slopes.scale[rows]) >= _FELT):
-        found.append(Condition(say("A calibrated length standard, for the scale that all orientations have in common"),
+        found.append(TestCondition(say("A calibrated length standard, for the scale that all orientations have in common"),
                                facts.length_standard is not None))  # fmt: skip
     if styli:
         which = listed(names(without)) if without else listed(names(styli))
         found.append(
-            Condition(say("A calibrated ring, sphere or plug for the tips of {styli}", styli=which), not without)
+            TestCondition(say("A calibrated ring, sphere or plug for the tips of {styli}", styli=which), not without)
         )
     certificates = [one.certificate for one in facts.probe_standard]
     if facts.length_standard is not None:
         certificates.append(facts.length_standard.certificate)
     if certificates:
-        found.append(Condition(say("Each standard has a certificate that the job names"), all(certificates)))
+        found.append(TestCondition(say("Each standard has a certificate that the job names"), all(certificates)))
     found.append(
-        Condition(say("Other points in each orientation, so that the part's form is seen"), facts.points_varied)
+        TestCondition(say("Other points in each orientation, so that the part's form is seen"), facts.points_varied)
     )
     return tuple(found)

@@ -22,7 +22,7 @@ from cmm_uq.jobs.tables.origin import SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Document
-    from cmm_uq.certificate.part.measurement import PartFound
+    from cmm_uq.certificate.part.measurement import PartMeasurement
     from cmm_uq.certificate.wording import Summary
 
 DOCUMENTS = ("part.html", "part.pdf")
@@ -30,7 +30,7 @@ COMMAND = "part"
 
 
 @dataclass(frozen=True)
-class Asked:
+class PartOptions:
     """How a part is evaluated."""
 
     seed: int = 0  # of everything random
@@ -48,7 +48,7 @@ class Asked:
 class WrittenPart:
     """What was found of a part, contents of results.json, and what was written, by name."""
 
-    found: PartFound
+    found: PartMeasurement
     results: bytes
     files: Mapping[str, Path] = field(default_factory=dict)
     recorded: str = ""
@@ -76,11 +76,11 @@ class WrittenPart:
 
 
 @naming_package()
-def found_of(job: PartJob, asked: Asked, stage: Stage = silent) -> PartFound:
+def evaluate(job: PartJob, asked: PartOptions, stage: Stage = silent) -> PartMeasurement:
     """What a part's job gives; nothing is written."""
-    from cmm_uq.app.commands.parts.part import part_found
+    from cmm_uq.app.commands.parts.part import evaluate_part
 
-    return part_found(
+    return evaluate_part(
         job, seed=asked.seed, trials=asked.trials, digits=asked.digits, rerun=asked.rerun,
         trust=asked.trust, records=asked.records, history=asked.history, stage=stage,
     )  # fmt: skip
@@ -95,7 +95,7 @@ def in_language(job: PartJob, language: Code | None) -> PartJob:
 
 
 def write_part(
-    folder: Path, out: Path | None = None, *, asked: Asked | None = None, force: bool = False, stage: Stage = silent,
+    folder: Path, out: Path | None = None, *, asked: PartOptions | None = None, force: bool = False, stage: Stage = silent,
     language: Code | None = None,
 ) -> WrittenPart:  # fmt: skip
     """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
@@ -105,7 +105,7 @@ def write_part(
     """
     stage("Reading the job", 0.0)
     job = in_language(read_part(folder), language)
-    return written(job, lambda: found_of(job, asked or Asked(), stage), out, force=force, stage=stage)
+    return written(job, lambda: evaluate(job, asked or PartOptions(), stage), out, force=force, stage=stage)
 
 
 def written(
@@ -118,7 +118,7 @@ def written(
     names = [file_name(name, facts.origin) for name in DOCUMENTS]
     owner, inputs = Owner(COMMAND, facts.id, facts.origin), tuple(job.folder / name for name in job.inputs)
     with staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS, PROVENANCE)) as place:
-        one: PartFound = found()
+        one: PartMeasurement = found()
         contents = contents_of(one, stage)
         stage(f"Writing: {len(contents)} files to {folder}", 0.95)
         files = place.write(contents)
@@ -126,7 +126,7 @@ def written(
     return WrittenPart(one, contents[RESULTS], files)
 
 
-def contents_of(found: PartFound, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
+def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:
     """Bytes of every file, by name."""
     from cmm_uq.certificate.part.results import part_results
     from cmm_uq.certificate.render.html import render_html
@@ -149,14 +149,14 @@ def contents_of(found: PartFound, stage: Stage = silent, *, finished: Finished =
     return {html: page, pdf: render_pdf(document, {**job.inputs, **further}), **further, **found.files}
 
 
-def _behind(found: PartFound) -> Behind:
+def _behind(found: PartMeasurement) -> Behind:
     facts, standing = found.job.facts, found.standing
     recording = "" if facts.recording is None else facts.recording.file
     return Behind(COMMAND, facts.job, facts.laboratory, facts.job.origin, found.job.inputs, recording,
                   (standing.number, standing.laboratory))  # fmt: skip
 
 
-def document_of(found: PartFound) -> Document:
+def document_of(found: PartMeasurement) -> Document:
     """The page, in the job's language, marked where nobody measured."""
     from cmm_uq.certificate.document import translated as said
     from cmm_uq.certificate.origin import marked_as

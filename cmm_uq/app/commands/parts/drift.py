@@ -35,7 +35,7 @@ _COLUMNS: Mapping[str, type] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownChanges:
     """What records say of how a machine changes."""
 
     adjusted: tuple[dt.date, ...]  # days of its adjustments
@@ -68,14 +68,16 @@ def attached_history(past: MachineHistory, until: dt.date) -> bytes:
     return (json.dumps(said, ensure_ascii=False, indent=1, sort_keys=True) + "\n").encode()
 
 
-def known_of(content: bytes) -> Known:
+def known_of(content: bytes) -> KnownChanges:
     """The history that :func:`attached_history` wrote."""
     try:
         said = json.loads(content)
         if said["schema"] != SCHEMA:
             raise ValueError(said["schema"])
         adjusted = tuple(map(dt.date.fromisoformat, said["adjusted"]))
-        return Known(adjusted, {str(one["name"]): (_series(one), one["adjusted_after"]) for one in said["values"]})
+        return KnownChanges(
+            adjusted, {str(one["name"]): (_series(one), one["adjusted_after"]) for one in said["values"]}
+        )
     except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
         raise CmmUqError("is no history of a machine", where=FILE,
                          fix="Evaluate the part again, with --records") from error  # fmt: skip
@@ -90,7 +92,7 @@ def _series(one: Mapping[str, Any]) -> Series:
 
 
 @dataclass(frozen=True, eq=False)
-class Aged:
+class AgedMachine:
     """A machine on the day of a part's measurement, what is known of its changes, in a sentence, and in figures."""
 
     state: MachineState
@@ -102,7 +104,7 @@ class Aged:
 
 def with_drift(
     state: MachineState, serial: str, on: dt.date, records: str | Path | None, where: str, *, kept: bytes | None = None
-) -> Aged:
+) -> AgedMachine:
     """The state of a machine on a day.
 
     ``records``: of its history; ``None`` or ``none`` for none. ``kept``: the history that an earlier report has inside
@@ -111,7 +113,7 @@ def with_drift(
     since = state.calibrated or on
     if kept is None and (records is None or str(records) == NONE):
         found = aged(state, on)
-        return Aged(found, _not_known(found))
+        return AgedMachine(found, _not_known(found))
     if kept is None:
         from cmm_uq.app.commands.laboratory.history import history_of
 
@@ -130,7 +132,7 @@ def with_drift(
         return found
 
     found = aged(state, on, change)
-    return Aged(found, _known(found), changes, kept)
+    return AgedMachine(found, _known(found), changes, kept)
 
 
 def _not_known(state: MachineState) -> Text:

@@ -13,7 +13,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.messages import NOTHING, Text, commas, plural, say, semicolons, sentences
 from cmm_uq.certificate.effect_words import title_of, titles
-from cmm_uq.certificate.part.measurement import Further, Unseen
+from cmm_uq.certificate.part.measurement import FurtherSetUps, UnseenError
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
@@ -33,14 +33,14 @@ _SHOWN_BY: tuple[tuple[str, Text], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class Planned:
+class PlannedSetUps:
     """What to measure, and the files of the job that plans it, by name."""
 
-    further: Further
+    further: FurtherSetUps
     files: Mapping[str, bytes] = field(default_factory=dict)
 
 
-def further_of(calibrated: Job | None, unseen: Iterable[Unseen]) -> Planned | None:
+def further_of(calibrated: Job | None, unseen: Iterable[UnseenError]) -> PlannedSetUps | None:
     """Further set-ups of the calibration's artefact for errors that it left free or did not see.
 
     ``calibrated``: job of the calibration; ``None`` where it is not at hand.
@@ -57,12 +57,14 @@ def further_of(calibrated: Job | None, unseen: Iterable[Unseen]) -> Planned | No
     text = sentences([part for part in (_setups(plan, found), _missed(calibrated, missed)) if part])
     names = tuple(one.name for one in wanted)
     if plan is None or not found:
-        return Planned(Further(names, 0, text, missed=missed))
+        return PlannedSetUps(FurtherSetUps(names, 0, text, missed=missed))
     command, file = f"cmm-uq plan {FOLDER}", f"{FOLDER}/job.toml"
-    return Planned(Further(names, len(plan.to_measure), text, command, file, missed), _files(calibrated, found))
+    return PlannedSetUps(
+        FurtherSetUps(names, len(plan.to_measure), text, command, file, missed), _files(calibrated, found)
+    )
 
 
-def _by_share(unseen: Iterable[Unseen]) -> list[Effect]:
+def _by_share(unseen: Iterable[UnseenError]) -> list[Effect]:
     """Errors of the machine, that of the largest share of any characteristic first."""
     shares: dict[str, float] = {}
     for one in unseen:

@@ -31,7 +31,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.certificate.clauses import draft
-from cmm_uq.certificate.part.measurement import Checked, Source, Standing
+from cmm_uq.certificate.part.measurement import CertificateStatus, Source, VerificationCheck
 from cmm_uq.certificate.verify.given import Given, given_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
@@ -55,7 +55,7 @@ def temperatures(job: Job | None) -> Floats | None:
     return np.concatenate([job.points.columns[name] for name in columns]) if columns else None
 
 
-def machine_warnings(job: PartJob, standing: Standing, calibrated: Job | None) -> Iterable[Text]:
+def machine_warnings(job: PartJob, standing: CertificateStatus, calibrated: Job | None) -> Iterable[Text]:
     """What the reader must know of the machine."""
     if standing.origin != MEASURED:
         origin = _ORIGINS.get(standing.origin, Verbatim(standing.origin))
@@ -111,11 +111,11 @@ _MOST = 200
 
 
 @dataclass(frozen=True, eq=False)
-class MachineFound:
+class StatedMachine:
     """A machine, and how it is known."""
 
     state: MachineState  # its errors and noise on the day of the part's measurement
-    standing: Standing  # of its certificate
+    standing: CertificateStatus  # of its certificate
     job: Job | None  # of its calibration, where the inputs are at hand
     warnings: tuple[Text, ...]  # what the reader must know of it
     history: bytes | None = None  # that its changes since follow from; ``None`` where no records were asked
@@ -131,16 +131,16 @@ class _Stated:
     draws: Mapping[str, Floats]
     job: Job | None
     verdict: str
-    checked: tuple[Checked, ...]
+    checked: tuple[VerificationCheck, ...]
     again: bool = False
     not_again: Text = NOTHING
 
 
-def machine_found(
+def state_machine(
     job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None, records: str | Path | None = None,
     history: bytes | None = None, seed: int = 0, stage: Stage = silent,
     fits: Callable[[Machine], None] = lambda machine: None,
-) -> MachineFound:  # fmt: skip
+) -> StatedMachine:  # fmt: skip
     """The machine of a part's job.
 
     ``rerun``: whether the certificate's figures are computed again from its inputs. ``trust``: files and folders of
@@ -170,11 +170,11 @@ def machine_found(
     told = machine_warnings(job, standing, stated.job)
     if rerun and stated.not_again:
         told = [stated.not_again, *told]
-    return MachineFound(state, standing, stated.job, tuple(told), since.history)
+    return StatedMachine(state, standing, stated.job, tuple(told), since.history)
 
 
 def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machine: None) -> None:
-    """Refuse what :func:`machine_found` refuses of a certificate, without its errors; a job to be analysed is read alone."""
+    """Refuse what :func:`state_machine` refuses of a certificate, without its errors; a job to be analysed is read alone."""
     if job.facts.machine_state.job is not None:
         fits(_machine(job, read_job(_machines_folder(job))))
         return
@@ -183,7 +183,7 @@ def refuse_machine(job: PartJob, fits: Callable[[Machine], None] = lambda machin
     fits(_machine(job, stated.job))
 
 
-def standing_of(job: PartJob, found: Verification) -> Standing:
+def standing_of(job: PartJob, found: Verification) -> CertificateStatus:
     """The machine's certificate on the day of the part's measurement, without what its errors then are."""
     stated = _certified(job, found, rerun=False)
     _machine(job, stated.job)
@@ -248,12 +248,12 @@ def _drawn(job: PartJob, given: Given, results: Mapping[str, Any], where: str) -
     return Draws.of_npz(content, named).flat()
 
 
-def _checks(found: Verification) -> tuple[Checked, ...]:
+def _checks(found: Verification) -> tuple[VerificationCheck, ...]:
     from cmm_uq.certificate.verify.found import CHECKS
 
     inquiry = found.inquiry
-    done = [Checked(what, inquiry.done[name]) for name, what in CHECKS.items() if inquiry.done.get(name)]
-    return (*done, *(Checked(left.what, 0, left.why) for left in inquiry.unchecked))
+    done = [VerificationCheck(what, inquiry.done[name]) for name, what in CHECKS.items() if inquiry.done.get(name)]
+    return (*done, *(VerificationCheck(left.what, 0, left.why) for left in inquiry.unchecked))
 
 
 def _analysed(job: PartJob, seed: int, stage: Stage) -> _Stated:
@@ -308,7 +308,7 @@ def with_history(job: PartJob, kept: bytes | None) -> PartJob:
     return job if kept is None else replace(job, inputs={**job.inputs, HISTORY: kept})
 
 
-def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
+def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> CertificateStatus:
     """The certificate on the day of the measurement."""
     said, facts, on = stated.results["job"], job.facts.machine_state, job.facts.job.date
     date = dt.date.fromisoformat(said["date"])
@@ -322,7 +322,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
         raise CmmUqError(f"the machine's certificate has expired: it held until {until}, and the part was measured on {on}",
                          where=where, fix="Calibrate the machine, or give the certificate that held on that day")  # fmt: skip
     recorded = temperatures(stated.job)
-    return Standing(
+    return CertificateStatus(
         stated.source, stated.files, number=str(said.get("number") or (own and own.job.number) or said["id"]),
         laboratory="" if own is None else own.laboratory.name, machine=str(said["machine"]),
         serial=str(said.get("serial") or ""), origin=str(said["origin"]), date=date, age=on - date, valid_until=until,
@@ -335,7 +335,7 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> Standing:
     )  # fmt: skip
 
 
-def _known_at(state: MachineState, standing: Standing) -> float | None:
+def _known_at(state: MachineState, standing: CertificateStatus) -> float | None:
     """Temperature at which the errors of the scales are known: of 20 °C where the calibration modelled their expansion."""
     modelled = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
     return None if modelled else standing.temperature_c

@@ -25,7 +25,7 @@ from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.checks import unfit
 from cmm_uq.jobs.part.datums import freedoms, members
 from cmm_uq.jobs.part.dmis import drawing_of_dmis
-from cmm_uq.jobs.part.drawing import KEY, Drawing, Unknown, probed_of, set_aside_unsound
+from cmm_uq.jobs.part.drawing import KEY, Drawing, NotUnderstood, probed_of, set_aside_unsound
 from cmm_uq.jobs.part.job import POSTERIOR, TABLES, part_of
 from cmm_uq.jobs.part.probed import Probed
 from cmm_uq.jobs.part.qif import drawing_of_qif
@@ -213,7 +213,7 @@ def _with(tables: dict[str, Any], given: Tables, id: str) -> dict[str, Any]:  # 
 
 def _files(
     tables: Mapping[str, Any], marked: Collection[str], opened: Mapping[str, Collection[str]],
-    left_out: Collection[Unknown] = (),
+    left_out: Collection[NotUnderstood] = (),
 ) -> dict[str, bytes]:  # fmt: skip
     part_of({"job.toml": as_toml(tables, "job.toml")}, machine=False)
     return {
@@ -279,7 +279,7 @@ def _copied(table: Any) -> Any:
     return [dict(one) for one in table] if isinstance(table, list) else dict(table)
 
 
-def _readme(left_out: Collection[Unknown]) -> str:
+def _readme(left_out: Collection[NotUnderstood]) -> str:
     lines = [
         "# A part and its uncertainty", "",
         "- `job.toml`: features with the points at which they are probed, datums, tolerances, styli, temperatures. Editors "

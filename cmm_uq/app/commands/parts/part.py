@@ -13,9 +13,9 @@ from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
 from cmm_uq.analysis.conformity.limits import LimitDecision as Judged
 from cmm_uq.analysis.conformity.limits import Limits, judge
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED
-from cmm_uq.analysis.parts.budget import Budget, budget, displaced
+from cmm_uq.analysis.parts.budget import VarianceShares, point_errors, variance_shares
 from cmm_uq.analysis.parts.machine.state import MachineState
-from cmm_uq.analysis.parts.methods.comparison import compared
+from cmm_uq.analysis.parts.methods.comparison import compare_methods
 from cmm_uq.analysis.parts.methods.of_job import methods_of
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import conforming, evaluated, middle, stated, within_bounds
@@ -32,12 +32,12 @@ from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.analysis.parts.ways import ways
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.further import further_of
-from cmm_uq.app.commands.parts.machine import machine_found, with_calibration, with_history
+from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.effect_words import title_of
-from cmm_uq.certificate.part.measurement import MATTERS, PartFound, Unseen
+from cmm_uq.certificate.part.measurement import MATTERS, PartMeasurement, UnseenError
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, Source, from_source, settled_source
@@ -65,7 +65,7 @@ def affordable(draws: int, plan: Plan) -> int:
     return max(draws // 10, min(draws, draws * MANY // points))
 
 
-def part_found(
+def evaluate_part(
     job: PartJob,
     *,
     seed: int = 0,
@@ -76,7 +76,7 @@ def part_found(
     records: str | Path | None = None,
     history: bytes | None = None,
     stage: Stage = silent,
-) -> PartFound:
+) -> PartMeasurement:
     """What a part's job gives.
 
     ``trials``: number of virtual measurements; by default :data:`TRIALS`, fewer of a plan of many points. ``digits``: of u
@@ -90,7 +90,7 @@ def part_found(
     measured = None if job.measured is None else evaluated(plan, job.measured)
     others = methods_of(job, plan, measured)
 
-    machine = machine_found(
+    machine = state_machine(
         job, rerun=rerun, trust=trust, records=records, history=history, seed=seed, stage=stage,
         fits=partial(refuse_out_of_reach, job),
     )  # fmt: skip
@@ -102,7 +102,7 @@ def part_found(
     virtual = Virtual(plan, given)
     simulated, errors = _simulated(virtual, trials, digits, seed, stage)
     stage("Shares of each cause", 0.6)
-    shares = budget(virtual, min(affordable(SHARED, plan), trials), seed)
+    shares = variance_shares(virtual, min(affordable(SHARED, plan), trials), seed)
     stage("What would change the uncertainty", 0.7)
     compared_by = min(affordable(COMPARED, plan), trials)
     found_ways = ways(
@@ -113,15 +113,32 @@ def part_found(
     further = further_of(machine.job, unseen)
     stage("Decisions", 0.85)
     known = stated(simulated, measured, plan, errors)
-    decided = judged(job, plan, errors, measured)
+    decided = decide_limits(job, plan, errors, measured)
     together = None if measured is None else _together(conforming(plan, errors, measured)[1], decided)
-    return PartFound(
-        job, plan, given, virtual, simulated, known, measured, shares, unseen, None if further is None else further.further,
-        decided, together, tuple(found_ways),
-        displaced(virtual, seed=seed), _three(origin_of(job, machine.state.machine)),
-        machine.standing, compared(known, shares, others), digits=digits, seed=seed, asked=trials, warnings=machine.warnings,
+    return PartMeasurement(
+        job,
+        plan,
+        given,
+        virtual,
+        simulated,
+        known,
+        measured,
+        shares,
+        unseen,
+        None if further is None else further.further,
+        decided,
+        together,
+        tuple(found_ways),
+        point_errors(virtual, seed=seed),
+        _three(origin_of(job, machine.state.machine)),
+        machine.standing,
+        compare_methods(known, shares, others),
+        digits=digits,
+        seed=seed,
+        asked=trials,
+        warnings=machine.warnings,
         files={} if further is None else further.files,
-    )  # fmt: skip
+    )
 
 
 def _together(together: float, decided: Iterable[Judged | None]) -> float | None:
@@ -174,17 +191,17 @@ def _simulated(virtual: Virtual, trials: int, digits: int | None, seed: int, sta
     return found, np.concatenate(keeping.blocks)
 
 
-def _unseen(virtual: Virtual, shares: Budget) -> tuple[Unseen, ...]:
+def _unseen(virtual: Virtual, shares: VarianceShares) -> tuple[UnseenError, ...]:
     """What the calibration left free or did not see, by characteristic, the largest share first."""
     found = []
     for name in shares.characteristics:
         for line, share, why in shares.told(name, virtual.named, MATTERS):
             effect = line.partition(": ")[2]
-            found.append(Unseen(name, line, effect, title_of(effect), share, why))
+            found.append(UnseenError(name, line, effect, title_of(effect), share, why))
     return tuple(found)
 
 
-def judged(job: PartJob, plan: Plan, errors: Floats, measured: Floats | None) -> tuple[Judged | None, ...]:
+def decide_limits(job: PartJob, plan: Plan, errors: Floats, measured: Floats | None) -> tuple[Judged | None, ...]:
     """What follows from each characteristic's limits, by the job's rule.
 
     Where nothing was measured, what would be accepted is told of a value that is not corrected for its mean error. A zone is

@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.causes.cause import MANY, Scatter, components, field_components
-from cmm_uq.analysis.parts.causes.form import Form
+from cmm_uq.analysis.parts.causes.cause import MANY, PointScatter, components, field_components
+from cmm_uq.analysis.parts.causes.form import SurfaceForm
 from cmm_uq.analysis.parts.causes.stylus import DEGREES, directions, styli
 from cmm_uq.analysis.parts.causes.surroundings import elapsed, moving_part
 from cmm_uq.analysis.parts.machine.state import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Plan, Stylus
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
@@ -37,14 +37,14 @@ def round_hole(count: int, *, whole: int = 0) -> Feature:
 def test_three_points_take_three_lobes_for_size(count: int, u: float) -> None:
     """A cosine of 3θ, its amplitude of standard deviation 5 µm, is the same at 120° steps, and no size to 4 or 6 points."""
     plan = Plan((round_hole(count, whole=90),), (Characteristic("d", "size", ("c",)),))
-    given = Circumstances(machine(), forms=(Form("c", ((3, 5.0),)),))
+    given = Circumstances(machine(), forms=(SurfaceForm("c", ((3, 5.0),)),))
     assert drawn(plan, given).std() == pytest.approx(u, abs=1e-4)
 
 
 def test_few_points_find_less_form_than_there_is() -> None:
     """The whole surface has the range of its cosine, 2·A; four points of two lobes see 2·A·|cos φ|, on average 2/π of it."""
     one = (Characteristic("round", "roundness", ("c",)),)
-    given = Circumstances(machine(), forms=(Form("c", ((2, 5.0),)),))
+    given = Circumstances(machine(), forms=(SurfaceForm("c", ((2, 5.0),)),))
     found = drawn(Plan((round_hole(4, whole=180),), one), given, 4000)[:, 0]
     assert (found <= 2e-5).all()  # of 180 points the nearest to a crest is a degree away
     # the amplitude is Rayleigh's, of mean σ·√(π/2); the phase is any
@@ -74,7 +74,7 @@ def test_a_random_field_has_its_covariance() -> None:
 
 def test_noise_keeps_to_the_axes_of_the_machine() -> None:
     """Noise of z alone is along the part's x where the part stands upright."""
-    upright = Pose(np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]), np.array([300.0, 200, -300]))
+    upright = PartPose(np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]), np.array([300.0, 200, -300]))
     plan = Plan(
         (spot("one", [0, 0, 0]), spot("other", [100, 0, 0])), (Characteristic("", "distance", ("one", "other")),)
     )
@@ -82,7 +82,7 @@ def test_noise_keeps_to_the_axes_of_the_machine() -> None:
     for pose, u in ((upright, 2e-3 * np.sqrt(2) / 2), (POSE, 0.0)):
         at = AtPose(plan, given, pose)
         assert at.errors(at.drawn(np.random.default_rng(0), 20_000)).std() == pytest.approx(u, rel=0.02, abs=1e-6)
-        assert isinstance(at.causes[1], Scatter)
+        assert isinstance(at.causes[1], PointScatter)
 
 
 def test_slow_noise_is_common_to_points_that_follow_each_other() -> None:
@@ -163,7 +163,7 @@ FACE = plane("A", UP, [0, 0, 0], [[120, 0, 0], [0, 80, 0]], (40, 30))
 
 def test_components_of_a_field_on_many_points_add_up_to_its_covariance() -> None:
     """Second method: eigenvectors of the whole covariance."""
-    form = Form("A", field_um=1.0, correlation_mm=25.0)
+    form = SurfaceForm("A", field_um=1.0, correlation_mm=25.0)
     assert len(FACE.points) > MANY
     found, whole = form.components(FACE, FACE.points), form.kernel(FACE, FACE.points)
     assert len(found) < len(FACE.points) / 5
@@ -184,7 +184,7 @@ def test_lobing_on_many_points_has_no_more_components_than_its_spherical_harmoni
     """Closed form: 2l + 1 harmonics of each degree l; pre-travel of one point has the whole variance."""
     feature = bore("bore", [10, 20, 0], 8.0, count=400)
     stylus = Stylus("stylus", np.zeros(3), 4.0, lobing_um=0.8)
-    (cause,) = styli(Plan((feature,), (), (stylus,)), Pose())
+    (cause,) = styli(Plan((feature,), (), (stylus,)), PartPose())
     assert len(cause.factors) <= sum(2 * degree + 1 for degree in DEGREES)
     shown = cause.moved(np.eye(len(cause.factors)), slice(None))
     np.testing.assert_allclose(np.sqrt(np.sum(shown**2, axis=(0, 2))), 0.8e-3, rtol=1e-7)

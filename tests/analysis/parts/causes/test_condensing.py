@@ -9,9 +9,9 @@ import pytest
 
 from cmm_uq.analysis.parts import virtual
 from cmm_uq.analysis.parts.causes import condensing
-from cmm_uq.analysis.parts.causes.form import Form
+from cmm_uq.analysis.parts.causes.form import SurfaceForm
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.plan import Alignment, Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, PartAlignment, Plan
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects
@@ -43,7 +43,7 @@ PLAN = Plan(
         Characteristic("size", "size", ("bore",)),
         Characteristic("squareness", "perpendicularity", ("bore",), ("A",)),
     ),
-    alignment=Alignment(("A",)),
+    alignment=PartAlignment(("A",)),
 )
 
 
@@ -51,7 +51,7 @@ def circumstances(measured: Floats | None) -> Circumstances:
     draws = np.random.default_rng(1).standard_normal((2000, 2)) * [3.0, 2.0]
     noise = StatedNoise(np.tile([[1e-3, 2e-3, 1.5e-3], [2e-3, 1e-3, 1e-3]], (1000, 1)))
     machine = MachineState(Machine("mine"), effects(["scale_x", "squareness_zx"]), draws, noise)
-    return Circumstances(machine, forms=(Form("A", roughness_um=0.5),), measured=measured)
+    return Circumstances(machine, forms=(SurfaceForm("A", roughness_um=0.5),), measured=measured)
 
 
 def lighter(monkeypatch: pytest.MonkeyPatch, given: Circumstances) -> Virtual:

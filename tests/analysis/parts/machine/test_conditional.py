@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 import cmm_uq
 from cmm_uq.analysis.parts.machine.conditional import (
-    Together,
+    JointModel,
     draws_given,
     given_recording,
     joint_posterior,
@@ -30,7 +30,7 @@ from cmm_uq.analysis.parts.machine.state import (
     machine_stated,
     of_machine,
 )
-from cmm_uq.analysis.parts.placing import Pose
+from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Characteristic, Plan
 from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
 from cmm_uq.app.commands.model import recorded_model
@@ -82,7 +82,7 @@ def test_what_cannot_be_told_from_the_recording_stays_on_its_own() -> None:
     further = left_out("hysteresis_x", "rotation_x_x", "periodic_scale_y")
     which, mean, _ = joint_posterior(calibration(), further, SIGMA)
     assert which == (1, 2)  # play needs directions of approach
-    assert len(mean) == 6 + 1 + 2 * TRIED + len(Together.of(calibration(), further).seen)
+    assert len(mean) == 6 + 1 + 2 * TRIED + len(JointModel.of(calibration(), further).seen)
 
 
 def test_all_trial_periods_together_have_nearly_the_covariance_of_a_period_that_nobody_knows() -> None:
@@ -134,7 +134,7 @@ def test_what_a_recording_says_of_an_error_with_a_period_is_what_its_covariance_
     further, between = left_out("periodic_scale_y"), np.linspace(333.0, 800.0, 40)
     mean, variance = beside(model, sigma, between)
     _, found, spread = joint_posterior(model, further, sigma)
-    (effect,) = Together.of(model, further).effects
+    (effect,) = JointModel.of(model, further).effects
     assert isinstance(effect, GivenPeriod)
     at = effect.at(between)
     np.testing.assert_allclose(at @ found[6:], mean, atol=0.02 * float(np.sqrt(np.diagonal(variance).mean())))
@@ -148,7 +148,7 @@ def test_what_a_recording_says_of_an_error_with_a_period_is_what_its_covariance_
 def test_a_draw_of_an_error_with_a_period_has_one_beforehand_with_the_covariance_of_all() -> None:
     """Products of two coefficients scatter by √(3·64/100 000) at most, a mixture of 64 normals; six times that."""
     model, further = gauge(), left_out("periodic_scale_y")
-    (effect,) = Together.of(model, further).effects
+    (effect,) = JointModel.of(model, further).effects
     assert isinstance(effect, GivenPeriod)
     draws = effect.beforehand(np.random.default_rng(3), 100_000)
     waves, said = draws[:, : 2 * TRIED], draws[:, 2 * TRIED :]
@@ -174,7 +174,7 @@ def test_offsets_of_set_ups_widen_what_is_left_out_as_generalised_least_squares_
     """Variance of a length: 2σ² of each reading and 2τ² of its set-up, common to its three repeats; with all priors
     (XᵀV⁻¹X + P)⁻¹, V filled in by hand. Covariances of 40 000 draws scatter by 1 %."""
     model, further = repeated(3), left_out("rotation_x_x", "straightness_x_y")
-    together, components, count = Together.of(model, further), noise_of(model), 40_000
+    together, components, count = JointModel.of(model, further), noise_of(model), 40_000
     whole = replace(model, effects=(*model.effects, *(one.effect for one in further)))
     about = model.estimate().about
     linear = whole.linearised(np.concatenate([about[:6], np.zeros(2), about[6:]]))
@@ -260,7 +260,7 @@ def test_an_error_that_was_left_out_does_not_make_intervals_of_parts_too_narrow(
     sd = np.array([c.prior_sd for effect in every for c in effect.coefficients])
     designed = replace(calibration(), effects=every)
     # a diagonal of x and y close above the table: by x·z·roll it is another one than halfway up, which no squareness is
-    noise, pose = StatedNoise(np.full(3, SIGMA)), Pose(np.eye(3), np.array([-400.0, -200.0, -180.0]))
+    noise, pose = StatedNoise(np.full(3, SIGMA)), PartPose(np.eye(3), np.array([-400.0, -200.0, -180.0]))
     pair = spot("one", [0, 0, 0]), spot("other", [300, 300, 0])
     plan = Plan(pair, (Characteristic("", "distance", ("one", "other")),))
     inside = np.zeros(2)
@@ -283,7 +283,7 @@ def test_an_error_that_was_left_out_does_not_make_intervals_of_parts_too_narrow(
     assert fewest <= inside[1] <= most
 
 
-def _errors(plan: Plan, state: MachineState, pose: Pose, random: np.random.Generator, n: int) -> Floats:
+def _errors(plan: Plan, state: MachineState, pose: PartPose, random: np.random.Generator, n: int) -> Floats:
     at = AtPose(plan, Circumstances(state), pose)
     return at.errors(at.drawn(random, n))[:, 0]
 

@@ -7,40 +7,40 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.budget import Budget as Shares
-from cmm_uq.analysis.parts.methods.comparison import compared, family_shares, small
-from cmm_uq.analysis.parts.methods.method import ByMethod, Comparison, Figure
-from cmm_uq.analysis.parts.result import Stated
+from cmm_uq.analysis.parts.budget import VarianceShares as Shares
+from cmm_uq.analysis.parts.methods.comparison import compare_methods, family_shares, small
+from cmm_uq.analysis.parts.methods.method import MethodComparison, MethodFigure, MethodResult
+from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import ARCSECOND, unit
 from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, Line
 
 NAME = "d"
-STATED = Stated(NAME, 20.001, 0.0, 5e-3, (19.991, 20.011), 2.0)
+STATED = StatedCharacteristic(NAME, 20.001, 0.0, 5e-3, (19.991, 20.011), 2.0)
 CAUSES = ("machine: scale_x", "machine: squareness_xy", "noise: reading", "form: form of bore")
 TOTAL = np.array([[0.30], [0.34], [0.32], [0.04]])
 SHARES = Shares((NAME,), CAUSES, TOTAL, TOTAL, (), np.zeros((0, 1)), np.array([5e-3]))
 """Virtual measurements: u = 5 µm, 64 % of the variance from the machine, 32 % from noise, 4 % from form."""
 
 
-def figure(**changes: object) -> Figure:
+def figure(**changes: object) -> MethodFigure:
     """U = 2 · 1.5 µm; what varied scattered by 5 µm · √0.32 = 2.83 µm."""
     budget = Budget(say("b"), [Line(say("all"), 1.5e-3, REPEATS, unit=unit("mm"))], 2e-3, unit("mm"), factor=2.0)
     given = {"value": 19.999, "systematic": 2e-3, "scatter": 2.83e-3, "scatter_dof": 19.0}
-    return Figure(NAME, budget, **{**given, **changes})  # type: ignore[arg-type]
+    return MethodFigure(NAME, budget, **{**given, **changes})  # type: ignore[arg-type]
 
 
-def method(one: Figure, **seen: str) -> ByMethod:
-    return ByMethod("calibrated_part", (one,), (), {"machine": "systematic", "noise": "varied", **seen})  # type: ignore[dict-item]
+def method(one: MethodFigure, **seen: str) -> MethodResult:
+    return MethodResult("calibrated_part", (one,), (), {"machine": "systematic", "noise": "varied", **seen})  # type: ignore[dict-item]
 
 
-def found(*methods: ByMethod) -> Comparison:
-    comparison = compared((STATED,), SHARES, methods)
+def found(*methods: MethodResult) -> MethodComparison:
+    comparison = compare_methods((STATED,), SHARES, methods)
     assert comparison is not None
     return comparison
 
 
-def why(one: Figure, **seen: str) -> str:
+def why(one: MethodFigure, **seen: str) -> str:
     return " ".join(found(method(one, **seen)).characteristics[0].why)
 
 
@@ -57,7 +57,7 @@ def test_e_n_is_the_difference_over_both_expanded_uncertainties() -> None:
 
 
 def test_each_two_methods_have_one() -> None:
-    other = ByMethod("orientations", (figure(value=20.004),), (), {})
+    other = MethodResult("orientations", (figure(value=20.004),), (), {})
     pairs = found(method(figure()), other).characteristics[0].pairs
     assert [(pair.one, pair.other) for pair in pairs] == [
         ("virtual", "calibrated_part"), ("virtual", "orientations"), ("calibrated_part", "orientations"),
@@ -70,8 +70,8 @@ def test_without_a_value_there_is_none() -> None:
 
 
 def test_what_is_not_tested_is_not_compared() -> None:
-    assert compared((STATED,), SHARES, ()) is None
-    assert found(ByMethod("orientations", (), (), {})).characteristics == ()
+    assert compare_methods((STATED,), SHARES, ()) is None
+    assert found(MethodResult("orientations", (), (), {})).characteristics == ()
 
 
 def test_the_sentences_say_what_is_systematic_and_what_scatters() -> None:
@@ -136,7 +136,7 @@ def test_a_systematic_error_beyond_what_the_machine_is_known_by_is_told() -> Non
 
 def test_a_zone_that_is_nearly_nothing_is_told_to_be_too_large() -> None:
     def by_orientations(**changes: object) -> str:
-        return " ".join(found(ByMethod("orientations", (figure(**changes),), (), {})).characteristics[0].why)
+        return " ".join(found(MethodResult("orientations", (figure(**changes),), (), {})).characteristics[0].why)
 
     assert "d is the width of a zone" in by_orientations(zone=True, value=8e-3)
     assert "width of a zone" not in by_orientations(zone=True, value=9e-3)
@@ -156,6 +156,6 @@ def test_a_zone_s_systematic_error_is_told_to_be_of_one_direction(systematic: fl
 @pytest.mark.parametrize(("error", "told"), [(-3e-3, True), (3e-3, False)])
 def test_it_is_the_mean_error_from_which_a_systematic_error_differs(error: float, told: bool) -> None:
     """8 µm are 11 µm from −3 µm, beyond U = 10 µm, and 5 µm from 3 µm."""
-    comparison = compared((replace(STATED, error=error),), SHARES, (method(figure(systematic=8e-3)),))
+    comparison = compare_methods((replace(STATED, error=error),), SHARES, (method(figure(systematic=8e-3)),))
     assert comparison is not None
     assert any("by 11 µm, more than their U" in text for text in comparison.characteristics[0].why) is told

@@ -15,12 +15,12 @@ import pytest
 from benchmarks.examples.part_methods_job import BESIDE_MM, LARGER_MM, TABLES, made
 from benchmarks.examples.part_methods_job import FOLDER as EXAMPLE
 from benchmarks.examples.part_methods_job import files as example_files
-from cmm_uq.analysis.parts.methods.method import ByMethod
+from cmm_uq.analysis.parts.methods.method import MethodResult
 from cmm_uq.analysis.parts.methods.of_job import lacking, methods_of
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.app.commands.jobs.check import check_job
-from cmm_uq.app.commands.parts.part import part_found
+from cmm_uq.app.commands.parts.part import evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.certificate.part.results import PART_RESULTS, part_results
@@ -45,7 +45,7 @@ STATE = {"certificate": "machine",
          "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}  # fmt: skip
 
 
-def methods(**changes: Any) -> dict[str, ByMethod]:
+def methods(**changes: Any) -> dict[str, MethodResult]:
     job = with_methods(**changes)
     plan = plan_of(job)
     return {one.method: one for one in methods_of(job, plan, evaluated(plan, plan.points))}
@@ -170,7 +170,7 @@ def test_the_part_s_command_finds_them_and_check_says_what_they_lack(
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", lambda *_, **__: [])
     job = plate_files({**by_results(), **files()}, by_calibrated_part=CALIBRATED,
                       by_orientations={**ORIENTED, "points_varied": False}, machine_state=STATE)  # fmt: skip
-    found = part_found(part_of(job), trials=1000)
+    found = evaluate_part(part_of(job), trials=1000)
     assert found.methods is not None
     assert [one.name for one in found.methods.characteristics] == [SIZE, ACROSS]
     virtual, calibrated, turned = found.methods.characteristics[0].stated
@@ -227,7 +227,7 @@ def test_the_example_has_all_methods_compared(monkeypatch: pytest.MonkeyPatch) -
     """With few draws; eleven of its twelve intervals hold the true value, and E_n beyond 1 tells of the twelfth."""
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", lambda *_, **__: [])
     assert not [one for one in check_job(EXAMPLE).warnings if one.key.startswith("[by_")]
-    found, truth = part_found(read_part(EXAMPLE), trials=1000), example_truth()
+    found, truth = evaluate_part(read_part(EXAMPLE), trials=1000), example_truth()
     assert found.methods is not None
     beyond = {
         (one.name, by.method)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-from cmm_uq.app.commands.parts.further import Planned, further_of
+from cmm_uq.app.commands.parts.further import PlannedSetUps, further_of
 from cmm_uq.app.commands.plans.planning import make_plan
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.part.measurement import Unseen
+from cmm_uq.certificate.part.measurement import UnseenError
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 
@@ -19,12 +19,14 @@ def calibrated(name: str = "step-gauge-simulated") -> Job:
     return read_job(ROOT / "examples" / name)
 
 
-def unseen(effect: str, share: float, characteristic: str = "1") -> Unseen:
-    return Unseen(characteristic, f"machine: {effect}", effect, say("{e}", e=say("error")), share, say("nobody saw it"))
+def unseen(effect: str, share: float, characteristic: str = "1") -> UnseenError:
+    return UnseenError(
+        characteristic, f"machine: {effect}", effect, say("{e}", e=say("error")), share, say("nobody saw it")
+    )
 
 
 @cache
-def planned() -> Planned:
+def planned() -> PlannedSetUps:
     shares = [
         unseen("rotation_x_y", 0.2),
         unseen("rotation_x_y", 0.6, "2"),

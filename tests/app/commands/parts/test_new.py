@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.parts import plan
-from cmm_uq.analysis.parts.characteristics import Evaluation
+from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.setup import (
     circumstances_of,
@@ -162,7 +162,7 @@ def test_what_a_job_may_ask_the_virtual_measurement_evaluates(what: str, kind: A
     features = [plan.Feature(name, *one) for name in names] + [plan.Feature("datum", *plan_feature(datum))]
     datums = ("datum",) if asks.datums else ()
     asked = plan.Characteristic("1", what, tuple(names), datums)
-    Evaluation(asked, plan.Plan(tuple(features), (asked,), alignment=plan.Alignment(("datum",))), {})
+    CharacteristicEvaluation(asked, plan.Plan(tuple(features), (asked,), alignment=plan.PartAlignment(("datum",))), {})
 
 
 def plan_feature(kind: str) -> tuple[Any, ...]:

@@ -16,11 +16,11 @@ from cmm_uq import __version__
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
-from cmm_uq.app.commands.parts.machine import machine_found
-from cmm_uq.app.commands.parts.part import affordable, judged, part_found
+from cmm_uq.app.commands.parts.machine import state_machine
+from cmm_uq.app.commands.parts.part import affordable, decide_limits, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.certificate.part.measurement import PartFound
+from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import PART_RESULTS, part_results
 from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.jobs.part.job import TABLES
@@ -45,17 +45,17 @@ def test_features_that_are_found_anew_each_time_have_fewer_virtual_measurements_
 
 
 @cache
-def plain() -> PartFound:
+def plain() -> PartMeasurement:
     """The plate with its nominal points, by the machine's certificate."""
-    return part_found(plate_of(by_certificate()), trials=TRIALS)
+    return evaluate_part(plate_of(by_certificate()), trials=TRIALS)
 
 
 @cache
-def shifted() -> PartFound:
+def shifted() -> PartMeasurement:
     """The plate with its bore measured 20 µm off along x, by figures and draws of the machine alone."""
     off = np.zeros((60, 3))
     off[36:, 0] = 0.02
-    return part_found(plate_of(by_results(), off, **THERE), trials=TRIALS)
+    return evaluate_part(plate_of(by_results(), off, **THERE), trials=TRIALS)
 
 
 def test_a_certificate_is_verified_and_its_recording_conditions_the_errors() -> None:
@@ -92,7 +92,7 @@ def test_a_machines_job_states_the_same_as_its_certificate(tmp_path: Path, monke
     (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
     files = plate_files({}, machine_state={"job": "../machine"})
     (tmp_path / "plate" / "job.toml").write_bytes(files["job.toml"])
-    found = machine_found(read_part(tmp_path / "plate"))
+    found = state_machine(read_part(tmp_path / "plate"))
     state, stated = found.state, shifted().given.machine
     assert (found.standing.source, found.standing.verdict) == ("job", "ANALYSED")
     assert [one.name for one in state.effects] == [one.name for one in stated.effects]
@@ -133,7 +133,7 @@ def test_of_a_perfect_zone_acceptance_goes_by_all_errors_about_zero() -> None:
     random = np.random.default_rng(5)
     job = plate_of(by_results(), characteristic=[TABLES["characteristic"][1]])
     errors = 2e-3 * np.abs(random.standard_normal((20_000, 1)))
-    (found,) = judged(job, plan_of(job), errors, None)
+    (found,) = decide_limits(job, plan_of(job), errors, None)
     assert found is not None
     assert found.accepted == (None, pytest.approx(0.1 - 1.645 * 2e-3, abs=1e-4))
 
@@ -206,7 +206,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
 def test_angles_are_in_degrees_in_results() -> None:
     asked = {"name": "a", "what": "angle", "features": ["A", "B"], "lower_deg": 89.0, "upper_deg": 91.0}
     job = plate_of(by_results(), np.zeros((60, 3)), characteristic=[asked], **THERE)
-    found = part_found(job, trials=1000)
+    found = evaluate_part(job, trials=1000)
     data = part_results(found)["characteristics"][0]
     assert data["unit"] == "°"
     assert data["measured"] == pytest.approx(90.0, abs=1e-6)
@@ -264,14 +264,14 @@ def test_a_machine_whose_certificate_does_not_hold_is_refused(
 ) -> None:
     placed = THERE if machine in (by_results, other_draws) and "nothing says" not in words else {}
     with pytest.raises(CmmUqError, match=words.replace("(", r"\(")) as raised:
-        part_found(plate_of(machine(), **{**placed, **changes}), trials=1000)
+        evaluate_part(plate_of(machine(), **{**placed, **changes}), trials=1000)
     assert raised.value.fix
 
 
 @pytest.mark.parametrize("last", [dt.date(2026, 5, 31), dt.date(2026, 6, 1)])
 def test_a_certificate_holds_until_its_last_day(last: dt.date) -> None:
     state = {**THERE["machine_state"], "valid_until": last}
-    found = machine_found(plate_of(by_results(), machine_state=state))
+    found = state_machine(plate_of(by_results(), machine_state=state))
     assert found.standing.valid_until == last
 
 
@@ -281,16 +281,16 @@ def test_a_certificate_of_another_version_that_was_to_be_computed_again_is_told_
     for module in ("verify_again", "parts.machine"):
         monkeypatch.setattr(f"cmm_uq.app.commands.{module}.__version__", "99.0.0")
     job = plate_of(by_certificate())
-    (first, *_) = machine_found(job, rerun=True).warnings
+    (first, *_) = state_machine(job, rerun=True).warnings
     assert "was to be computed again and was not: version " in first
     assert __version__ in first
     assert "99.0.0" in first
-    assert not any("computed again" in one for one in machine_found(job).warnings)
+    assert not any("computed again" in one for one in state_machine(job).warnings)
 
 
 def test_temperatures_outside_of_the_calibrations_are_told() -> None:
     warm = {"scales_c": [23.0, 23.0, 23.0]}
-    told = machine_found(plate_of(by_results(), environment=warm, **THERE)).warnings
+    told = state_machine(plate_of(by_results(), environment=warm, **THERE)).warnings
     assert any("23 to 23 °C; the temperature of the calibration is not known" in text for text in told)
 
 
