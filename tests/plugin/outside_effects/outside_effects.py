@@ -2,11 +2,7 @@
 
 from collections.abc import Sequence
 
-from cmm_uq.base.messages import say
-from cmm_uq.base.points import Floats, Points
-from cmm_uq.base.units import ARCSECOND, unit
-from cmm_uq.machine.physics.effect import Effect, Parameter
-from cmm_uq.machine.physics.rigid_body import turned
+from cmm_uq.effect import ARCSECOND, Effect, Floats, Parameter, Points, say, turned, unit
 
 
 class BeamTwist(Effect):
@@ -22,7 +18,6 @@ class BeamTwist(Effect):
     coefficients = (Parameter("twist_arcsec", unit("″"), 10.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, high = points.machine.travel("y")
         place = 2 * (points.readings["y"] - low) / (high - low) - 1
         return turned(points, "y", "y", ARCSECOND * (1 - place**2))
