@@ -1,7 +1,5 @@
 """Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
 
-Readings that the screening left out of the estimates, as they were recorded: a decision is made of the whole recording.
-
 A reading that misses the artefact by more than any machine's error spoils an estimate and is left out of it. For a decision it
 is a value outside: the machine, or whoever worked at it, indicated it. Copies of a whole (measurement, repeat) alone are no
 measurements.
@@ -34,10 +32,9 @@ class OutsideReadings:
     """What of a recording the estimates do not hold.
 
     ``recording``: all its rows, copies too; ``artefact``: made of all but copies, or with their places in other repeats
-    for points that no artefact can be made with;; ``None`` where that cannot be either, or nothing was left out.;
-    ``xyz``: (n, 3) the points of ``artefact`` as they were recorded, mm; ``kept``: (n,) rows of ``artefact.points``
-    that the estimates hold; ``outside``: (n,) those that they do not, because they miss the artefact; ``findings``:
-    that say why.
+    for points that no artefact can be made with, ``None`` where that cannot be either, or nothing was left out; ``xyz``:
+    (n, 3) the points of ``artefact`` as they were recorded, mm; ``kept``: (n,) rows of ``artefact.points`` that the
+    estimates hold; ``outside``: (n,) those that they do not, because they miss the artefact; ``findings``: that say why.
     """
 
     recording: Points
@@ -121,18 +118,20 @@ class AsRecorded(Artefact):
         own, raw = self.own.forms(), self._raw.forms()
         if own is None or raw is None:
             return raw
-        runs, counts = (np.column_stack([f.measurement, f.repeat, f.count]) for f in (raw, own))
-        chosen = {tuple(run): i for i, run in enumerate(counts.tolist())}
-        same = [(i, chosen[tuple(run)]) for i, run in enumerate(runs.tolist()) if tuple(run) in chosen]
+        runs, counts = (np.column_stack([f.measurement, f.repeat, f.count]).tolist() for f in (raw, own))
+        chosen = {tuple(run): i for i, run in enumerate(counts)}
+        same = [(i, chosen[tuple(run)]) for i, run in enumerate(runs) if tuple(run) in chosen]
         to, of = np.array(same, dtype=np.int64).reshape(-1, 2).T
-        form, size = raw.form.copy(), None if raw.size is None else raw.size.copy()
-        centres = None if raw.centres is None else raw.centres.copy()
+
+        def mixed(whole: Floats | None, part: Floats | None) -> Floats | None:
+            found = None if whole is None else whole.copy()
+            if found is not None and part is not None:
+                found[to] = part[of]
+            return found
+
+        form = raw.form.copy()
         form[to] = own.form[of]
-        if size is not None and own.size is not None:
-            size[to] = own.size[of]
-        if centres is not None and own.centres is not None:
-            centres[to] = own.centres[of]
-        return replace(raw, form=form, size=size, centres=centres)
+        return replace(raw, form=form, size=mixed(raw.size, own.size), centres=mixed(raw.centres, own.centres))
 
     def lines_of(self, rows: Ints) -> tuple[Floats, Floats]:
         middles, along = (each.copy() for each in self._raw.lines_of(rows))

@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.analysis.conformity.length_conditions import tip_offsets
 from cmm_uq.analysis.conformity.plans import OFFSET_TOLERANCE_MM, Condition, OffsetPlan, position_of
 from cmm_uq.analysis.conformity.standard import NOT_STATED, Test
-from cmm_uq.analysis.conformity.statement import Decided, Statement
+from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.analysis.conformity.uncertainty_lines import u_of_repeats
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
@@ -40,7 +40,7 @@ def volumetric_performance(test: Test) -> Statement:
     limit = float(test.limits_um(np.array([bar]))[0])
     lengths, aside = artefact.lengths(), bool(test.set_aside(artefact.rows).any())
     value = measured.value if lengths is None or not aside else float(np.ptp(lengths)) / MICROMETRE
-    item = Decided(value, u, limit, test.decide(value, u, limit, signed=False), length_mm=bar, set_aside=aside)
+    item = test.decided(value, u, limit, signed=False, length_mm=bar, set_aside=aside)
     return test.stated(say("range of the ballbar lengths"), say("lengths"), (item,), [told], signed=False,
                        budget=test.budget_at_least(budget, bar) if budget.u > 0 else None)  # fmt: skip
 
@@ -86,29 +86,20 @@ def _budget(test: Test) -> tuple[Budget, Text]:
 
 def offset_probe(test: Test) -> Statement:
     """Difference of the bar's lengths with the stylus tip to one side and to the other, in each position."""
-    u = u_of_repeats(test.artefact.sizes[0].nominal, test.circumstances)
+    bar = test.artefact.sizes[0].nominal
+    u = u_of_repeats(bar, test.circumstances)
     test.refuse_without_uncertainty(u, "u_repeat_um")
     found = _differences(test.artefact)
-    test.refuse_nothing_measured(
-        bool(found), "a bar measured with the stylus tip to both sides (tip_x_mm, tip_y_mm, tip_z_mm)"
-    )
-    bar = test.artefact.sizes[0].nominal
-    aside = _set_aside(test)
+    asked = "a bar measured with the stylus tip to both sides (tip_x_mm, tip_y_mm, tip_z_mm)"
+    test.refuse_nothing_measured(bool(found), asked)
+    _, along = test.artefact.lines_of(test.artefact.rows)
+    aside = {position_of(along[i]) for i in np.flatnonzero(test.set_aside(test.artefact.rows))}
     limit, known = float(test.limits_um(np.array([bar]))[0]), test.at_least(u, bar)
     items = tuple(
-        Decided(
-            value,
-            known,
-            limit,
-            test.decide(value, known, limit, signed=True),
-            number,
-            None,
-            bar,
-            position,
-            set_aside=position in aside,
-        )
+        test.decided(value, known, limit, signed=True, measurement=number, length_mm=bar, position=position,
+                     set_aside=position in aside)
         for position, number, value in found
-    )
+    )  # fmt: skip
     told = say("u is what of the bar changed between both readings.") if u > 0 else NOT_STATED
     return test.stated(say("difference of the bar's lengths with opposite offsets, worst against its limit"),
                        say("differences"), items, [told])  # fmt: skip
@@ -116,18 +107,11 @@ def offset_probe(test: Test) -> Statement:
 
 def offset_positions(plan: OffsetPlan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Which positions were measured with tips to both sides."""
-    measured = {position for position, _, _ in _differences(artefact)}
-    missing = tuple(
-        say("{position} with the stylus tip to both sides", position=position)
-        for position in plan.positions
-        if position not in measured
-    )
+    lacking = dict.fromkeys(plan.positions)
+    for position, _, _ in _differences(artefact):
+        lacking.pop(position, None)
+    missing = tuple(say("{position} with the stylus tip to both sides", position=position) for position in lacking)
     return (Condition(say("four diagonals in vertical planes, each with two offsets"), missing),)
-
-
-def _set_aside(test: Test) -> set[Text]:
-    _, along = test.artefact.lines_of(test.artefact.rows)
-    return {position_of(along[i]) for i in np.flatnonzero(test.set_aside(test.artefact.rows))}
 
 
 def _differences(artefact: Artefact) -> list[tuple[Text, int, float]]:

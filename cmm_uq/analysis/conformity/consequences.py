@@ -67,13 +67,9 @@ class Costs:
 
 
 def consequences(
-    job: Job,
-    diagnosis: Diagnosis,
-    observe: Observed,
-    tested: Collection[str],
-    seed: int,
+    job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int,
     left_out: OutsideReadings | None = None,
-) -> Consequences | None:
+) -> Consequences | None:  # fmt: skip
     """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
 
     The uncertainty of a corrected figure is that of repeated recordings with this correction.
@@ -86,9 +82,8 @@ def consequences(
     before, after = correction.before(seed), correction.after(seed)
     recorded = correction.statements(job, tested, correction.model.artefact, before, left_out)
     corrected = correction.statements(job, tested, correction.corrected, after, left_out)
-    return Consequences(
-        {name: (before[name], after[name]) for name in before}, tuple(zip(recorded, corrected, strict=True))
-    )
+    figures = {name: (before[name], after[name]) for name in before}
+    return Consequences(figures, tuple(zip(recorded, corrected, strict=True)))
 
 
 def costs(
@@ -172,7 +167,7 @@ class _Correction:
         lengths, late = self.model.artefact.lengths(), self.corrected.lengths()
         if lengths is None or late is None:
             return {}
-        own = (self._draws - self.value)[:, self.ours] @ self._whole.design[:, self.ours].T
+        own = (self.drawn.values[self._some] - self.value)[:, self.ours] @ self._whole.design[:, self.ours].T
         return self._figures(late, self._predicted(lengths) + (late - lengths) - own, seed)
 
     def statements(
@@ -191,17 +186,13 @@ class _Correction:
         lengths = self.model.artefact.lengths()
         return repeated_draws(len(self.drawn.values), 1 if lengths is None else len(lengths))
 
-    @property
-    def _draws(self) -> Floats:
-        return self.drawn.values[self._some]
-
     @cached_property
     def _whole(self) -> LinearModel:
         return self.model.linearised(self.value)
 
     def _predicted(self, lengths: Floats) -> Floats:
         """Lengths (N, m) that draws predict."""
-        return lengths - self._whole.observed + self._draws @ self._whole.design.T
+        return lengths - self._whole.observed + self.drawn.values[self._some] @ self._whole.design.T
 
     def _figures(self, lengths: Floats, predicted: Floats, seed: int) -> dict[str, Quantity]:
         artefact, sizes = self.model.artefact, self.drawn.sizes.at(self._some)

@@ -1,12 +1,8 @@
 """Decision rules: what follows from a measured value, its uncertainty and a limit, and the risks of being wrong.
 
-Risks of a wrong decision, with what is known beforehand of the quantity: of this item, and of all that are tested alike.
-
 A prior is a normal distribution; of a quantity that is never negative the part above zero. JCGM 106:2012: clause 7.2 for the
 posterior distribution, clause 9.5 for the consumer's and the producer's global risk. All integrals are Gauss–Legendre sums
 over panels that are narrow where the integrand bends.
-
-Decision rules: from a value, its uncertainty and a limit to the decision on that one quantity.
 
 A quantity with a sign, as an error of indication, is limited on both sides (−limit to +limit); a range or a form, which is
 never negative, on one. Without a prior the probability of conforming is that of a normal distribution about the value, with
@@ -257,35 +253,33 @@ def _decided_knowing(
     return outcome, _posterior_band(u, limit, 1 - least, signed, prior, side)
 
 
+def _figure(rule: Rule, of: type, name: str, usual: float) -> float | None:
+    """The figure that a rule is given with, or the usual one of a rule of a name; ``None`` of other rules."""
+    if not isinstance(rule, str) and isinstance(rule, of):
+        (value,) = rule.model_dump().values()
+        return float(value)
+    return usual if name in rule_name(rule) else None
+
+
 def largest_risk(rule: Rule) -> float | None:
     """Largest probability of a wrong acceptance, and of a wrong rejection; ``None`` for rules that do not go by it."""
-    if isinstance(rule, FalseAccept):
-        return rule.max_false_accept
-    return 1 - CONFORMANCE_PROBABILITY if rule_name(rule).startswith("ISO 14253-1") else None
+    return _figure(rule, FalseAccept, "ISO 14253-1", 1 - CONFORMANCE_PROBABILITY)
 
 
 def least_ratio(rule: Rule) -> float | None:
-    if isinstance(rule, UncertaintyRatio):
-        return rule.uncertainty_ratio
-    return RATIO if rule_name(rule).startswith("ASME B89.7.3.1") else None
+    return _figure(rule, UncertaintyRatio, "ASME B89.7.3.1", RATIO)
 
 
 def least_probability(rule: Rule) -> float | None:
-    if isinstance(rule, PosteriorProbability):
-        return rule.posterior_probability
-    return CONFORMANCE_PROBABILITY if rule_name(rule).startswith("JCGM 106") else None
+    return _figure(rule, PosteriorProbability, "JCGM 106", CONFORMANCE_PROBABILITY)
 
 
 def largest_share(rule: Rule) -> float | None:
-    if isinstance(rule, UnconditionalRisk):
-        return rule.max_unconditional_false_accept
-    return UNCONDITIONAL if "Z540.3" in rule_name(rule) else None
+    return _figure(rule, UnconditionalRisk, "Z540.3", UNCONDITIONAL)
 
 
 def guard_width(rule: Rule) -> float:
-    if isinstance(rule, GuardBand):
-        return rule.guard_band
-    return 1.0 if rule_name(rule).startswith("ILAC-G8") else 0.0
+    return _figure(rule, GuardBand, "ILAC-G8", 1.0) or 0.0
 
 
 def needs_uncertainty(rule: Rule) -> bool:

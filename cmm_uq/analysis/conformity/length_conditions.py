@@ -81,11 +81,8 @@ def tip_offsets(points: Points) -> Floats | None:
 def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
     if not plan.offset_mm:
         return ()
-    what = say(
-        "stylus tip {offset_mm:g} mm across the ram{key}",
-        key=at_key("tip_x_mm, tip_y_mm, tip_z_mm"),
-        offset_mm=plan.offset_mm,
-    )
+    key = at_key("tip_x_mm, tip_y_mm, tip_z_mm")
+    what = say("stylus tip {offset_mm:g} mm across the ram{key}", key=key, offset_mm=plan.offset_mm)
     found = artefact.indications()
     there = found is not None and with_offset(artefact.points, found.rows, plan.offset_mm).any()
     return (Condition(what, () if there else (what,)),)
@@ -101,16 +98,15 @@ def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[
         unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
         return (Condition(what, (unknown,), Verbatim("columns approach_x, approach_y, approach_z")),)
     if not any(one.bidirectional for one in known):
-        short = say(
+        none = say(
             "bidirectional lengths: these are not, and no short gauge reached from both sides was measured beside them"
         )
-        return (Condition(what, (short,)),)
+        return (Condition(what, (none,)),)
     counts = {line: sum(bool(one.bidirectional) for one in found) for line, found in places.items()}
     missing = tuple(
         say("{lengths} bidirectional lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
-        for line, count in counts.items()
-        if count < min(plan.lengths, len(places[line]))
-    )
+        for line, count in counts.items() if count < min(plan.lengths, len(places[line]))
+    )  # fmt: skip
     return (Condition(what, missing),)
 
 
@@ -171,54 +167,36 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
         travel = say("the travel of all three axes{key}, without which no length's share of it is known",
                      key=at_key("[machine] travel_mm"))  # fmt: skip
         return Condition(say("{what}: not known", what=what), (travel,))
-    shares = {line: max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
+    shares = {line: 100 * max((m.share or 0.0 for m in found), default=0.0) for line, found in places.items()}
     missing = tuple(
-        say(
-            "length of at least {least} of the travel ({line}: {share:.0f} %)",
-            least=least,
-            line=line,
-            share=100 * share,
-        )
-        for line, share in shares.items()
-        if share < plan.least_share
-    )
-    return Condition(
-        say("{what}: {span}", what=what, span=_percents([100 * share for share in shares.values()])), missing
-    )
-
-
-def _span(counts: Sequence[int]) -> Text:
-    return say("{low:.0f} to {high:.0f}", low=min(counts), high=max(counts)) if counts else say("none")
-
-
-def _percents(shares: Sequence[float]) -> Text:
-    return say("{low:.0f} % to {high:.0f} %", low=min(shares), high=max(shares)) if shares else say("none")
+        say("length of at least {least} of the travel ({line}: {share:.0f} %)", least=least, line=line, share=share)
+        for line, share in shares.items() if share < 100 * plan.least_share
+    )  # fmt: skip
+    every = list(shares.values())
+    span = say("{low:.0f} % to {high:.0f} %", low=min(every), high=max(every)) if every else say("none")
+    return Condition(say("{what}: {span}", what=what, span=span), missing)
 
 
 def _different(plan: LengthPlan, places: _Places) -> Condition:
-    counts = {line: len(found) for line, found in places.items()}
+    wanted, counts = plan.lengths, {line: len(found) for line, found in places.items()}
     missing = tuple(
-        say("{lengths} different lengths ({line}: {count})", lengths=plan.lengths, line=line, count=count)
-        for line, count in counts.items()
-        if count < plan.lengths
-    )
-    return Condition(
-        say("{lengths} lengths on each line: {span}", lengths=plan.lengths, span=_span(list(counts.values()))), missing
-    )
+        say("{lengths} different lengths ({line}: {count})", lengths=wanted, line=line, count=count)
+        for line, count in counts.items() if count < wanted
+    )  # fmt: skip
+    every = list(counts.values())
+    span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
+    return Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing)
 
 
 def _spread(plan: LengthPlan, places: _Places) -> Condition:
     """That lengths of each line are spaced equally as nearly as their gauge allows; fewer of them are missing otherwise."""
-    missing = tuple(
-        say(
-            "lengths spread over the range ({line}: {lengths} mm)",
-            line=line,
-            lengths=semicolons(number(one.length, ".4g") for one in sorted(found, key=lambda m: m.length)),
-        )
-        for line, found in places.items()
-        if len(found) >= plan.lengths and not _any_spread(plan, found)
-    )
-    return Condition(say("{lengths} lengths spread over the range on each line", lengths=plan.lengths), missing)
+    missing = []
+    for line, found in places.items():
+        if len(found) >= plan.lengths and not _any_spread(plan, found):
+            lengths = semicolons(number(length, ".4g") for length in sorted(one.length for one in found))
+            missing.append(say("lengths spread over the range ({line}: {lengths} mm)", line=line, lengths=lengths))
+    what = say("{lengths} lengths spread over the range on each line", lengths=plan.lengths)
+    return Condition(what, tuple(missing))
 
 
 def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
@@ -245,47 +223,27 @@ def _spaced(lengths: Floats, equally: Floats) -> bool:
 
 
 def _shortest(plan: LengthPlan, places: _Places) -> Condition:
-    shortest = {line: min(m.length for m in found) for line, found in places.items()}
+    most, shortest = plan.shortest_mm, {line: min(m.length for m in found) for line, found in places.items()}
     missing = tuple(
-        say(
-            "length of at most {shortest_mm:g} mm ({line}: {length} mm)",
-            shortest_mm=plan.shortest_mm,
-            line=line,
-            length=nominal(length),
-        )
-        for line, length in shortest.items()
-        if length > plan.shortest_mm
-    )
+        say("length of at most {shortest_mm:g} mm ({line}: {length} mm)", shortest_mm=most, line=line, length=nominal(length))
+        for line, length in shortest.items() if length > most
+    )  # fmt: skip
     longest = say("{shortest} mm", shortest=nominal(max(shortest.values()))) if shortest else say("none")
-    return Condition(
-        say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=plan.shortest_mm, longest=longest),
-        missing,
-    )
+    what = say("shortest length at most {shortest_mm:g} mm: {longest}", shortest_mm=most, longest=longest)
+    return Condition(what, missing)
 
 
 def _repeated(plan: LengthPlan, places: _Places) -> Condition:
     """Of the lengths in a position, as many as the plan asks for must be repeated as often as it asks; more do not help."""
-    repeats = {line: sorted((m.repeats for m in found), reverse=True) for line, found in places.items()}
-    total = sum(min(count, plan.repeats) for counts in repeats.values() for count in counts[: plan.lengths])
-    lost: tuple[Text, ...] = ()
+    wanted = plan.repeats
+    repeats = {line: sorted((m.repeats for m in found), reverse=True)[: plan.lengths] for line, found in places.items()}
+    total = sum(min(count, wanted) for counts in repeats.values() for count in counts)
+    missing: list[Text] = [
+        say("{repeats} repetitions of each length ({line}: {counts})", repeats=wanted, line=line, counts=counts[-1])
+        for line, counts in repeats.items() if counts[-1] < wanted
+    ]  # fmt: skip
     if total < plan.total:
-        lost = (say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total),)
-    missing = tuple(
-        say(
-            "{repeats} repetitions of each length ({line}: {counts})",
-            repeats=plan.repeats,
-            line=line,
-            counts=counts[: plan.lengths][-1],
-        )
-        for line, counts in repeats.items()
-        if counts[: plan.lengths][-1] < plan.repeats
-    )
-    return Condition(
-        say(
-            "{repeats} repetitions of each, {wanted} lengths in all: {total}",
-            repeats=plan.repeats,
-            wanted=plan.total,
-            total=total,
-        ),
-        (*missing, *lost),
-    )
+        missing.append(say("{lack} of {total} lengths", lack=plan.total - total, total=plan.total))
+    what = say("{repeats} repetitions of each, {wanted} lengths in all: {total}",
+               repeats=wanted, wanted=plan.total, total=total)  # fmt: skip
+    return Condition(what, tuple(missing))

@@ -29,6 +29,11 @@ from cmm_uq.maths.uncertainty.rounding import nominal
 NORMAL_EXPANSION = (8e-6, 13e-6)
 """1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)."""
 
+REPEATS_CANCEL = say(
+    "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge "
+    "changes between them."
+)
+
 Chosen = Callable[[Artefact, Indications], NDArray[np.bool_]]
 """Which of the lengths of a recording belong to a test, (m,)."""
 
@@ -68,12 +73,10 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
     test.refuse_without_uncertainty(float(causes.u[rows].min()), "u_um")
     position, aside = lines(artefact, found), test.set_aside(found.rows)
     items = tuple(
-        Decided(
-            float(errors[i]), float(causes.u[i]), float(limits[i]),
-            test.decide(float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True,
-                        length_mm=float(found.lengths[i])),
-            int(points.measurement[first[i]]), int(points.repeat[first[i]]), float(found.lengths[i]), position[i],
-            set_aside=bool(aside[i]),
+        test.decided(
+            float(errors[i]), float(causes.u[i]), float(limits[i]), signed=True,
+            measurement=int(points.measurement[first[i]]), repeat=int(points.repeat[first[i]]),
+            length_mm=float(found.lengths[i]), position=position[i], set_aside=bool(aside[i]),
         )
         for i in rows
     )  # fmt: skip
@@ -121,28 +124,21 @@ def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = Non
         value = float(np.ptp(found.errors[own])) / MICROMETRE
         limit = float(test.limits_um(np.array([length]))[0])
         known = test.at_least(u_of_repeats(length, test.circumstances), length)
-        items.append(Decided(
-            value, known, limit, test.decide(value, known, limit, signed=False, length_mm=length), int(key[0]), None,
-            length, position[own[0]], set_aside=bool(aside[own].any()),
+        items.append(test.decided(
+            value, known, limit, signed=False, measurement=int(key[0]), length_mm=length, position=position[own[0]],
+            set_aside=bool(aside[own].any()),
         ))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of lengths")
+    count = len(items)
     remarks = [
-        say(
-            "The range of the first {repeats} repeats of each length: {count} ranges.",
-            repeats=repeats,
-            count=len(items),
-        ),
-        say(
-            "What the gauge's certificate leaves uncertain is common to the repeats and cancels; u is what of the gauge "
-            "changes between them."
-        )
-        if least > 0
-        else NOT_STATED,
+        say("The range of the first {repeats} repeats of each length: {count} ranges.", repeats=repeats, count=count),
+        REPEATS_CANCEL if least > 0 else NOT_STATED,
         *_others_in_words(test, found, rows),
     ]
     quantity = say("range of repeated lengths, worst against its limit")
-    return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats,
-                       causes=_each_its_own([item.u_um for item in items]), lacking=single)  # fmt: skip
+    own_causes = Causes(np.zeros((count, 0)), np.array([item.u_um for item in items]), np.arange(count))
+    return test.stated(quantity, say("ranges"), tuple(items), remarks, signed=False, repeats=repeats, causes=own_causes,
+                       lacking=single)  # fmt: skip
 
 
 def length_unstated(artefact: ArtefactFacts) -> str | None:
@@ -185,22 +181,12 @@ def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> Ints
 def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
     """How many lengths of the recording are not decided for they belong to another test."""
     copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
-    others = int((~copied).sum()) - len(rows)
-    if not others:
-        return []
-    return [
-        plural(
-            others,
-            one=say(
-                "{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
-                count=others,
-            ),
-            many=say(
-                "{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
-                count=others,
-            ),
-        )
-    ]
+    count = int((~copied).sum()) - len(rows)
+    one = say("{count} length recorded beside them has another position, stylus tip or size, and is not decided.",
+              count=count)  # fmt: skip
+    many = say("{count} lengths recorded beside them have another position, stylus tip or size, and are not decided.",
+               count=count)  # fmt: skip
+    return [plural(count, one=one, many=many)] if count else []
 
 
 def _uncertainty_in_words(worst: Decided, stated: TestUncertainty) -> Text:
@@ -231,25 +217,22 @@ def _counted_in_words(items: Sequence[Decided], worst: Decided) -> Text:
 def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> list[Text]:
     if again is None:
         return []
+
+    def named(standing: str) -> Text:
+        places = [(item.measurement or 0, item.length_mm or 0.0) for item in items if item.standing == standing]
+        return semicolons(say("measurement {measurement}, {length} mm", measurement=measurement, length=nominal(length))
+                          for measurement, length in dict.fromkeys(places))  # fmt: skip
+
     told: list[Text] = []
-    for standing in ("again", "replaced"):
-        which = semicolons(
-            say("measurement {measurement}, {length} mm", measurement=measurement, length=nominal(length))
-            for measurement, length in dict.fromkeys(
-                (item.measurement or 0, item.length_mm or 0.0) for item in items if item.standing == standing
-            )
-        )
-        if which and standing == "again":
-            told.append(say(
-                "One of {repeats} values lies outside: measure {readings} times more, as further repeats of the same "
-                "measurement, all of which must lie inside: {which}.",
-                repeats=again.repeats, readings=again.readings, which=which,
-            ))  # fmt: skip
-        elif which:
-            told.append(say(
-                "One of {repeats} values lay outside and was measured {readings} times more, all inside: {which}.",
-                repeats=again.repeats, readings=again.readings, which=which,
-            ))  # fmt: skip
+    if which := named("again"):
+        told.append(say(
+            "One of {repeats} values lies outside: measure {readings} times more, as further repeats of the same "
+            "measurement, all of which must lie inside: {which}.",
+            repeats=again.repeats, readings=again.readings, which=which,
+        ))  # fmt: skip
+    if which := named("replaced"):
+        told.append(say("One of {repeats} values lay outside and was measured {readings} times more, all inside: {which}.",
+                        repeats=again.repeats, readings=again.readings, which=which))  # fmt: skip
     return told
 
 
@@ -263,7 +246,3 @@ def _unshown(test: Test, found: Indications) -> list[Text]:
             say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
         )
     return [text for text in told if text]
-
-
-def _each_its_own(u_um: Sequence[float]) -> Causes:
-    return Causes(np.zeros((len(u_um), 0)), np.array(u_um, dtype=np.float64), np.arange(len(u_um)))

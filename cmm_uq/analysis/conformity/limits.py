@@ -1,7 +1,5 @@
 """Limits of a characteristic, and the decision on a value against them.
 
-Decisions on a value between limits of a drawing, with probabilities from draws of its error, by the rules for machines.
-
 The error need not be normal, and a limit may stand on either side or on one. The draws say what the measurement alone says of
 the true value (JCGM 106:2012, 7.2); with a prior each is weighted by it (JCGM 106:2012, 7.2.2, 8.3). Tails that the draws are
 too few for are those of a normal distribution where these are larger.
@@ -18,6 +16,7 @@ from scipy import special
 from cmm_uq.analysis.conformity.decision import (
     COVERAGE_FACTOR,
     Outcome,
+    PriorKnowledge,
     guard_width,
     largest_risk,
     largest_share,
@@ -26,7 +25,6 @@ from cmm_uq.analysis.conformity.decision import (
     rule_name,
     rule_words,
 )
-from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.conformity import Rule
@@ -50,11 +48,10 @@ _REACH = 8.0
 class LimitDecision:
     """What follows from a value between limits.
 
-    ``lower, upper``: limits; ``None`` where there is none; ``outcome``: ``None`` where nothing was measured;
-    ``probability, beyond``: that the true value conforms, and the rest of it, which keeps its digits; ``None``
-    likewise; ``accepted``: smallest and largest value that the rule accepts, ``None`` of a side without a limit;
-    ``None`` as a whole where; it accepts none, or where a zone was measured so much better than its errors that even
-    this value proves nothing.; ``rule``: in words.
+    ``outcome``: ``None`` where nothing was measured; ``probability, beyond``: that the true value conforms, and the rest of
+    it, which keeps its digits; ``accepted``: smallest and largest value that the rule accepts, ``None`` of a side without a
+    limit, and as a whole where it accepts none, or where a zone was measured so much better than its errors that even this
+    value proves nothing.
     """
 
     lower: float | None
@@ -80,7 +77,7 @@ class Limits:
     upper: float | None
     errors: Floats
     zone: bool = False
-    prior: Known | None = None
+    prior: PriorKnowledge | None = None
     u: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -114,10 +111,8 @@ class Limits:
         if self.inside(value):
             return 1.0 - self.beyond(value)
         if self.upper is None or self.lower is None:
-            only = (
-                self._above(value - self.upper) if self.upper is not None else self._below(value - (self.lower or 0.0))
-            )
-            return min(1.0, only)
+            low = self.lower or 0.0
+            return min(1.0, self._below(value - low) if self.upper is None else self._above(value - self.upper))
         if value > self.upper:
             return max(0.0, self._above(value - self.upper) - self._above(value - self.lower))
         return max(0.0, self._below(value - self.lower) - self._below(value - self.upper))
@@ -134,9 +129,8 @@ class Limits:
         return max(self._below(value), np.finfo(np.float64).tiny) if self.zone else 1.0
 
     def _below(self, error: float) -> float:
-        return self._tail(
-            int(np.searchsorted(self.errors, error, "left")), error / self.u if self.u else np.inf * error
-        )
+        count = int(np.searchsorted(self.errors, error, "left"))
+        return self._tail(count, error / self.u if self.u else np.inf * error)
 
     def _above(self, error: float) -> float:
         count = len(self.errors) - int(np.searchsorted(self.errors, error, "right"))
@@ -167,7 +161,7 @@ class Limits:
             outside |= true < self.lower
         return float(weight[~outside].sum()) / total, float(weight[outside].sum()) / total
 
-    def _knowing_normal(self, known: Known) -> tuple[float, float]:
+    def _knowing_normal(self, known: PriorKnowledge) -> tuple[float, float]:
         least = float(special.ndtr(-known.mean / known.sd)) if self.zone else 0.0
         high = 1.0 if self.upper is None else float(special.ndtr((self.upper - known.mean) / known.sd))
         low = least if self.lower is None else max(least, float(special.ndtr((self.lower - known.mean) / known.sd)))
@@ -188,12 +182,10 @@ class Limits:
             density = np.exp(-0.5 * ((true - prior.mean) / prior.sd) ** 2) / (prior.sd * np.sqrt(2 * np.pi))
             high = np.full(len(true), np.inf) if self.upper is None else self.upper - guard - true
             low = np.full(len(true), -np.inf) if self.lower is None else self.lower + guard - true
-            accepted = self._shares(high, "right") - self._shares(low, "left")
+            counts = np.searchsorted(self.errors, high, "right"), np.searchsorted(self.errors, low, "left")
+            accepted = counts[0] / len(self.errors) - counts[1] / len(self.errors)
             found += float(np.sum(density * np.maximum(0.0, accepted))) * reach / _NODES
         return found / (float(special.ndtr(prior.mean / prior.sd)) if self.zone else 1.0)
-
-    def _shares(self, error: Floats, side: str) -> Floats:
-        return np.searchsorted(self.errors, error, "right" if side == "right" else "left") / len(self.errors)
 
 
 def judge(limits: Limits, rule: Rule, value: float | None) -> LimitDecision:
@@ -301,9 +293,8 @@ def _inwards(limits: Limits, guard: float | None) -> tuple[float | None, float |
 def _smallest_guard(limits: Limits, share: float) -> float | None:
     if limits.wrongly_accepted(0.0) <= share:
         return 0.0
-    largest = (
-        _REACH * limits.u if limits.width is None else 0.5 * limits.width if limits.lower is not None else limits.width
-    )
+    width = limits.width
+    largest = _REACH * limits.u if width is None else width if limits.lower is None else 0.5 * width
     if limits.wrongly_accepted(largest) > share:
         return None
     return _edge(lambda guard: limits.wrongly_accepted(guard) <= share, largest, 0.0)

@@ -1,7 +1,5 @@
 """Whether a plan or a recording is a complete test with bars and test spheres.
 
-Whether placings, planned or recorded, are those that a standard asks for, and what is missing.
-
 A plan and a recording are held to the same conditions. Of a recording alone, what repeats another measurement to the last
 digit does not count: that is a copy, where in a plan it is a wish.
 """
@@ -9,6 +7,7 @@ digit does not count: that is a copy, where in a plan it is a wish.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -31,37 +30,23 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     numbers, ends = _one_a_measurement(artefact)
     same = _same_places(plan, points, numbers, ends, copies)
     count = sum(number not in same for number in numbers)
-    missing = _lacking(wanted, count, _in_words(same)) if count < wanted else ()
-    unknown = () if known else (
-        say("the travel of all three axes{key}, by whose proportions the number of positions goes",
-            key=at_key("[machine] travel_mm")),
-    )  # fmt: skip
+    missing: list[Text] = []
+    if count < wanted:
+        lack = say("{lack} of {wanted} positions: {count} distinct", lack=wanted - count, wanted=wanted, count=count)
+        missing.append(commas((lack, *_in_words(same))))
+    if not known:
+        missing.append(say("the travel of all three axes{key}, by whose proportions the number of positions goes",
+                           key=at_key("[machine] travel_mm")))  # fmt: skip
     copied = {number for number, (apart, _) in same.items() if apart is None}
     taken = {position_of(b - a) for (a, b), number in zip(ends, numbers, strict=True) if number not in copied}
-    directions = tuple(say("position {along}", along=_along(d)) for d in plan.directions if d not in taken)
-    return (
-        Condition(
-            say("at least {wanted} positions of the bar: {count}", wanted=wanted, count=count), (*missing, *unknown)
-        ),
-        Condition(_directions(directions), directions),
-    )
-
-
-def _lacking(wanted: int, count: int, same: Sequence[Text]) -> tuple[Text, ...]:
-    lack = say("{lack} of {wanted} positions: {count} distinct", lack=wanted - count, wanted=wanted, count=count)
-    return (commas((lack, *same)),)
-
-
-def _directions(missing: tuple[Text, ...]) -> Text:
-    if not missing:
-        return say("along the axes, and the face and space diagonals of the volume")
-    return say(
-        "along the axes, and the face and space diagonals of the volume; missing: {missing}", missing=commas(missing)
-    )
-
-
-def _along(position: Text) -> Text:
-    return position if position in PARALLELS else say("along {position}", position=position)
+    absent = [d if d in PARALLELS else say("along {position}", position=d) for d in plan.directions if d not in taken]
+    lines = tuple(say("position {along}", along=along) for along in absent)
+    asked = say("along the axes, and the face and space diagonals of the volume")
+    if lines:
+        asked = say("along the axes, and the face and space diagonals of the volume; missing: {missing}",
+                    missing=commas(lines))  # fmt: skip
+    positions = say("at least {wanted} positions of the bar: {count}", wanted=wanted, count=count)
+    return Condition(positions, tuple(missing)), Condition(asked, lines)
 
 
 def _one_a_measurement(artefact: Artefact) -> tuple[list[int], Floats]:
@@ -126,43 +111,27 @@ def _in_order(near: Mapping[int, Collection[int]], group: set[int]) -> set[int]:
 
 def _in_words(same: dict[int, tuple[float | None, int]]) -> list[Text]:
     """One sentence for all that are the same of one other; copies come first."""
-    pairs = sorted(set(same.values()), key=lambda pair: (pair[1], pair[0] is not None))
-    return [
-        _is_no_further(apart, other, sorted(own for own, pair in same.items() if pair == (apart, other)))
-        for apart, other in pairs
-    ]
-
-
-def _is_no_further(apart: float | None, other: int, numbers: Sequence[int]) -> Text:
-    which = _listed(numbers)
-    if apart is None:
-        return plural(
-            len(numbers),
-            one=say("measurement {which} is a copy of {other}", which=which, other=other),
-            many=say("measurements {which} are copies of {other}", which=which, other=other),
-        )
-    return plural(
-        len(numbers),
-        one=say("measurement {which} is within {apart:g} mm of {other}", which=which, apart=apart, other=other),
-        many=say("measurements {which} are within {apart:g} mm of {other}", which=which, apart=apart, other=other),
-    )
+    told: list[Text] = []
+    for apart, other in sorted(set(same.values()), key=lambda pair: (pair[1], pair[0] is not None)):
+        numbers = sorted(own for own, pair in same.items() if pair == (apart, other))
+        which = _listed(numbers)
+        if apart is None:
+            one = say("measurement {which} is a copy of {other}", which=which, other=other)
+            many = say("measurements {which} are copies of {other}", which=which, other=other)
+        else:
+            one = say("measurement {which} is within {apart:g} mm of {other}", which=which, apart=apart, other=other)
+            many = say("measurements {which} are within {apart:g} mm of {other}", which=which, apart=apart, other=other)
+        told.append(plural(len(numbers), one=one, many=many))
+    return told
 
 
 def _listed(numbers: Sequence[int]) -> Text:
     """Numbers in ascending order, those that follow each other as from 2 to 20."""
-    runs: list[list[int]] = []
-    for one in numbers:
-        if runs and runs[-1][-1] == one - 1:
-            runs[-1].append(one)
-        else:
-            runs.append([one])
-    return commas(part for run in runs for part in _run(run))
-
-
-def _run(numbers: Sequence[int]) -> list[Text]:
-    if len(numbers) > 2:
-        return [say("{first} to {last}", first=numbers[0], last=numbers[-1])]
-    return [number(one) for one in numbers]
+    told: list[Text] = []
+    for _, run in groupby(enumerate(numbers), key=lambda pair: pair[1] - pair[0]):
+        own = [value for _, value in run]
+        told += [say("{first} to {last}", first=own[0], last=own[-1])] if len(own) > 2 else map(number, own)
+    return commas(told)
 
 
 def _apart(one: Floats, two: Floats) -> float:
@@ -179,38 +148,23 @@ def sphere_points(
 ) -> tuple[Condition, ...]:
     """How many points on each sphere, and whether they cover it.
 
-    ``points, directions``: that were probed, and the outward direction (n, 3) of each from the middle of its sphere.
+    ``directions``: outward direction (n, 3) of each point from the middle of its sphere.
     """
-    lacking, bare = [], []
+    wanted, reach, lacking, bare = plan.points, plan.reach_deg, [], []
     for group, rows in enumerate(points.rows_of_groups):
         if group in copies:
             continue
         count = len(np.unique(points.xyz[rows] + 0.0, axis=0))
         name = say("measurement {number}", number=points.run_of(group)[0])
-        if count < plan.points:
-            lacking.append(
-                say(
-                    "{points} points on the sphere of {name} ({recorded} recorded, {different} different)",
-                    points=plan.points,
-                    name=name,
-                    recorded=len(rows),
-                    different=count,
-                )
-            )
-        elif (gap := _farthest(directions[rows])) > plan.reach_deg:
-            bare.append(
-                say(
-                    "points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
-                    name=name,
-                    gap=gap,
-                )
-            )
-    return (
-        Condition(say("{points} points over the sphere", points=plan.points), tuple(lacking)),
-        Condition(
-            say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=plan.reach_deg),
-            tuple(bare),
-        ),
+        if count < wanted:
+            lacking.append(say("{points} points on the sphere of {name} ({recorded} recorded, {different} different)",
+                               points=wanted, name=name, recorded=len(rows), different=count))  # fmt: skip
+        elif (gap := _farthest(directions[rows])) > reach:
+            bare.append(say("points over a hemisphere on the sphere of {name} (part of it {gap:.0f}° from the nearest point)",
+                            name=name, gap=gap))  # fmt: skip
+    over = say("every direction of a hemisphere within {reach_deg:g}° of a point", reach_deg=reach)
+    return Condition(say("{points} points over the sphere", points=wanted), tuple(lacking)), Condition(
+        over, tuple(bare)
     )
 
 

@@ -1,7 +1,5 @@
 """What standards ask of a complete test, and where in the volume a length lies.
 
-What each standard's test consists of, as data: positions, lengths, points, repeats, and what counts as another one.
-
 None of these standards is public. Where a figure comes from second hand, or was chosen here, it says so; docs/standards.md
 gathers it.
 """

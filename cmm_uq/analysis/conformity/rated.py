@@ -41,10 +41,9 @@ def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Cond
 
 def rated_in_words(rated: RatedConditions) -> list[Text]:
     """Who answers for rated conditions that are not stated, and why."""
-    given = rated.declared
-    if given is None:
+    if rated.declared is None:
         return []
-    by, reason = Verbatim(given.by), Verbatim(given.reason.rstrip(". "))
+    by, reason = Verbatim(rated.declared.by), Verbatim(rated.declared.reason.rstrip(". "))
     return [say("Rated conditions: declared to be met by {by}: {reason}.", by=by, reason=reason)]
 
 
@@ -67,20 +66,16 @@ def _change(points: Points, most: float) -> Condition:
     what = say("rated change of temperature {most:g} K/h", most=most)
     columns = _recorded(points)
     if not columns or "time_s" not in points.columns:
-        return Condition(
-            what, (say("{what}: no temperature is recorded over time{key}", what=what, key=at_key("temp_…_c, time_s")),)
-        )
-    time = points.columns["time_s"]
-    largest = max(_largest_change(time, points.columns[name]) for name in columns)
+        key = at_key("temp_…_c, time_s")
+        return Condition(what, (say("{what}: no temperature is recorded over time{key}", what=what, key=key),))
+    order = np.argsort(points.columns["time_s"], kind="stable")
+    time = points.columns["time_s"][order]
+    ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")
+    largest = max(
+        float(np.ptp(points.columns[name][order][start:end])) for name in columns for start, end in enumerate(ends)
+    )
     told = say("{what} ({largest:.3g} K in an hour)", what=what, largest=largest)
     return Condition(what, () if largest <= most + _ROUNDING else (told,))
-
-
-def _largest_change(time_s: np.ndarray, values: np.ndarray) -> float:
-    order = np.argsort(time_s, kind="stable")
-    time, value = time_s[order], values[order]
-    ends = np.searchsorted(time, time + SECONDS_PER_HOUR, side="right")
-    return float(max(np.ptp(value[start:end]) for start, end in enumerate(ends)))
 
 
 def _difference(points: Points, most: float) -> Condition:
@@ -99,25 +94,15 @@ _NAMED = 5
 
 def copies_in_words(points: Points) -> Text:
     """Which measurements are copies of which; empty when none is."""
-    told = []
-    for later, original in points.copies.items():
-        (one, first), (two, repeat) = points.run_of(original), points.run_of(later)
-        told.append((one, first, two, repeat))
-    said = [
-        say(
-            "measurement {two}, repeat {repeat} of measurement {one}, repeat {first}",
-            two=two,
-            repeat=repeat,
-            one=one,
-            first=first,
-        )
-        for one, first, two, repeat in sorted(told)
-    ]
-    if not said:
+    runs = sorted((*points.run_of(original), *points.run_of(later)) for later, original in points.copies.items())
+    told = [
+        say("measurement {two}, repeat {repeat} of measurement {one}, repeat {first}",
+            two=two, repeat=repeat, one=one, first=first)
+        for one, first, two, repeat in runs
+    ]  # fmt: skip
+    if not told:
         return NOTHING
-    if len(said) <= _NAMED:
-        return say("Copies to the last digit, which do not count: {copies}.", copies=semicolons(said))
-    return say(
-        "Copies to the last digit, which do not count: {copies} and {count} more.",
-        copies=semicolons(said[:_NAMED]), count=len(said) - _NAMED,
-    )  # fmt: skip
+    copies, more = semicolons(told[:_NAMED]), len(told) - _NAMED
+    if more <= 0:
+        return say("Copies to the last digit, which do not count: {copies}.", copies=copies)
+    return say("Copies to the last digit, which do not count: {copies} and {count} more.", copies=copies, count=more)

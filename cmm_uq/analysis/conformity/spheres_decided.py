@@ -41,8 +41,8 @@ def form_error(test: Test) -> Statement:
         else say("The test sphere is taken as perfectly round: its form deviation{key} is not given.", key=at_key("form_um"))
     ]  # fmt: skip
     remarks += _largest(items)
-    causes = Causes(np.full((len(items), 1), known), np.zeros(len(items)), np.arange(len(items)))
-    return test.stated(say("probing form error"), say("points"), items, remarks, signed=False, causes=causes,
+    return test.stated(say("probing form error"), say("points"), items, remarks, signed=False,
+                       causes=_shared(known, len(items)),
                        budget=test.budget_at_least(budget, test.artefact.sizes[0].nominal) if u > 0 else None)  # fmt: skip
 
 
@@ -66,8 +66,8 @@ def size_error(test: Test) -> Statement:
         if u > 0
         else NOT_STATED
     )
-    causes = Causes(np.full((len(items), 1), known), np.zeros(len(items)), np.arange(len(items)))
-    return test.stated(say("probing size error"), say("points"), items, [told, *_largest(items)], causes=causes,
+    return test.stated(say("probing size error"), say("points"), items, [told, *_largest(items)],
+                       causes=_shared(known, len(items)),
                        budget=test.budget_at_least(budget, sphere.nominal) if u > 0 else None)  # fmt: skip
 
 
@@ -86,8 +86,8 @@ def range_of_centres(test: Test) -> Statement:
         own = _originals(test, probed) & (probed.measurement == number)
         if own.sum() > 1:
             value = float(np.ptp(probed.centres[own], axis=0).max()) / MICROMETRE
-            items.append(Decided(value, known, limit, test.decide(value, known, limit, signed=False), int(number),
-                                 set_aside=test.set_aside_in(int(number))))  # fmt: skip
+            items.append(test.decided(value, known, limit, signed=False, measurement=int(number),
+                                      set_aside=test.set_aside_in(int(number))))  # fmt: skip
     test.refuse_nothing_measured(bool(items), "repeats of one sphere in its place")
     told = say("u is what of the sphere changed between the repeats.") if u > 0 else NOT_STATED
     return test.stated(say("range of the middle of a fixed ball"), say("ranges"), tuple(items), [told], signed=False)
@@ -97,11 +97,6 @@ def form_unstated(artefact: ArtefactFacts) -> str | None:
     """The key without which a form has no uncertainty."""
     key = artefact.form_key
     return key if key is not None and not getattr(artefact, key) else None
-
-
-def size_unstated(artefact: ArtefactFacts) -> str | None:
-    """The key without which a size has no uncertainty."""
-    return "u_um" if artefact.certified and not artefact.u_um else None
 
 
 def diameter_allowed(test: Test, plan: SpherePlan) -> tuple[Condition, ...]:
@@ -151,12 +146,17 @@ def _originals(test: Test, probed: Forms) -> np.ndarray:
 def _items(test: Test, probed: Forms, values: np.ndarray, u: float, *, signed: bool) -> tuple[Decided, ...]:
     size = test.artefact.sizes[0].nominal
     limit = float(test.limits_um(np.array([size]))[0])
+    runs = [(i, int(probed.measurement[i]), int(probed.repeat[i])) for i in np.flatnonzero(_originals(test, probed))]
     return tuple(
-        Decided(float(values[i]), u, limit, test.decide(float(values[i]), u, limit, signed=signed),
-                int(probed.measurement[i]), int(probed.repeat[i]), size,
-                set_aside=test.set_aside_in(int(probed.measurement[i]), int(probed.repeat[i])))
-        for i in np.flatnonzero(_originals(test, probed))
+        test.decided(float(values[i]), u, limit, signed=signed, measurement=measurement, repeat=repeat, length_mm=size,
+                     set_aside=test.set_aside_in(measurement, repeat))
+        for i, measurement, repeat in runs
     )  # fmt: skip
+
+
+def _shared(u_um: float, count: int) -> Causes:
+    """One cause that all values share."""
+    return Causes(np.full((count, 1), u_um), np.zeros(count), np.arange(count))
 
 
 def _largest(items: tuple[Decided, ...]) -> list[Text]:

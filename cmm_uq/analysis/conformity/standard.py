@@ -37,7 +37,7 @@ from cmm_uq.analysis.conformity.uncertainty_lines import (
     with_declared,
 )
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, Verbatim, at_key, say
+from cmm_uq.base.messages import NOTHING, Text, Verbatim, at_key, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.jobs.recording.short_gauge import ShortGauge
@@ -68,18 +68,6 @@ BY_MEASUREMENT_ALONE = say(
 )
 
 
-def _nothing_asked(artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
-    return ()
-
-
-def _nothing_needed(artefact: ArtefactFacts) -> str | None:
-    return None
-
-
-def _nothing_more(test: Test) -> tuple[Condition, ...]:
-    return ()
-
-
 @dataclass(frozen=True)
 class Characteristic:
     """One thing that a standard decides.
@@ -103,9 +91,9 @@ class Characteristic:
     name: str
     observed: str
     statement: Callable[[Test], Statement]
-    conditions: Callable[..., tuple[Condition, ...]] = _nothing_asked
-    unstated: Callable[[ArtefactFacts], str | None] = _nothing_needed
-    asks: Callable[[Test], tuple[Condition, ...]] = _nothing_more
+    conditions: Callable[..., tuple[Condition, ...]] = lambda artefact, *, recorded: ()
+    unstated: Callable[[ArtefactFacts], str | None] = lambda artefact: None
+    asks: Callable[[Test], tuple[Condition, ...]] = lambda test: ()
     also: tuple[str, ...] = ()
     needs: str | None = None
     beside: Callable[[Artefact, ShortGauge | None], Artefact] | None = None
@@ -247,6 +235,16 @@ class Test:
         """Standard uncertainty, µm, that what is not stated may well have, of a length in mm."""
         return cache(partial(u_of_unstated, self.characteristic.lines, self.recorded, self.circumstances))
 
+    def decided(
+        self, value_um: float, u_um: float, limit_um: float, *, signed: bool, measurement: int | None = None,
+        repeat: int | None = None, length_mm: float | None = None, position: Text = NOTHING, set_aside: bool = False,
+    ) -> Decided:  # fmt: skip
+        """One value with what follows from it, and where it comes from."""
+        decision = self.decide(value_um, u_um, limit_um, signed=signed, length_mm=length_mm)
+        return Decided(
+            value_um, u_um, limit_um, decision, measurement, repeat, length_mm, position, set_aside=set_aside
+        )
+
     def least_u(self, lengths_mm: Floats) -> Floats:
         """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.
 
@@ -270,7 +268,6 @@ class Test:
         return replace(budget, lines=[*budget.lines, more])
 
     def prior(self, limit_um: float) -> PriorKnowledge | None:
-        """What the job says of an error with this limit beforehand."""
         given = self.facts.prior
         if given is None:
             return None
@@ -328,7 +325,11 @@ class Test:
         if self.left_out is not None and (aside or outside):
             more = [*self.left_out.in_words([item.measurement for item in aside] if not outside else [None]), *more]
         more = [*_set_aside(self.circumstances.set_aside), *more]
-        joint = None if causes is None or outside or counted(aside) else _joint(items, causes, signed)
+        joint = None
+        if causes is not None and not outside and not counted(aside):
+            left = [i for i, item in enumerate(items) if item.standing != "replaced"]
+            errors, limits = [items[i].error_um for i in left], [items[i].limit_um for i in left]
+            joint = probability_of_all(errors, limits, causes.of(np.array(left, dtype=np.int64)), signed=signed)
         lines, stated = self.characteristic.lines, self.circumstances.uncertainty
         more += [*declared_in_words(lines, stated), *rated_in_words(self.circumstances.rated), *told]
         if budget is not None:
@@ -374,14 +375,6 @@ def _set_aside(reasons: Mapping[int, str]) -> list[Text]:
                  "stated.", number=number)
         for number, reason in reasons.items()
     ]  # fmt: skip
-
-
-def _joint(items: Sequence[Decided], causes: Causes, signed: bool) -> float | None:
-    rows = np.array([i for i, item in enumerate(items) if item.standing != "replaced"], dtype=np.int64)
-    left = counted(items)
-    return probability_of_all(
-        [item.error_um for item in left], [item.limit_um for item in left], causes.of(rows), signed=signed
-    )
 
 
 def characteristic_of(standard: Standard, facts: ConformityFacts, key: str) -> Characteristic:

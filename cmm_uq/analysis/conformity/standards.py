@@ -1,7 +1,5 @@
 """The standards that a job may name, each with what is decided on it.
 
-The standards that can be stated, each with its characteristics, and those of other packages.
-
 Another package offers one as an entry point of the group ``cmm_uq.standards``, of the standard's own name. What of each is
 tested, from which columns, and what is not: docs/standards.md.
 """
@@ -15,7 +13,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.as_recorded import OutsideReadings as LeftOut
+from cmm_uq.analysis.conformity.as_recorded import OutsideReadings
 from cmm_uq.analysis.conformity.bars_decided import offset_positions, offset_probe, volumetric_performance
 from cmm_uq.analysis.conformity.clauses import CLAUSES
 from cmm_uq.analysis.conformity.lengths_decided import (
@@ -51,11 +49,9 @@ from cmm_uq.analysis.conformity.spheres_decided import (
     repeats_of_sphere,
     sensing_stated,
     size_error,
-    size_unstated,
 )
 from cmm_uq.analysis.conformity.standard import Characteristic, Standard, Test, characteristic_of
-from cmm_uq.analysis.conformity.statement import Remeasurement as Again
-from cmm_uq.analysis.conformity.statement import Statement
+from cmm_uq.analysis.conformity.statement import Remeasurement, Statement
 from cmm_uq.analysis.conformity.uncertainty_lines import FORM_LINES, LENGTH_LINES, REPEAT_LINES, SIZE_LINES
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -69,10 +65,8 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 def orientations(plan: ShortLengthPlan, artefact: Artefact, *, recorded: bool) -> tuple[Condition, ...]:
     """Orientations that differ, and how often the gauge was measured in each."""
-    found = artefact.indications()
-    what = say(
-        "a length of at most {longest:g} mm in {count} orientations", longest=plan.longest_mm, count=plan.orientations
-    )
+    found, wanted = artefact.indications(), plan.orientations
+    what = say("a length of at most {longest:g} mm in {count} orientations", longest=plan.longest_mm, count=wanted)
     if found is None:
         return (Condition(what, (what,)),)
     points, first = artefact.points, found.rows[:, 0]
@@ -81,37 +75,34 @@ def orientations(plan: ShortLengthPlan, artefact: Artefact, *, recorded: bool) -
     _, along = artefact.lines_of(found.rows)
     kept: list[tuple[np.ndarray, set[int]]] = []
     for i in rows:
-        direction = along[i] / np.linalg.norm(along[i])
-        near = next(
-            (runs for one, runs in kept if abs(float(one @ direction)) > np.cos(np.radians(plan.apart_deg))), None
-        )
+        direction, group = along[i] / np.linalg.norm(along[i]), int(points.group[first[i]])
+        alike = np.cos(np.radians(plan.apart_deg))
+        near = next((groups for other, groups in kept if abs(float(other @ direction)) > alike), None)
         if near is None:
-            kept.append((direction, {int(points.group[first[i]])}))
+            kept.append((direction, {group}))
         else:
-            near.add(int(points.group[first[i]]))
-    lacking = plan.orientations - len(kept)
-    told = () if lacking <= 0 else (say("{lacking} of {count} orientations", lacking=lacking, count=plan.orientations),)
-    few = sorted((len(runs) for _, runs in kept), reverse=True)[: plan.orientations]
+            near.add(group)
+    lacking = wanted - len(kept)
+    told = () if lacking <= 0 else (say("{lacking} of {count} orientations", lacking=lacking, count=wanted),)
+    least = min(sorted((len(groups) for _, groups in kept), reverse=True)[:wanted], default=0)
     repeats = say("{repeats} repetitions in each orientation", repeats=plan.repeats)
-    least = min(few, default=0)
-    lacks = say("{what} ({least})", what=repeats, least=least)
+    lacks = () if least >= plan.repeats else (say("{what} ({least})", what=repeats, least=least),)
     unknown = say("bidirectional lengths: from which side each end was reached is not recorded")
     sides = Condition(
         say("ends of each length reached from opposite sides"),
         (unknown,) if len(rows) and artefact.bidirectional(found.rows) is None else (),
         Verbatim("columns approach_x, approach_y, approach_z"),
     )
-    return (Condition(what, told), Condition(repeats, () if least >= plan.repeats else (lacks,)), sides)
+    return (Condition(what, told), Condition(repeats, lacks), sides)
 
 
-AGAIN = Again(repeats=3, outside=1, lengths=5, readings=10)
+AGAIN = Remeasurement(repeats=3, outside=1, lengths=5, readings=10)
 """Of ISO 10360-2:2009; see docs/standards.md."""
 
 
 def _short_gauge_repeated(test: Test) -> tuple[Condition, ...]:
-    return repeats_of_gauge(
-        test.circumstances.short_gauge, test.indications(), ISO_10360_2.repeats, ISO_10360_2.shortest_mm
-    )
+    gauge, plan = test.circumstances.short_gauge, ISO_10360_2
+    return repeats_of_gauge(gauge, test.indications(), plan.repeats, plan.shortest_mm)
 
 
 def _asked_of_gauges(test: Test) -> tuple[Condition, ...]:
@@ -160,18 +151,18 @@ _STANDARDS = (
     Standard("ISO 10360-2:2009", (_E0, _R0, _E150), sensing="contacting"),
     Standard("ISO 10360-5:2010", (
         Characteristic("P_FTU", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1], lines=FORM_LINES),
-        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1], lines=SIZE_LINES),
+        Characteristic("P_STU", FORMS, size_error, _SPHERE[0], length_unstated, _SPHERE[1], lines=SIZE_LINES),
     ), _superseded("ISO 10360-5:2020"), "contacting"),
     Standard("ISO 10360-5:2020", (
         Characteristic("P_Form.Sph.1x25:SS:Tact", FORMS, form_error, _SPHERE[0], form_unstated, _SPHERE[1],
                        ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
-        Characteristic("P_Size.Sph.1x25:SS:Tact", FORMS, size_error, _SPHERE[0], size_unstated, _SPHERE[1],
+        Characteristic("P_Size.Sph.1x25:SS:Tact", FORMS, size_error, _SPHERE[0], length_unstated, _SPHERE[1],
                        ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
     ), sensing="contacting"),
     Standard("ISO 10360-8:2013", (
         Characteristic("P_Form.Sph.1x25:Tr:ODS", FORMS, form_error, partial(conditions, ISO_10360_8), form_unstated,
                        sensing_stated, ("P_Form.Sph.1x25", "P_Form"), lines=FORM_LINES),
-        Characteristic("P_Size.Sph.1x25:Tr:ODS", FORMS, size_error, partial(conditions, ISO_10360_8), size_unstated,
+        Characteristic("P_Size.Sph.1x25:Tr:ODS", FORMS, size_error, partial(conditions, ISO_10360_8), length_unstated,
                        sensing_stated, ("P_Size.Sph.1x25", "P_Size"), lines=SIZE_LINES),
     ), sensing="optical"),
     Standard("VDI/VDE 2617", (_E0,), (
@@ -192,15 +183,10 @@ BUILT_IN: Mapping[str, Standard] = MappingProxyType(
 
 
 def statement(
-    facts: ConformityFacts,
-    artefact: Artefact,
-    accuracy: Mapping[str, Quantity],
-    key: str,
-    tested: Collection[str],
-    recorded: Artefact | None = None,
-    circumstances: Circumstances | None = None,
-    left_out: LeftOut | None = None,
-) -> Statement:
+    facts: ConformityFacts, artefact: Artefact, accuracy: Mapping[str, Quantity], key: str, tested: Collection[str],
+    recorded: Artefact | None = None, circumstances: Circumstances | None = None,
+    left_out: OutsideReadings | None = None,
+) -> Statement:  # fmt: skip
     """Compare what the standard asks for with its limit, and decide.
 
     ``recorded``: the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a

@@ -1,10 +1,7 @@
 """Statements of conformity: every error with its limit and decision, and what they come to together.
 
-A statement of conformity: a finding, which every quantity decided by itself makes, and completeness.
-
-A pass needs both. A finding that is worse than a conditional pass is the outcome whatever is missing beside it.
-
-Measuring again: what follows where one of the repeats of a length lies outside.
+A pass needs a finding, which every quantity decided by itself makes, and completeness. A finding that is worse than a
+conditional pass is the outcome whatever is missing beside it.
 
 ISO 10360-2:2009 lets at most five of the 35 lengths have one of their three values outside, and each of these is measured ten
 times more at its place; all ten must lie inside (the clause is known here from others, see docs/standards.md). Two of three,
@@ -228,9 +225,8 @@ def with_standing(items: Sequence[Decided], nominal: Ints, again: Remeasurement)
         sets.setdefault((item.measurement, int(nominal[i])), []).append(i)
     standing: dict[int, Standing] = {}
     for not_inside in (OUTSIDE, NOT_INSIDE):
-        eligible = {
-            key: found for key, rows in sets.items() if (found := _one(items, rows, again, not_inside)) is not None
-        }
+        each = {key: _not_inside(items, rows, again, not_inside) for key, rows in sets.items()}
+        eligible = {key: found for key, found in each.items() if found is not None}
         failed = {key for key, rows in sets.items() if any(items[i].outcome in OUTSIDE for i in rows)}
         if not_inside is OUTSIDE and failed - set(eligible):
             break  # the test fails, whatever more is measured
@@ -246,7 +242,7 @@ def with_standing(items: Sequence[Decided], nominal: Ints, again: Remeasurement)
     return tuple(replace(item, standing=standing.get(i, "counts")) for i, item in enumerate(items))
 
 
-def _one(
+def _not_inside(
     items: Sequence[Decided], rows: Sequence[int], again: Remeasurement, not_inside: Collection[str]
 ) -> tuple[list[int], list[int]] | None:
     """Those not inside among the repeats of the test, and the further readings; ``None`` where the clause does not apply."""

@@ -49,10 +49,10 @@ _NAMES = {
 def uncertainty_conditions(lines: Collection[str], artefact: Artefact, under: Circumstances) -> tuple[Condition, ...]:
     """That each of some lines is stated or declared, and what it is computed from recorded and stated."""
     found = [_neither(line) for line in lines if not _met(line, artefact, under)]
-    if "form" in lines and not _form_of_sphere(artefact):
-        found.append(
-            _lacks(say("uncertainty: the form deviation of the test sphere is not stated"), "form_um in [artefact]")
-        )
+    probed = artefact.forms()
+    if "form" in lines and (probed is None or probed.certified <= 0):
+        what = say("uncertainty: the form deviation of the test sphere is not stated")
+        found.append(_lacks(what, "form_um in [artefact]"))
     if "expansion" in lines:
         found += _thermal(artefact, under)
     return tuple(found)
@@ -64,8 +64,7 @@ def u_of_unstated(lines: Collection[str], artefact: Artefact, under: Circumstanc
     It counts before a value is called nonconforming, and for nothing else: the figures are this project's, and larger than a
     laboratory that controls its temperature has. An expansion of which no coefficient is stated was not corrected at all.
     """
-    recorded = artefact.points.columns.get("temp_artefact_c")
-    away = 0.0 if recorded is None else float(np.abs(recorded - REFERENCE_TEMPERATURE).max())
+    away = away_from_20(artefact)
     per_length = {
         "temperature": abs(under.cte_per_k or STEEL) * UNSTATED_K,
         "expansion": away * (UNSTATED_EXPANSION if under.cte_per_k else LARGEST_EXPANSION),
@@ -121,11 +120,6 @@ def _calibrated(line: str, artefact: Artefact, under: Circumstances) -> bool:
     return under.uncertainty.declared(line) is not None or bool(np.all(u > 0))
 
 
-def _form_of_sphere(artefact: Artefact) -> bool:
-    probed = artefact.forms()
-    return probed is not None and probed.certified > 0
-
-
 def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
     """Expansion coefficient and temperature, without which errors are neither corrected nor uncertain as they are."""
     stated = under.uncertainty
@@ -176,22 +170,18 @@ def _lacks(what: Text, remedy: str) -> Condition:
 def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[Text]:
     told: list[Text] = []
     for line in ("temperature", "fixturing", *lines) if lines == REPEAT_LINES else lines:
-        negligible, own = getattr(stated.negligible, line, None), getattr(stated.machine, line, None)
+        name, negligible, own = (
+            _NAMES[line],
+            getattr(stated.negligible, line, None),
+            getattr(stated.machine, line, None),
+        )
         if negligible:
             by, reason = _answer(negligible)
-            told.append(
-                say("{line:capital}: declared negligible by {by}: {reason}.", line=_NAMES[line], by=by, reason=reason)
-            )
+            told.append(say("{line:capital}: declared negligible by {by}: {reason}.", line=name, by=by, reason=reason))
         if own:
             by, reason = _answer(own)
-            told.append(
-                say(
-                    "{line:capital}: declared the machine's own by {by}: {reason}.",
-                    line=_NAMES[line],
-                    by=by,
-                    reason=reason,
-                )
-            )
+            told.append(say("{line:capital}: declared the machine's own by {by}: {reason}.",
+                            line=name, by=by, reason=reason))  # fmt: skip
     return told
 
 
@@ -206,12 +196,10 @@ def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty)
     That of a form begins with the form deviation itself, of which nothing is declared; that of repeats has lines of its own.
     """
     own = () if lines == REPEAT_LINES else ("", *lines) if lines == FORM_LINES else lines
-    named = [
-        replace(line, name=say("{line} (declared negligible)", line=line.name))
-        if name and getattr(stated.negligible, name, None)
-        else replace(line, name=say("{line} (declared the machine's own)", line=line.name))
-        if name and getattr(stated.machine, name, None)
-        else line
-        for line, name in zip(budget.lines, own, strict=False)
-    ]
-    return replace(budget, lines=[*named, *budget.lines[len(named) :]])
+    named = list(budget.lines)
+    for i, (line, name) in enumerate(zip(budget.lines, own, strict=False)):
+        if name and getattr(stated.negligible, name, None):
+            named[i] = replace(line, name=say("{line} (declared negligible)", line=line.name))
+        elif name and getattr(stated.machine, name, None):
+            named[i] = replace(line, name=say("{line} (declared the machine's own)", line=line.name))
+    return replace(budget, lines=named)
