@@ -17,13 +17,14 @@ from cmm_uq.certificate.plots.style import (
     DIVERGING,
     INK,
     MUTED,
-    TINY,
     bars,
+    crosses,
     dots,
     drawn,
     finite,
-    house_style,
-    new_figure,
+    note,
+    picture,
+    strokes,
 )
 
 if TYPE_CHECKING:
@@ -36,9 +37,8 @@ def trumpet(
 ) -> Plot:  # fmt: skip
     """Errors against their limits on both sides of zero.
 
-    ``length_mm, error_um``: (m,) of each length; ``limit_um``: (m,) its limit; ``acceptance_um``: (m,) largest size
-    that is accepted; ``None`` where none is; ``expanded_um``: (m,) expanded uncertainty of each error, k = 2;
-    ``outside``: (m,) errors to be marked: those that are not accepted.
+    All (m,) in µm but the lengths: errors, their limits, largest size that is accepted (``None`` where none is), expanded
+    uncertainty (k = 2), and which errors are marked as not accepted.
     """
     x = finite("length_mm", length_mm, (None,))
     y, top, U = (finite(name, values, x.shape) for name, values in
@@ -46,20 +46,16 @@ def trumpet(
     accepted = np.array([np.nan if value is None else value for value in acceptance_um], dtype=np.float64)
     marked = np.asarray(outside, dtype=bool)
     size = float(np.clip(45.0 / len(x) ** 0.6, 1.6, 4.0))
-    with house_style():
-        figure = new_figure(76)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.082, right=0.985, bottom=0.145, top=0.91)
+    with picture(76, left=0.082, right=0.985, bottom=0.145, top=0.91) as (figure, ax):
         _limits(ax, x, top, accepted)
         ax.axhline(0, color=INK, lw=0.7, zorder=1)
         bars(ax, x, y - U, y + U, max(0.28 * size, 0.6), MUTED)
         dots(ax, x[~marked], y[~marked], size, ACCENT)
-        ax.plot(x[marked], y[marked], ls="", marker="x", ms=size + 2.5, mec=DIVERGING[-1], mew=1.3, zorder=4)
+        crosses(ax, x[marked], y[marked], size + 2.5, 1.3)
         ax.set(xlabel=say("Length / mm"), ylabel=quantity, xlim=(0.0, 1.04 * float(x.max())))
         ax.margins(y=0.08)
         ax.grid(axis="y")
-        figure.text(0.985, 0.975, _legend(accepted, U, marked=bool(marked.any())), ha="right", va="top",
-                    fontsize=TINY, color=MUTED)  # fmt: skip
+        note(figure, _legend(accepted, U, marked=bool(marked.any())))
         return drawn(figure, caption, alternative)
 
 
@@ -105,35 +101,26 @@ def tolerance_plot(
     ends = finite("low", low, value.shape), finite("high", high, value.shape)
     rows = np.arange(len(value), dtype=np.float64)
     reach = float(np.clip(1.15 * max(np.abs(ends[0]).max(), np.abs(ends[1]).max()), 1.3, _FARTHEST))
-    out = np.minimum(np.abs(ends[0]), np.abs(ends[1])) > 1
-    out &= np.sign(ends[0]) == np.sign(ends[1])
-    with house_style():
-        height = 14 + (5.5 if len(value) <= _MANY else 4.5) * len(value)
-        figure = new_figure(height)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height)
+    out = (np.minimum(np.abs(ends[0]), np.abs(ends[1])) > 1) & (np.sign(ends[0]) == np.sign(ends[1]))
+    height = 14 + (5.5 if len(value) <= _MANY else 4.5) * len(value)
+    with picture(height, left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height) as (figure, ax):
         ax.axvspan(-1, 1, color=BAND, lw=0, zorder=0)
         ax.axvline(0, color=INK, lw=0.7, zorder=1)
         for chosen, colour in ((~out, ACCENT), (out, DIVERGING[-1])):
-            inside = np.clip(value[chosen], -reach, reach)
-            gaps = np.full(int(chosen.sum()), np.nan)
-            across = np.column_stack([*(np.clip(end[chosen], -reach, reach) for end in ends), gaps]).ravel()
-            up = np.column_stack([rows[chosen], rows[chosen], gaps]).ravel()
-            ax.plot(across, up, lw=1.6, color=colour, solid_capstyle="butt", zorder=2)
+            inside, own = np.clip(value[chosen], -reach, reach), rows[chosen]
+            left, right = (np.clip(end[chosen], -reach, reach) for end in ends)
+            strokes(ax, left, right, own, own, lw=1.6, color=colour, solid_capstyle="butt", zorder=2)
             if colour == ACCENT:
-                dots(ax, inside, rows[chosen], 4.0, colour)
+                dots(ax, inside, own, 4.0, colour)
             else:
-                ax.plot(inside, rows[chosen], ls="", marker="x", ms=6.0, mec=colour, mew=1.6, zorder=4)
+                crosses(ax, inside, own, 6.0, 1.6)
         for row in np.flatnonzero(np.abs(value) > reach):
             side = np.sign(value[row])
-            text = f"{value[row]:+.1f}".replace("-", "−")
-            ax.annotate(text, (side * reach, row), (-6 * side, 4), textcoords="offset points",
-                        ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
+            ax.annotate(f"{value[row]:+.1f}".replace("-", "−"), (side * reach, row), (-6 * side, 4),
+                        textcoords="offset points", ha="right" if side > 0 else "left", color=MUTED)  # fmt: skip
         ax.set_yticks(rows, names)
-        ax.set(
-            xlim=(-1.02 * reach, 1.02 * reach),
-            xlabel=say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)"),
-        )
+        label = say("Parameter over its tolerance (band: inside; cross: outside beyond doubt)")
+        ax.set(xlim=(-1.02 * reach, 1.02 * reach), xlabel=label)
         ax.invert_yaxis()
         ax.tick_params(left=False)
         ax.spines["left"].set_visible(False)

@@ -1,7 +1,5 @@
 """The posterior distribution of several parameters: each density, and each pair.
 
-The posterior as a corner: every parameter's density, and how each pair goes together.
-
 All panels live in one set of axes and every line style is one path: an eight-parameter corner is a few dozen vector
 objects, where a grid of axes with points would be thousands.
 """
@@ -15,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
 from cmm_uq.certificate.plots.labels import width_mm
@@ -31,6 +29,7 @@ from cmm_uq.certificate.plots.style import (
     house_style,
     lettered,
     new_figure,
+    strokes,
 )
 
 if TYPE_CHECKING:
@@ -50,56 +49,43 @@ _SLANT = 40  # of the figures under the panels, degrees
 
 
 def corner_plot(
-    samples: ArrayLike,
-    names: Sequence[Text],
-    *,
-    units: Sequence[Text] | None = None,
-    estimates: ArrayLike | None = None,
-    intervals95: ArrayLike | None = None,
-    priors: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    samples: ArrayLike, names: Sequence[Text], *, units: Sequence[Text] | None = None, estimates: ArrayLike | None = None,
+    intervals95: ArrayLike | None = None, priors: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
+    caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """Marginal and pairwise posterior densities.
 
-    ``samples``: (n, d) draws. Beyond twelve parameters the twelve with the strongest correlations are shown, and the;
-    ``names, units``: (d,) words over the densities; ``estimates``: (d,) drawn as lines and crosses; the medians where
-    left out; ``intervals95``: (d, 2) shaded; between the 2.5 % and 97.5 % quantiles where left out; ``priors``: by
+    ``samples``: (n, d) draws; beyond twelve parameters the twelve with the strongest correlations are shown, and the caption
+    says so; ``names, units``: (d,) words over the densities; ``estimates``: (d,) drawn as lines and crosses, the medians
+    where left out; ``intervals95``: (d, 2) shaded, between the 2.5 % and 97.5 % quantiles where left out; ``priors``: by
     parameter, (x, density) of its prior, dashed in grey.
     """
-    draws = finite("samples", samples, (None, len(names)))
-    if len(draws) < 2 or not len(names):
+    total = len(names)
+    draws = finite("samples", samples, (None, total))
+    if len(draws) < 2 or not total:
         raise CmmUqError("the picture of a posterior needs at least two draws of one parameter")
     chosen = _most_correlated(draws)
-    if len(chosen) < len(names):
-        caption = say(
-            "{caption} The {count} of {total} parameters that are correlated most are shown.",
-            caption=caption,
-            count=len(chosen),
-            total=len(names),
-        )
+    if len(chosen) < total:
+        caption = say("{caption} The {count} of {total} parameters that are correlated most are shown.",
+                      caption=caption, count=len(chosen), total=total)  # fmt: skip
     kept = draws[:, chosen]
-    ranges = _ranges(kept)
-    middle = np.median(draws, axis=0) if estimates is None else finite("estimates", estimates, (len(names),))
-    between = (
-        np.quantile(draws, [0.025, 0.975], axis=0).T
-        if intervals95 is None
-        else finite("intervals95", intervals95, (len(names), 2))
-    )
+    middle = np.median(draws, axis=0) if estimates is None else finite("estimates", estimates, (total,))
+    between = np.quantile(draws, [0.025, 0.975], axis=0).T
+    if intervals95 is not None:
+        between = finite("intervals95", intervals95, (total, 2))
+    labels = [names[c] for c in chosen]
+    if units:
+        labels = [say("{name} / {unit}", name=names[c], unit=units[c]) if units[c] else names[c] for c in chosen]
     with house_style():
-        panels = _Panels(ranges, kept)
+        panels = _Panels(_ranges(kept), kept)
         panels.densities(middle[chosen], between[chosen])
         for k, parameter in enumerate(chosen):
             if priors and parameter in priors:
                 panels.prior(k, *priors[parameter])
         panels.pairs(middle[chosen])
         panels.frames()
-        panels.words([_label(names[c], units[c] if units else NOTHING) for c in chosen])
+        panels.words(labels)
         return drawn(panels.figure, caption, alternative)
-
-
-def _label(name: Text, unit: Text) -> Text:
-    return say("{name} / {unit}", name=name, unit=unit) if unit else name
 
 
 def _most_correlated(draws: Floats) -> NDArray[np.intp]:
@@ -141,9 +127,8 @@ class _Panels:
 
     def __init__(self, ranges: Floats, draws: Floats) -> None:
         self.ranges, self.count = ranges, len(ranges)
-        self.ticks = [
-            _ticks(low, high, most=1 if self.count > 5 else 2 if self.count > 3 else 4) for low, high in ranges
-        ]
+        most = 1 if self.count > 5 else 2 if self.count > 3 else 4
+        self.ticks = [_ticks(low, high, most) for low, high in ranges]
         longest = max(width_mm(text, TINY) for _, texts in self.ticks for text in texts)
         self.left = max(_LEFT, longest + 3.0)
         below = max(_BELOW, longest * np.sin(np.radians(_SLANT)) + 4.0)
@@ -252,10 +237,7 @@ class _Panels:
                          fontsize=size * min(1.0, room / width_mm(lettered(label), size, "bold")))  # fmt: skip
 
     def strokes(self, x0: Floats, x1: Floats, y0: Floats, y1: Floats, colour: str) -> None:
-        """Straight hairlines from (x0, y0) to (x1, y1), all in one path."""
-        gap = np.full(len(x0), np.nan)
-        x, y = np.column_stack([x0, x1, gap]), np.column_stack([y0, y1, gap])
-        self.ax.plot(x.ravel(), y.ravel(), color=colour, lw=0.6, solid_capstyle="butt")
+        strokes(self.ax, x0, x1, y0, y1, color=colour, lw=0.6, solid_capstyle="butt")
 
 
 def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:

@@ -26,6 +26,7 @@ from cmm_uq.certificate.plots.style import (
     house_style,
     lettered,
     new_figure,
+    picture,
 )
 
 if TYPE_CHECKING:
@@ -62,9 +63,7 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
     span = 1.22 * (high - low)
     width = WIDTH_MM / A_ROW
     below = _BELOW * float(np.ptp(box[0])) + _LABEL_MM * float(span[0]) / width
-    span[1] = max(
-        span[1], high[1] - low[1] + 2 * below
-    )  # of a low volume the name of X needs more room than a share of it
+    span[1] = max(span[1], high[1] - low[1] + 2 * below)  # the name of X needs more room than a share of a low volume
     height = min(width * float(span[1] / span[0]), 75.0) + _TEXT_MM
     with house_style():
         figure = new_figure(height)
@@ -82,20 +81,15 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
                 figure.text(left + 0.035, 1 - below / height, line, fontsize=min(_size(one) for one in lines), color=INK,
                             fontweight="bold")  # fmt: skip
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
-        last = first + len(placings) - 1
-        numbers = (
-            say("Placing {first}", first=first)
-            if last == first
-            else say("Placings {first} to {last}", first=first, last=last)
-        )
-        placings_in_words = semicolons(
-            say("{first}: {title}, {ends} mm", first=first + i, title=p.title, ends=p.ends)
-            for i, p in enumerate(placings)
-        )
+        last, numbers = first + len(placings) - 1, say("Placing {first}", first=first)
+        if last > first:
+            numbers = say("Placings {first} to {last}", first=first, last=last)
         told = say(
             "{numbers}: scale readings in mm; ○ is the first point, dashed lines drop to the table.", numbers=numbers
         )
-        return drawn(figure, told, placings_in_words)
+        words = [say("{first}: {title}, {ends} mm", first=first + i, title=p.title, ends=p.ends)
+                 for i, p in enumerate(placings)]  # fmt: skip
+        return drawn(figure, told, semicolons(words))
 
 
 def _seen(xyz: Floats) -> Floats:
@@ -121,9 +115,7 @@ def _draw(ax: Axes, placing: SetUp, box: Floats) -> None:
 def _frame(ax: Axes, box: Floats) -> None:
     """Edges of the volume, those behind lighter, and the names of the axes."""
     x, y, z = box
-    floor = np.array(
-        [[x[0], y[0], z[0]], [x[1], y[0], z[0]], [x[1], y[1], z[0]], [x[0], y[1], z[0]], [x[0], y[0], z[0]]]
-    )
+    floor = np.array([[x[i], y[j], z[0]] for i, j in ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))])
     polygon = _seen(floor)
     ax.fill(polygon[:, 0], polygon[:, 1], color="#f4f7f8", zorder=0)
     _line(ax, floor, MUTED, 0.6)
@@ -153,8 +145,7 @@ def _outline(readings: Floats) -> list[int]:
 
 
 def _line(ax: Axes, xyz: Floats, colour: str, width: float, *, dashed: bool = False) -> None:
-    seen = _seen(xyz)
-    ax.plot(seen[:, 0], seen[:, 1], lw=width, color=colour, ls=(0, (3, 2)) if dashed else "-", zorder=2)
+    ax.plot(*_seen(xyz).T, lw=width, color=colour, ls=(0, (3, 2)) if dashed else "-", zorder=2)
 
 
 def gain_plot(
@@ -165,24 +156,24 @@ def gain_plot(
 
     ``before, after``: smaller is better; ``None`` for infinitely large.
     """
-    figures = [[v if v is not None and np.isfinite(v) else np.inf for v in series] for series in (before, after)]
-    pairs = np.array(figures).T
-    finite_best = np.where(np.isfinite(pairs), pairs, 0.0).max(axis=1)
-    whole = np.where(finite_best > 0, finite_best, 1.0)
-    ratio = pairs / whole[:, None]
+    pairs = np.array(
+        [[np.inf if v is None or not np.isfinite(v) else v for v in series] for series in (before, after)]
+    ).T
+    largest = np.where(np.isfinite(pairs), pairs, 0.0).max(axis=1)
+    ratio = pairs / np.where(largest > 0, largest, 1.0)[:, None]
     shown = np.where(np.isfinite(ratio), ratio, 1.3)
     height, never = 20.0 + 5.2 * len(labels), say("not at all")
-    with house_style():
-        figure = new_figure(height)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.36, right=0.98, bottom=11 / height, top=1 - 8 / height)
+    # the right end of the axis leaves room for the text of its last tick, at 1.3
+    axis, beside = 0.62 * WIDTH_MM, width_mm(lettered(never), SMALL) / 2 - 0.02 * WIDTH_MM
+    edge = max(1.38, 1.3 * axis / (axis - beside))
+    with picture(height, left=0.36, right=0.98, bottom=11 / height, top=1 - 8 / height) as (figure, ax):
         y = np.arange(len(labels), dtype=np.float64)[::-1]
         for i, row in enumerate(y):
             ax.plot(shown[i], [row, row], color=RULE, lw=2.2, solid_capstyle="butt", zorder=1)
         dots(ax, shown[:, 0], y, 5.0, MUTED, hollow=True)
         dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
         ax.set_yticks(y, labels)
-        ax.set(xlim=(0.0, _edge(never)), ylim=(-0.7, len(labels) - 0.3))
+        ax.set(xlim=(0.0, edge), ylim=(-0.7, len(labels) - 0.3))
         ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", never])
         ax.grid(axis="x")
         ax.set_xlabel(say("{quantity}, over the larger of the two", quantity=quantity))
@@ -204,13 +195,6 @@ def _title(title: Text) -> list[Text]:
 def _size(title: Text) -> float:
     """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
     return SMALL * min(1.0, _ROOM_MM / width_mm(lettered(title), SMALL, "bold"))
-
-
-def _edge(last: Text) -> float:
-    """Right end of the axis, so that the text of its last tick, at 1.3, has room."""
-    axis, margin = 0.62 * WIDTH_MM, 0.02 * WIDTH_MM
-    beside = width_mm(lettered(last), SMALL) / 2 - margin
-    return max(1.38, 1.3 * axis / (axis - beside))
 
 
 def _figure(value: float | None) -> Text:

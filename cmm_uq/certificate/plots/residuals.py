@@ -1,7 +1,5 @@
 """Lengths, residuals, error fields, curves and budgets as pictures.
 
-The pictures of a certificate: lengths by position, residuals in the volume, a curve with its band, a budget.
-
 Each function takes plain arrays and words and gives back a :class:`~cmm_uq.certificate.document.Plot`. Nothing is
 computed here but where the ink goes. The posterior's picture is in :mod:`cmm_uq.certificate.plots.corner`.
 """
@@ -30,6 +28,7 @@ from cmm_uq.certificate.plots.style import (
     SMALL,
     TINY,
     WIDTH_MM,
+    band,
     bars,
     dots,
     drawn,
@@ -37,6 +36,10 @@ from cmm_uq.certificate.plots.style import (
     house_style,
     lettered,
     new_figure,
+    note,
+    panel_title,
+    picture,
+    strokes,
 )
 from cmm_uq.certificate.result import Result
 from cmm_uq.maths.uncertainty.rounding import alike
@@ -47,21 +50,12 @@ if TYPE_CHECKING:
 
 
 def length_plot(
-    position: ArrayLike,
-    before_um: ArrayLike,
-    after_um: ArrayLike,
-    *,
-    expanded_before_um: ArrayLike | float,
-    expanded_after_um: ArrayLike | float,
-    reference: Text,
-    reference_expanded_um: float = 0.0,
-    flagged: ArrayLike | None = None,
-    position_label: Text = say("Position of the bar"),
-    before_label: Text = say("Before the model"),
-    after_label: Text = say("After the fitted model"),
-    caption: Text,
+    position: ArrayLike, before_um: ArrayLike, after_um: ArrayLike, *, expanded_before_um: ArrayLike | float,
+    expanded_after_um: ArrayLike | float, reference: Text, reference_expanded_um: float = 0.0,
+    flagged: ArrayLike | None = None, position_label: Text = say("Position of the bar"),
+    before_label: Text = say("Before the model"), after_label: Text = say("After the fitted model"), caption: Text,
     alternative: Text,
-) -> Plot:
+) -> Plot:  # fmt: skip
     """Bar lengths by position, before and after the fitted model, as deviations from a reference length.
 
     ``position``: (n,) number of each position; repeats carry the same number and are drawn side by side; ``before_um,
@@ -75,32 +69,21 @@ def length_plot(
 
 
 def residual_plot(
-    position: ArrayLike,
-    residual_um: ArrayLike,
-    *,
-    expanded_um: ArrayLike | float,
-    reference: Text,
-    flagged: ArrayLike | None = None,
-    position_label: Text,
-    label: Text,
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    position: ArrayLike, residual_um: ArrayLike, *, expanded_um: ArrayLike | float, reference: Text,
+    flagged: ArrayLike | None = None, position_label: Text, label: Text, caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """The same in one panel, of what is not compared with anything."""
     series = ((label, residual_um, expanded_um, ACCENT),)
     return _panels(position, series, (reference, 0.0), flagged, position_label, caption, alternative)
 
 
 def _panels(
-    position: ArrayLike,
-    given: Sequence[tuple[Text, ArrayLike, ArrayLike | float, str]],
-    zero: tuple[Text, float],
-    flagged: ArrayLike | None,
-    position_label: Text,
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    position: ArrayLike, given: Sequence[tuple[Text, ArrayLike, ArrayLike | float, str]], zero: tuple[Text, float],
+    flagged: ArrayLike | None, position_label: Text, caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """Deviations with their expanded uncertainties by position, a panel a series."""
+    from matplotlib.ticker import MaxNLocator, MultipleLocator
+
     reference, reference_expanded_um = zero
     count = np.asarray(given[0][1]).shape[0]
     x = _side_by_side(finite("position", position, (count,)))
@@ -108,52 +91,47 @@ def _panels(
     marked = np.zeros(count, dtype=bool) if flagged is None else np.asarray(flagged, dtype=bool)
     rows = shown([values for _, values, _, _ in series], marked)
     caption, x, marked = told(caption, len(rows), count), x[rows], marked[rows]
-    size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
+    size, two = float(np.clip(60.0 / count**0.75, 1.3, 4.2)), len(series) == 2
     with house_style():
-        two = len(series) == 2
         figure = new_figure(84 if two else 62)
         axes = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
-        figure.subplots_adjust(
-            left=0.082, right=0.995, bottom=0.105 if two else 0.16, top=0.945 if two else 0.92, hspace=0.27
-        )
-        for ax, (label, values, expanded, colour) in zip(axes, series, strict=True):
-            half = finite(
-                "expanded uncertainty", np.broadcast_to(np.asarray(expanded, dtype=float), (count,)), (count,)
-            )[rows]
-            values = values[rows]
+        below, above = (0.105, 0.945) if two else (0.16, 0.92)
+        figure.subplots_adjust(left=0.082, right=0.995, bottom=below, top=above, hspace=0.27)
+        for ax, (label, whole, expanded, colour) in zip(axes, series, strict=True):
+            every = np.broadcast_to(np.asarray(expanded, dtype=float), (count,))
+            half, values = finite("expanded uncertainty", every, (count,))[rows], whole[rows]
             ax.axhspan(-reference_expanded_um, reference_expanded_um, color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.7, zorder=1)
             bars(ax, x, values - half, values + half, max(0.28 * size, 0.6), colour)
             dots(ax, x, values, size, colour, hollow=colour == MUTED)  # the two series differ in grey too
-            _mark(ax, x[marked], values[marked], size)
+            if marked.any():
+                ax.plot(x[marked], values[marked], ls="", marker="o", ms=size + 4, mfc="none", mec=DIVERGING[-1], mew=1.1,
+                        zorder=4)  # fmt: skip
             ax.grid(axis="y")
             ax.margins(y=0.08)
             ax.set_ylabel(say("Deviation / µm"))
-            ax.set_title(label, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
+            panel_title(ax, label, colour)
         for ax in axes[:-1]:
             ax.tick_params(bottom=False)
-        axes[-1].set_xlabel(position_label)
+        last = axes[-1]
+        last.set_xlabel(position_label)
         room = 0.8 + 0.01 * float(np.ptp(x))
-        axes[-1].set_xlim(x.min() - room, x.max() + room)
-        _whole_numbers(axes[-1], x)
+        last.set_xlim(x.min() - room, x.max() + room)
+        last.xaxis.set_major_locator(MultipleLocator(1) if np.ptp(x) <= 30 else MaxNLocator(12, integer=True))
         figure.align_ylabels(axes)
-        note = _legend(reference, reference_expanded_um, flagged=bool(marked.any()))
-        if width_mm(lettered(note), TINY) > _NOTE_MM:
+        parts = [say("zero: {reference}", reference=reference)]
+        if reference_expanded_um:
+            parts = [say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=reference_expanded_um)]
+        marks = say("bars: U, rings: flagged by screening") if marked.any() else say("bars: U")
+        legend = semicolons((*parts, marks))
+        if width_mm(lettered(legend), TINY) > _NOTE_MM:
             figure.subplots_adjust(top=0.905 if two else 0.86)  # the note has a line of its own
-        figure.text(0.995, 0.985, note, ha="right", va="top", fontsize=TINY, color=MUTED)
+        note(figure, legend, 0.995, 0.985)
         return drawn(figure, caption, alternative)
 
 
 _NOTE_MM = 128.0
 """Room of the note beside a title of thirty letters."""
-
-
-def _legend(reference: Text, band_um: float, *, flagged: bool) -> Text:
-    parts: list[Text] = [say("zero: {reference}", reference=reference)]
-    if band_um:
-        parts = [say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=band_um)]
-    marks = say("bars: U, rings: flagged by screening") if flagged else say("bars: U")
-    return semicolons((*parts, marks))
 
 
 def _side_by_side(position: Floats) -> Floats:
@@ -165,28 +143,11 @@ def _side_by_side(position: Floats) -> Floats:
     return position + 0.6 * ((rank + 0.5) / counts[inverse] - 0.5)
 
 
-def _mark(ax: Axes, x: Floats, y: Floats, size: float) -> None:
-    if len(x):
-        ax.plot(x, y, ls="", marker="o", ms=size + 4, mfc="none", mec=DIVERGING[-1], mew=1.1, zorder=4)
-
-
-def _whole_numbers(ax: Axes, x: Floats) -> None:
-    from matplotlib.ticker import MaxNLocator, MultipleLocator
-
-    ax.xaxis.set_major_locator(MultipleLocator(1) if np.ptp(x) <= 30 else MaxNLocator(12, integer=True))
-
-
 def volume_plot(
-    start_mm: ArrayLike,
-    residual_um: ArrayLike,
-    *,
-    end_mm: ArrayLike | None = None,
-    travel_mm: ArrayLike | None = None,
-    axis_labels: Sequence[Text] = (say("X / mm"), say("Y / mm"), say("Z / mm")),
-    quantity: Text = say("Residual / µm"),
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    start_mm: ArrayLike, residual_um: ArrayLike, *, end_mm: ArrayLike | None = None, travel_mm: ArrayLike | None = None,
+    axis_labels: Sequence[Text] = (say("X / mm"), say("Y / mm"), say("Z / mm")), quantity: Text = say("Residual / µm"),
+    caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """Residuals where they lie in the machine's volume, in three orthogonal projections to one scale.
 
     Sign and size show twice: by colour, and by a dot that is full for a positive residual, hollow for a negative one,
@@ -249,9 +210,9 @@ def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
 def _members(ax: Axes, start: Floats, end: Floats, relative: Floats, colour: str, total: int) -> None:
     """Bars of one colour step, with dots at their middles in four sizes."""
     width = float(np.clip(14 / np.sqrt(total), 0.7, 2.2))
-    gaps = np.full((len(start), 1), np.nan)
-    ax.plot(np.hstack([start[:, :1], end[:, :1], gaps]).ravel(), np.hstack([start[:, 1:], end[:, 1:], gaps]).ravel(),
-            color=colour, lw=width, solid_capstyle="round", zorder=2)  # fmt: skip
+    strokes(
+        ax, start[:, 0], end[:, 0], start[:, 1], end[:, 1], color=colour, lw=width, solid_capstyle="round", zorder=2
+    )
     middle = (start + end) / 2
     classes = np.minimum(np.floor(np.abs(relative) * 4), 3)
     for size_class in np.unique(classes):
@@ -274,29 +235,20 @@ def _colour_scale(ax: Axes, edges: Floats, quantity: Text) -> None:
 
 
 def curve_with_band(
-    x: ArrayLike,
-    y: ArrayLike,
-    expanded: ArrayLike,
-    *,
-    x_label: Text,
-    y_label: Text,
-    points: tuple[ArrayLike, ArrayLike] | None = None,
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    x: ArrayLike, y: ArrayLike, expanded: ArrayLike, *, x_label: Text, y_label: Text,
+    points: tuple[ArrayLike, ArrayLike] | None = None, caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """A curve (n,) with the band of its expanded uncertainty (n,), and optional points that it was drawn through.
 
     Labels carry their units, such as "Error / µm".
     """
     across = finite("x", x, (None,))
-    values = finite("y", y, across.shape)
-    half = finite("expanded uncertainty", expanded, across.shape)
-    with house_style():
-        figure = new_figure(72)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.105, right=0.975, bottom=0.14, top=0.97)  # room for ticks of six characters
-        around = np.append(values - half, (values + half)[::-1])
-        ax.fill(np.append(across, across[::-1]), around, color=ACCENT, alpha=0.16, lw=0)
+    values, half = finite("y", y, across.shape), finite("expanded uncertainty", expanded, across.shape)
+    with picture(72, left=0.105, right=0.975, bottom=0.14, top=0.97) as (
+        figure,
+        ax,
+    ):  # room for ticks of six characters
+        band(ax, across, values, half, alpha=0.16)
         ax.plot(across, values, color=ACCENT, lw=1.3)
         ax.axhline(0, color=INK, lw=0.6, zorder=1)
         if points is not None:
@@ -312,14 +264,13 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
     share = finite("shares", shares, (len(sources),))
     if not len(share):
         raise CmmUqError("a budget without a source has no picture")
+    from matplotlib import rcParams
+
     order = np.argsort(-share, kind="stable")
     rows = np.arange(len(order))
     names = [folded(sources[index], NAMES_MM) for index in order]
-    with house_style():
-        height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
-        figure = new_figure(height)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height)
+    height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
+    with picture(height, left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height) as (figure, ax):
         ax.barh(rows, share[order], 0.55, color=[ACCENT if value >= 0 else MUTED for value in share[order]], lw=0)
         ax.axvline(0, color=MUTED, lw=0.6)
         for row, value in zip(rows, share[order], strict=True):
@@ -329,21 +280,14 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
         ax.set(xlim=(min(share.min() * 1.15, 0), max(share.max(), 1e-9) * 1.02), xticks=[])
         ax.invert_yaxis()
         ax.tick_params(left=False)
+        left = -rcParams["ytick.major.pad"] - rcParams["ytick.major.size"]
         for place, lines in enumerate(names):
-            if len(lines) > 1:
-                _two_lines(ax, place, lines)
+            for line, up in zip(lines, (0.6, -0.6), strict=True) if len(lines) > 1 else ():
+                ax.annotate(line, (0, place), (left, up * SMALL), xycoords=("axes fraction", "data"),
+                            textcoords="offset points", ha="right", va="center", fontsize=SMALL, color=INK)  # fmt: skip
         for side in ("bottom", "left"):
             ax.spines[side].set_visible(False)
         return drawn(figure, caption, alternative)
-
-
-def _two_lines(ax: Axes, row: int, lines: Sequence[Text]) -> None:
-    from matplotlib import rcParams
-
-    left = -rcParams["ytick.major.pad"] - rcParams["ytick.major.size"]
-    for line, up in zip(lines, (0.6, -0.6), strict=True):
-        ax.annotate(line, (0, row), (left, up * SMALL), xycoords=("axes fraction", "data"), textcoords="offset points",
-                    ha="right", va="center", fontsize=SMALL, color=INK)  # fmt: skip
 
 
 def residual_volume(result: Result, what: Text) -> Plot:
@@ -356,12 +300,8 @@ def residual_volume(result: Result, what: Text) -> Plot:
     ends = readings[artefact.rows]
     low, high = alike(residuals.min(), residuals.max())
     return volume_plot(
-        ends[:, 0],
-        residuals,
-        end_mm=ends[:, -1] if ends.shape[1] > 1 else None,
+        ends[:, 0], residuals, end_mm=ends[:, -1] if ends.shape[1] > 1 else None,
         travel_mm=travel if np.all(np.isfinite(travel)) else None,
         caption=say("Residuals after the fitted model in the machine's volume (scale readings)."),
-        alternative=say(
-            "Three projections of the {what}; residuals of {low} to {high} µm.", what=what, low=low, high=high
-        ),
-    )
+        alternative=say("Three projections of the {what}; residuals of {low} to {high} µm.", what=what, low=low, high=high),
+    )  # fmt: skip

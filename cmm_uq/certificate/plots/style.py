@@ -1,11 +1,7 @@
 """The looks and lettering of all pictures, black and white first.
 
-The language of what is lettered in pictures: it is chosen before a document is composed, since a picture is drawn once.
-
-The texts of a document are said in a language when all is composed (``in_language``); a picture's are part
-of it by then, with the room that they need.
-
-The look of every picture: one accent colour, quiet axes, and SVG that both views can take as it is.
+One accent colour, quiet axes, and SVG that both views can take as it is. The language of what is lettered is chosen before a
+document is composed, since a picture is drawn once, with the room that its texts need.
 
 Text stays text in the SVG, without a font of its own. The browser then sets it in the page's face and the PDF in the
 document's, and it can be searched and copied; outlines would make the three pictures of a ballbar certificate half as
@@ -231,6 +227,16 @@ def new_figure(height_mm: float) -> Figure:
     return figure
 
 
+@contextmanager
+def picture(height_mm: float, **edges: float) -> Iterator[tuple[Figure, Axes]]:
+    """A figure in the house style with one set of axes, whose ``left``, ``right``, ``bottom``, ``top`` are parts of it."""
+    with house_style():
+        figure = new_figure(height_mm)
+        ax = figure.subplots()
+        figure.subplots_adjust(**edges)
+        yield figure, ax
+
+
 _NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
 _COORDINATES = re.compile(r'(?<= )(?:x|y|points|transform)="[^"]*"')
 _UNWANTED = re.compile(r'font-family: [^;"]*;? ?| transform="rotate\(-0 [^"]*"| xmlns:xlink="[^"]*"| version="1.1"')
@@ -311,19 +317,37 @@ def finite(name: str, values: ArrayLike, shape: tuple[int | None, ...]) -> Float
     return array
 
 
+def strokes(ax: Axes, x0: Floats, x1: Floats, y0: Floats, y1: Floats, **style: Any) -> None:
+    """Straight lines from (x0, y0) to (x1, y1), each (n,), as one path."""
+    gaps = np.full(len(x0), np.nan)
+    ax.plot(np.column_stack([x0, x1, gaps]).ravel(), np.column_stack([y0, y1, gaps]).ravel(), **style)
+
+
 def dots(ax: Axes, x: Floats, y: Floats, size: float, colour: str, *, hollow: bool = False, zorder: float = 3) -> None:
-    """Round marks of ``size`` pt as one path: strokes of no length with round ends, which viewers draw as dots."""
-    gaps = np.full(len(x), np.nan)
-    across = np.column_stack([x, x, gaps]).ravel()
-    up = np.column_stack([y, y, gaps]).ravel()
-    ax.plot(across, up, lw=size, color=colour, solid_capstyle="round", zorder=zorder)
+    """Round marks of ``size`` pt: strokes of no length with round ends, which viewers draw as dots."""
+    strokes(ax, x, x, y, y, lw=size, color=colour, solid_capstyle="round", zorder=zorder)
     if hollow:
-        ax.plot(across, up, lw=size * 0.5, color="white", solid_capstyle="round", zorder=zorder + 0.01)
+        strokes(ax, x, x, y, y, lw=size * 0.5, color="white", solid_capstyle="round", zorder=zorder + 0.01)
 
 
 def bars(ax: Axes, x: Floats, low: Floats, high: Floats, width: float, colour: str, zorder: float = 2) -> None:
-    """Vertical bars from ``low`` to ``high`` as one path of ``width`` pt."""
-    gaps = np.full(len(x), np.nan)
-    across = np.column_stack([x, x, gaps]).ravel()
-    ax.plot(across, np.column_stack([low, high, gaps]).ravel(), lw=width, color=colour,
-            solid_capstyle="butt", zorder=zorder)  # fmt: skip
+    """Vertical bars from ``low`` to ``high`` of ``width`` pt."""
+    strokes(ax, x, x, low, high, lw=width, color=colour, solid_capstyle="butt", zorder=zorder)
+
+
+def crosses(ax: Axes, x: Floats, y: Floats, size: float, width: float) -> None:
+    ax.plot(x, y, ls="", marker="x", ms=size, mec=DIVERGING[-1], mew=width, zorder=4)
+
+
+def band(ax: Axes, x: Floats, y: Floats, half: Floats, **style: Any) -> None:
+    """What lies within ``half`` of a curve."""
+    ax.fill(np.append(x, x[::-1]), np.append(y - half, (y + half)[::-1]), color=ACCENT, lw=0, **style)
+
+
+def panel_title(ax: Axes, text: Text, colour: str) -> None:
+    ax.set_title(text, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
+
+
+def note(figure: Figure, text: Text, right: float = 0.985, top: float = 0.975) -> None:
+    """What the marks are, small, at the upper right."""
+    figure.text(right, top, text, ha="right", va="top", fontsize=TINY, color=MUTED)

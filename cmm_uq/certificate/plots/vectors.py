@@ -22,11 +22,14 @@ from cmm_uq.certificate.plots.style import (
     RULE,
     TINY,
     WIDTH_MM,
+    band,
     dots,
     drawn,
     finite,
     house_style,
     new_figure,
+    panel_title,
+    strokes,
 )
 
 if TYPE_CHECKING:
@@ -37,13 +40,9 @@ _ROUND = (1.0, 2.0, 5.0)
 
 
 def vector_plot(
-    position_mm: ArrayLike,
-    series: Sequence[tuple[Text, ArrayLike]],
-    *,
-    axis_labels: tuple[Text, Text] = (say("x / mm"), say("y / mm")),
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    position_mm: ArrayLike, series: Sequence[tuple[Text, ArrayLike]], *,
+    axis_labels: tuple[Text, Text] = (say("x / mm"), say("y / mm")), caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """Vectors in a plane, one panel a series, all magnified alike, with a scale arrow of a round length.
 
     ``position_mm``: (n, 2) where each vector stands; ``series``: title and (n, 2) vectors in µm; one to three of them.
@@ -68,24 +67,17 @@ def vector_plot(
             dots(ax, place[:, 0], place[:, 1], 2.0, RULE)
             tips = place + factor * values
             ax.quiver(*place.T, *(tips - place).T, angles="xy", scale_units="xy", scale=1, color=colour, width=0.006)
-            ax.set_title(title, loc="left", fontsize=8, color=colour, fontweight="bold", pad=4)
+            panel_title(ax, title, colour)
             ax.set_aspect("equal")
             ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
             ax.set_xlabel(axis_labels[0])
             ax.locator_params(nbins=5)
         axes[0].set_ylabel(axis_labels[1])
         unit = round_length(longest)
-        at = (high[0] + 0.9 * margin - factor * unit, low[1] - 0.75 * margin)
-        axes[-1].plot([at[0], at[0] + factor * unit], [at[1], at[1]], color=ACCENT, lw=1.6, solid_capstyle="butt")
-        axes[-1].annotate(
-            say("{length:g} µm", length=unit),
-            (at[0] + factor * unit / 2, at[1]),
-            (0, 3),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=TINY,
-        )
+        x, y = high[0] + 0.9 * margin - factor * unit, low[1] - 0.75 * margin
+        axes[-1].plot([x, x + factor * unit], [y, y], color=ACCENT, lw=1.6, solid_capstyle="butt")
+        axes[-1].annotate(say("{length:g} µm", length=unit), (x + factor * unit / 2, y), (0, 3),
+                          textcoords="offset points", ha="center", va="bottom", fontsize=TINY)  # fmt: skip
         return drawn(figure, caption, alternative)
 
 
@@ -108,14 +100,9 @@ Shade = tuple[str, float, float]
 
 
 def residual_field_plot(
-    field: ResidualField,
-    expanded_um: Floats,
-    *,
-    titles: tuple[Text, Text] | tuple[Text],
-    shade: Shade | None = None,
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    field: ResidualField, expanded_um: Floats, *, titles: tuple[Text, Text] | tuple[Text], shade: Shade | None = None,
+    caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """Vectors in the two planes that show most of them, a column before and a column after, all magnified alike.
 
     What is longer than its expanded uncertainty is an arrow; what lies within it is a thin line without a head.
@@ -138,21 +125,19 @@ def residual_field_plot(
         figure, axes = _panels(planes, len(titles), high - low)
         for row, (a, b) in enumerate(planes):
             for column, values in enumerate(series):
-                ax = axes[row][column]
+                ax, at = axes[row][column], place[:, (a, b)]
                 _shaded(ax, shade, a, b)
                 if field.lengths:
-                    _lines(ax, place[:, (a, b)])
+                    strokes(ax, at[::2, 0], at[1::2, 0], at[::2, 1], at[1::2, 1], color=RULE, lw=0.8, zorder=1)
                 beyond = np.linalg.norm(values, axis=1) > limit
-                _vectors(ax, place[:, (a, b)], factor * values[:, (a, b)], beyond, colours[column])
+                _vectors(ax, at, factor * values[:, (a, b)], beyond, colours[column])
                 ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
                 ax.locator_params(nbins=5)
                 ax.set_xlabel(say("{axis} / mm", axis=Verbatim(_AXES[a])), labelpad=1)
                 if not column:
                     ax.set_ylabel(say("{axis} / mm", axis=Verbatim(_AXES[b])))
                 if not row:
-                    ax.set_title(
-                        titles[column], loc="left", fontsize=8, color=colours[column], fontweight="bold", pad=4
-                    )
+                    panel_title(ax, titles[column], colours[column])
         _key(figure, axes[-1][0], factor, longest, float(np.median(limit)), colours[0])
         return drawn(figure, caption, alternative)
 
@@ -206,18 +191,9 @@ def _shaded(ax: Axes, shade: Shade | None, a: int, b: int) -> None:
         ax.axhspan(low, high, color=BAND, lw=0, zorder=0)
 
 
-def _lines(ax: Axes, ends: Floats) -> None:
-    gaps = np.full((len(ends) // 2, 1), np.nan)
-    for_x, for_y = (np.hstack([ends[::2, i : i + 1], ends[1::2, i : i + 1], gaps]).ravel() for i in (0, 1))
-    ax.plot(for_x, for_y, color=RULE, lw=0.8, zorder=1)
-
-
 def _vectors(ax: Axes, place: Floats, way: Floats, beyond: NDArray[np.bool_], colour: str) -> None:
-    inside = ~beyond
-    gaps = np.full((int(inside.sum()), 1), np.nan)
-    tips = place + way
-    for_x, for_y = (np.hstack([place[inside, i : i + 1], tips[inside, i : i + 1], gaps]).ravel() for i in (0, 1))
-    ax.plot(for_x, for_y, color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
+    start, tips = place[~beyond], (place + way)[~beyond]
+    strokes(ax, start[:, 0], tips[:, 0], start[:, 1], tips[:, 1], color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
     if beyond.any():
         ax.quiver(*place[beyond].T, *way[beyond].T, angles="xy", scale_units="xy", scale=1, color=colour, units="width",
                   width=0.006, headwidth=4, headlength=5, zorder=3)  # fmt: skip
@@ -247,15 +223,9 @@ def _key(figure: Figure, ax: Axes, factor: float, longest: float, limit: float, 
 
 
 def profile_plot(
-    curve: tuple[Floats, Floats, Floats],
-    data: tuple[Floats, Floats, Floats],
-    region: tuple[float, float],
-    *,
-    x_label: Text,
-    y_label: Text,
-    caption: Text,
-    alternative: Text,
-) -> Plot:
+    curve: tuple[Floats, Floats, Floats], data: tuple[Floats, Floats, Floats], region: tuple[float, float], *,
+    x_label: Text, y_label: Text, caption: Text, alternative: Text,
+) -> Plot:  # fmt: skip
     """A function with its band above, what each observation leaves below, the region where it matters shaded in both.
 
     ``curve``: covariate, function in µm and its expanded uncertainty, each (p,); ``data``: lowest and highest covariate
@@ -268,40 +238,27 @@ def profile_plot(
     rows = shown([residual])
     caption = told(caption, len(rows), len(low))
     low, high, residual = low[rows], high[rows], residual[rows]
+    middle = 0.5 * (region[0] + region[1])
+    seen = max(0.5 * (region[1] - region[0]), 0.005 * float(np.ptp(x)))  # a hundredth of the picture at least
     with house_style():
         figure = new_figure(90)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 0.8))
         figure.subplots_adjust(left=0.105, right=0.985, bottom=0.115, top=0.94, hspace=0.22)
         for ax in (above, below):
-            ax.axvspan(*_widened(region, x), color=BAND, lw=0, zorder=0)
+            ax.axvspan(middle - seen, middle + seen, color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.6, zorder=1)
             ax.grid(axis="y")
-        above.fill(
-            np.append(x, x[::-1]), np.append(y - half, (y + half)[::-1]), color=ACCENT, alpha=0.18, lw=0, zorder=2
-        )
+        band(above, x, y, half, alpha=0.18, zorder=2)
         above.plot(x, y, color=ACCENT, lw=1.4, zorder=3)
         above.set_ylabel(y_label)
-        above.set_title(say("What the observations show together, with U"), loc="left", fontsize=8, color=ACCENT,
-                        fontweight="bold", pad=4)  # fmt: skip
-        size = float(np.clip(60.0 / len(low) ** 0.75, 1.3, 3.6))
+        panel_title(above, say("What the observations show together, with U"), ACCENT)
         wide = high - low > 1e-3 * np.ptp(x)
         if wide.any():
-            gaps = np.full(int(wide.sum()), np.nan)
-            below.plot(
-                np.column_stack([low[wide], high[wide], gaps]).ravel(),
-                np.column_stack([residual[wide], residual[wide], gaps]).ravel(), color=DIVERGING[-1], lw=0.6, zorder=2,
-            )  # fmt: skip
+            strokes(below, low[wide], high[wide], residual[wide], residual[wide], color=DIVERGING[-1], lw=0.6, zorder=2)
+        size = float(np.clip(60.0 / len(low) ** 0.75, 1.3, 3.6))
         dots(below, 0.5 * (low + high), residual, size, DIVERGING[-1], hollow=True)
         below.set(xlabel=x_label, ylabel=say("Residual / µm"))
-        below.set_title(say("What each observation leaves"), loc="left", fontsize=8, color=DIVERGING[-1],
-                        fontweight="bold", pad=4)  # fmt: skip
+        panel_title(below, say("What each observation leaves"), DIVERGING[-1])
         below.margins(x=0.02, y=0.1)
         figure.align_ylabels((above, below))
         return drawn(figure, caption, alternative)
-
-
-def _widened(region: tuple[float, float], x: Floats) -> tuple[float, float]:
-    """A region that would be too narrow to see, as a hundredth of the picture."""
-    middle, half = 0.5 * (region[0] + region[1]), 0.5 * (region[1] - region[0])
-    half = max(half, 0.005 * float(np.ptp(x)))
-    return middle - half, middle + half
