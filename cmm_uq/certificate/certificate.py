@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed, without_keys
-from cmm_uq.base.points import Points
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.clauses import (
     DRAFT,
@@ -19,7 +17,7 @@ from cmm_uq.certificate.clauses import (
     replaced_certificate,
 )
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
-from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature
+from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
 from cmm_uq.certificate.origin import CERTIFICATE, DIGITAL, came_about, file_name, program
 from cmm_uq.certificate.outcome import Outcome, Page
 from cmm_uq.certificate.result import Result
@@ -41,7 +39,9 @@ from cmm_uq.certificate.sections.results import (
 )
 from cmm_uq.certificate.sections.traceability import claimed, traceability
 from cmm_uq.certificate.sections.warnings import warnings
-from cmm_uq.jobs.job import Job, JobFacts, JobFile
+from cmm_uq.jobs.identification import Identification
+from cmm_uq.jobs.job import Job
+from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
@@ -56,20 +56,15 @@ TEMPERATURES: Mapping[str, Text] = {
 
 def conditions(job: Job) -> Facts:
     """As stated, and the least and largest recorded temperatures; without rows where there are none."""
-    rows: list[tuple[Text, Text]] = []
-    if job.facts.job.conditions:
-        rows.append((say("Conditions"), Verbatim(job.facts.job.conditions)))
-    if recorded := _recorded(job.points):
-        rows.append((say("Temperatures recorded"), recorded))
-    return Facts(tuple(rows))
-
-
-def _recorded(points: Points) -> Text:
-    return commas(
-        say("{what} {low} to {high} {unit}", what=what, low=signed(float(points.columns[name].min()), ".2f"),
-            high=signed(float(points.columns[name].max()), ".2f"), unit=unit("°C"))
-        for name, what in TEMPERATURES.items() if name in points.columns
+    columns = job.points.columns
+    recorded = commas(
+        say("{what} {low} to {high} {unit}", what=what, low=signed(float(columns[name].min()), ".2f"),
+            high=signed(float(columns[name].max()), ".2f"), unit=unit("°C"))
+        for name, what in TEMPERATURES.items() if name in columns
     )  # fmt: skip
+    stated = Verbatim(job.facts.job.conditions)
+    rows = ((say("Conditions"), stated), (say("Temperatures recorded"), recorded))
+    return Facts(tuple(row for row in rows if row[1]))
 
 
 Row = tuple[Text, str]
@@ -77,30 +72,22 @@ Row = tuple[Text, str]
 
 
 def certificate_of(
-    job: Job,
-    sections: list[Section],
-    told: tuple[Text, ...],
-    produced_by: Text,
-    files: tuple[Text, ...] = (),
+    job: Job, sections: list[Section], warnings: tuple[Text, ...], produced_by: Text, files: tuple[Text, ...] = (),
     overview: Overview | None = None,
-) -> Document:
+) -> Document:  # fmt: skip
     """Sections and warnings between what every certificate has.
 
-    ``told``: warnings on the results; those on what the job does not state follow them.
+    Warnings on what the job does not state follow ``warnings``; ``files`` are attached beside job and recording.
     """
     facts = job.facts
+    name, date = Verbatim(facts.machine.name), day(facts.job.date)
     return in_words(Document(
         title=CERTIFICATE,
         number=Verbatim(facts.job.number or facts.job.id),
-        subject=say(
-            "{name}, {came_about} {date}",
-            name=Verbatim(facts.machine.name),
-            came_about=came_about(job),
-            date=day(facts.job.date),
-        ),
+        subject=say("{name}, {came_about} {date}", name=name, came_about=came_about(job), date=date),
         issuer=issuer_of(facts.laboratory),
         particulars=_particulars(job),
-        warnings=(*told, *formal_warnings(job)),
+        warnings=(*warnings, *formal_warnings(job)),
         sections=tuple(sorted((one for one in sections if one.blocks), key=lambda one: (not one.first, one.opinion))),
         statements=statements_of(facts.job),
         signatures=signatures_of(facts.laboratory),
@@ -120,42 +107,35 @@ def certificate_of(
 
 def in_words(document: Document) -> Document:
     """The document without keys of the job, which the laboratory reads from ``check``, the terminal and results.json."""
-    made: Document = _in_words(document)
-    return made
-
-
-def _in_words(value: Any) -> Any:
-    if isinstance(value, Text):
-        return without_keys(value)
-    if isinstance(value, tuple):
-        return tuple(map(_in_words, value))
-    if is_dataclass(value) and not isinstance(value, type):
-        return replace(value, **{field.name: _in_words(getattr(value, field.name)) for field in fields(value)})
-    return value
+    found: Document = with_each_text(document, without_keys)
+    return found
 
 
 def _particulars(of: Job) -> tuple[Facts, ...]:
     facts, job, machine = of.facts, of.facts.job, of.facts.machine
     method, *others = performed(job)
+    travel = [
+        say("{axis}\u00a0{low}\u00a0…\u00a0{high}", axis=Verbatim(axis.upper()), low=nominal(ends[0]), high=nominal(ends[1]))
+        for axis in "xyz" if (ends := getattr(machine.travel_mm, axis))
+    ]  # fmt: skip
+    traced = ((say("Traceability"), claimed(of).statement),) if of.origin == MEASURED else ()
+    # no interval is recommended that the customer did not agree to (7.8.4.3)
+    agreed = day(job.recalibration_agreed) if job.recalibration_agreed else NOTHING
     return grouped(
         (
-            *identified(job, facts.laboratory, job.origin),
-            (say("Next calibration, as agreed with the customer"), _agreed(job)),
+            *identified(job, facts.laboratory, of.origin),
+            (say("Next calibration, as agreed with the customer"), agreed),
         ),
         (
             (say("Machine"), machine.name),
             (say("Manufacturer, model"), ", ".join(filter(None, (machine.manufacturer, machine.model)))),
             (say("Serial number"), machine.serial),
             (say("Owner"), machine.owner),
-            (say("Measuring range"), _travel(facts)),
+            (say("Measuring range"), say("{travel} mm", travel=commas(travel)) if travel else NOTHING),
             (say("Place"), job.place),
         ),
-        (method, *conditions(of).rows, *_traced(of), *others),
+        (method, *conditions(of).rows, *traced, *others),
     )
-
-
-def _traced(job: Job) -> tuple[Row, ...]:
-    return ((say("Traceability"), claimed(job).statement),) if job.origin == MEASURED else ()
 
 
 def grouped(*groups: tuple[Row, ...]) -> tuple[Facts, ...]:
@@ -222,25 +202,6 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     )
 
 
-def _travel(facts: JobFile) -> Text:
-    travel = [
-        say(
-            "{axis}\u00a0{low}\u00a0…\u00a0{high}",
-            axis=Verbatim(axis.upper()),
-            low=nominal(given[0]),
-            high=nominal(given[1]),
-        )
-        for axis in "xyz"
-        if (given := getattr(facts.machine.travel_mm, axis))
-    ]
-    return say("{travel} mm", travel=commas(travel)) if travel else NOTHING
-
-
-def _agreed(job: JobFacts) -> Text:
-    """No interval is recommended that the customer did not agree to (7.8.4.3)."""
-    return day(job.recalibration_agreed) if job.recalibration_agreed else NOTHING
-
-
 def with_capability(result: Result) -> tuple[Result, Stating]:
     """The result as a certificate states it, and what was raised.
 
@@ -262,37 +223,30 @@ def with_capability(result: Result) -> tuple[Result, Stating]:
 def certified(result: Result, page: Page) -> Outcome:
     """What there is to write of a result: the certificate, complete but for its looks, and its figures."""
     result, stating = with_capability(result)
-    told = (*warnings(result), *stating.warnings())
-    warned = (*told, *formal_warnings(result.job))
+    own = (*warnings(result), *stating.warnings())
+    warned = (*own, *formal_warnings(result.job))
     draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
-    data = (
-        results(result)
-        | as_found_data(result.job)
-        | clauses_data(result.job)
-        | stating.data()
-        | ({} if draws is None else {"posterior": draws.entry})
-    )
+    data = results(result) | as_found_data(result.job) | clauses_data(result.job) | stating.data()
+    if draws is not None:
+        data["posterior"] = draws.entry
     return Outcome(
-        result, lambda: _certificate(result, page, told), page.with_further(result, data), summary(result, warned), warned,
+        result, lambda: _certificate(result, page, own), page.with_further(result, data), summary(result, warned), warned,
         {draws.name: draws.content} if draws else {}, draws=result.draws, verdicts=result.verdicts,
         in_order=result.diagnosed.diagnosis.verdict == "consistent",
     )  # fmt: skip
 
 
-def _certificate(result: Result, page: Page, told: tuple[Text, ...]) -> Document:
-    diagnosis = diagnosis_sections(result.diagnosed) if result.job.facts.job.diagnosis_on_certificate else ()
+def _certificate(result: Result, page: Page, warned: tuple[Text, ...]) -> Document:
+    job, posterior = result.job, result.posterior
+    diagnosis = diagnosis_sections(result.diagnosed) if job.facts.job.diagnosis_on_certificate else ()
     sections = [
         *with_first(result, [*_ordered(result, page.sections(result)), *tolerance_sections(result)]), method(result),
         *(replace(section, opinion=True) for section in (*diagnosis, posterior_section(result))),
     ]  # fmt: skip
-    produced_by = say(
-        "{program}, {sampler}, seed {seed}",
-        program=program(result.job),
-        sampler=Verbatim(result.posterior.sampler),
-        seed=result.posterior.seed,
-    )
-    files = (Verbatim(posterior_name(result.job.origin)),) if len(result.draws) else ()
-    return certificate_of(result.job, sections, told, produced_by, files, overview_of(result))
+    produced_by = say("{program}, {sampler}, seed {seed}", program=program(job), sampler=Verbatim(posterior.sampler),
+                      seed=posterior.seed)  # fmt: skip
+    files = (Verbatim(posterior_name(job.origin)),) if len(result.draws) else ()
+    return certificate_of(job, sections, warned, produced_by, files, overview_of(result))
 
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:

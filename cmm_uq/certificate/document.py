@@ -1,7 +1,5 @@
 """A document as data: what a certificate says, before anyone decides what it looks like.
 
-A document as data: what a certificate says, before anyone decides what it looks like.
-
 HTML and PDF are two views of one :class:`Document`; every figure stands in it once, already as text, so that the views
 cannot differ. A section is a list of blocks, and a block is one of the small classes below: whoever adds an artefact, a
 budget or a diagnosis composes blocks and touches neither view. Text is plain Unicode without markup; a line feed is a new
@@ -13,7 +11,7 @@ from __future__ import annotations
 import datetime as dt
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Literal
@@ -91,6 +89,14 @@ class Column:
     heading: Text
     unit: Text = NOTHING
     numeric: bool = True
+
+
+def text_columns(*headings: Text) -> tuple[Column, ...]:
+    return tuple(Column(heading, numeric=False) for heading in headings)
+
+
+def figure_columns(*headings: Text, unit: Text = NOTHING) -> tuple[Column, ...]:
+    return tuple(Column(heading, unit) for heading in headings)
 
 
 @dataclass(frozen=True)
@@ -174,7 +180,7 @@ class Signature:
     role: Text = NOTHING
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Document:
     """A certificate or report.
 
@@ -204,13 +210,13 @@ class Document:
     title: Text
     number: Text
     subject: Text
-    issuer: tuple[Text, ...]
-    particulars: tuple[Facts, ...]
-    warnings: tuple[Text, ...]
-    sections: tuple[Section, ...]
-    statements: tuple[Text, ...]
-    signatures: tuple[Signature, ...]
-    attachments: tuple[Text, ...]
+    issuer: tuple[Text, ...] = ()
+    particulars: tuple[Facts, ...] = ()
+    warnings: tuple[Text, ...] = ()
+    sections: tuple[Section, ...] = ()
+    statements: tuple[Text, ...] = ()
+    signatures: tuple[Signature, ...] = ()
+    attachments: tuple[Text, ...] = ()
     produced_by: Text
     date: dt.date | None = None
     language: str = "en"
@@ -329,48 +335,32 @@ def translated(document: Document, code: Code) -> Document:
     """The document in a language; pictures were lettered when they were drawn (:mod:`cmm_uq.certificate.plots.style`)."""
     if code == ENGLISH:
         return document
-    found: Document = _said(document, code)
+    found: Document = with_each_text(document, lambda text: said_in(text, code))
     return replace(found, language=code)
 
 
-def _said(value: Any, code: Code) -> Any:
+def with_each_text(value: Any, change: Callable[[Text], Text]) -> Any:
+    """The same blocks, tuples and texts, each text changed."""
     if isinstance(value, Text):
-        return said_in(value, code)
+        return change(value)
     if isinstance(value, tuple):
-        return tuple(_said(item, code) for item in value)
+        return tuple(with_each_text(item, change) for item in value)
     if is_dataclass(value) and not isinstance(value, type):
-        found = {field.name: getattr(value, field.name) for field in fields(value)}
-        return replace(value, **{name: _said(item, code) for name, item in found.items()})
+        return replace(value, **{f.name: with_each_text(getattr(value, f.name), change) for f in fields(value)})
     return value
 
 
 def working_page(
-    facts: JobFile,
-    title: Text,
-    subject: Text,
-    *,
-    particulars: tuple[Facts, ...],
-    warnings: Iterable[Text],
-    sections: Iterable[Section],
-    produced_by: Text,
-    end: Text = say("End of diagnosis"),
-    attachments: tuple[Text, ...] = (),
-    overview: Overview | None = None,
-) -> Document:
+    facts: JobFile, title: Text, subject: Text, *, particulars: tuple[Facts, ...], warnings: Iterable[Text],
+    sections: Iterable[Section], produced_by: Text, end: Text = say("End of diagnosis"),
+    attachments: tuple[Text, ...] = (), overview: Overview | None = None,
+) -> Document:  # fmt: skip
     """A document about a job, without the sections that have nothing to say; see :class:`Document`."""
     return Document(
-        title=title,
-        number=Verbatim(facts.job.id),
+        title=title, number=Verbatim(facts.job.id), date=facts.job.date,
         subject=say("{name}, {subject}", name=Verbatim(facts.machine.name), subject=subject),
         issuer=tuple(Verbatim(line) for line in (facts.laboratory.name,) if line),
-        particulars=particulars,
-        warnings=tuple(warnings),
+        particulars=particulars, warnings=tuple(warnings),
         sections=tuple(section for section in sections if section.blocks),
-        statements=(),
-        signatures=(),
-        attachments=attachments,
-        produced_by=produced_by,
-        date=facts.job.date,
-        end=end,
-        overview=overview,
-    )
+        attachments=attachments, produced_by=produced_by, end=end, overview=overview,
+    )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -204,10 +205,8 @@ def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
     lengths = np.sort([one.length for one in found])
     starts = lengths[lengths <= plan.shortest_mm]
     ends = np.array([one.length for one in found if one.share is not None and one.share >= plan.least_share])
-    starts, ends = (starts if len(starts) else lengths[:1]), (ends if len(ends) else lengths[-1:])
-    return any(
-        _spaced(lengths, np.linspace(start, end, plan.lengths)) for start in starts for end in ends if end > start
-    )
+    pairs = product(starts if len(starts) else lengths[:1], ends if len(ends) else lengths[-1:])
+    return any(_spaced(lengths, np.linspace(start, end, plan.lengths)) for start, end in pairs if end > start)
 
 
 def _spaced(lengths: Floats, equally: Floats) -> bool:

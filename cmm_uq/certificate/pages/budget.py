@@ -21,21 +21,12 @@ _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 
 def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name: str) -> Document:
     asked = evaluation.request
-    summary = Table(
-        say("Results"),
-        _columns(SUMMARY),
-        tuple(summary_rows(evaluation)),
-        (
-            say(
-                "Intervals are for a coverage probability of {coverage:g} %; the shortest one where the "
-                "method is Monte Carlo.",
-                coverage=100 * asked.coverage,
-            ),
-        ),
-    )
+    note = say("Intervals are for a coverage probability of {coverage:g} %; the shortest one where the method is Monte Carlo.",
+               coverage=100 * asked.coverage)  # fmt: skip
+    summary = Table(say("Results"), _columns(SUMMARY), tuple(summary_rows(evaluation)), (note,))
     expressions = Facts(tuple(
-        (Verbatim(output), say("{output} = {text}", output=Verbatim(output), text=Verbatim(text)))
-        for output, text in _expressions(file).items()
+        (Verbatim(output), say("{output} = {text}", output=Verbatim(output), text=Verbatim(expression.text)))
+        for output, expression in file.expressions.items()
     ))  # fmt: skip
     described = Facts(tuple((foreign(what), foreign(text)) for what, text in file.descriptions.items()))
     model: tuple[Block, ...] = tuple(facts for facts in (expressions, described) if facts.rows)
@@ -48,40 +39,28 @@ def budget_document(file: ModelFile | ReadyBudget, evaluation: Evaluation, name:
         title=say("Uncertainty budget"),
         number=Verbatim(file.title),
         subject=say("Evaluated {how} from {name}", how=file.how, name=Verbatim(name)),
-        issuer=(),
         particulars=(Facts(((say("File"), Verbatim(name)), (say("SHA-256"), Verbatim(file.sha256)))),),
-        warnings=(),
         sections=tuple(sections),
-        statements=(),
-        signatures=(),
         attachments=(Verbatim(name), Verbatim("results.json")),
         produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=asked.seed),
         end=say("End of budget"),
     )
 
 
-def _expressions(file: ModelFile | ReadyBudget) -> dict[str, str]:
-    return {output: expression.text for output, expression in file.expressions.items()}
-
-
 def _budget(evaluation: Evaluation, output: str, stated: Stated) -> tuple[Block, ...]:
-    budget = stated.budget
-    blocks: list[Block] = [Paragraph(_sentence(stated.reason), tone="note")]
+    budget, reason, name = stated.budget, stated.reason, Verbatim(output)
+    sentence = say("{reason:capital}.", reason=reason)
+    if reason.endswith("."):
+        sentence = say("{reason:capital}", reason=reason)
+    blocks: list[Block] = [Paragraph(sentence, tone="note")]
     if budget.statement:
         blocks.append(Paragraph(budget.statement, tone="note"))
-    blocks += budget_blocks(Verbatim(output), budget)
+    blocks += budget_blocks(name, budget)
     rows = tuple(comparison_rows(evaluation, output))
     if len(rows) > 1:
-        blocks.append(
-            Table(
-                say("The methods beside each other for {output}", output=Verbatim(output)), _columns(COMPARISON), rows
-            )
-        )
+        title = say("The methods beside each other for {output}", output=name)
+        blocks.append(Table(title, _columns(COMPARISON), rows))
     return (*blocks, Paragraph(statement(evaluation, output)))
-
-
-def _sentence(reason: Text) -> Text:
-    return say("{reason:capital}", reason=reason) if reason.endswith(".") else say("{reason:capital}.", reason=reason)
 
 
 def budget_blocks(measurand: Text, budget: Budget) -> list[Block]:
@@ -91,13 +70,9 @@ def budget_blocks(measurand: Text, budget: Budget) -> list[Block]:
     if len(shares) < 2:
         return [table]
     told = commas(say("{name} {share:.0f} %", name=name, share=100 * share) for name, share in shares)
-    picture = budget_bars(
-        [name for name, _ in shares],
-        [share for _, share in shares],
-        caption=say("Share of each contribution in the variance of {measurand}.", measurand=measurand),
-        alternative=say("Shares: {shares}.", shares=told),
-    )
-    return [table, picture]
+    caption = say("Share of each contribution in the variance of {measurand}.", measurand=measurand)
+    names, parts = zip(*shares, strict=True)
+    return [table, budget_bars(names, parts, caption=caption, alternative=say("Shares: {shares}.", shares=told))]
 
 
 def _columns(headings: tuple[Text, ...]) -> tuple[Column, ...]:

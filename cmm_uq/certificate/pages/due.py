@@ -8,36 +8,24 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
-from cmm_uq.certificate.document import Block, Column, Document, Overview, Paragraph, Section, Standing, Table
-from cmm_uq.laboratory.due.due import DueItem, State
+from cmm_uq.certificate.document import Column, Document, Overview, Paragraph, Section, Standing, Table, text_columns
+from cmm_uq.laboratory.due.due import Due, State
 
 STATE_WORDS: Mapping[State, Text] = {
     "overdue": say("overdue"), "due": say("due soon"), "later": say("later"), "unknown": say("no date"),
 }  # fmt: skip
 
 
-def due_document(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) -> Document:
-    """The page of what is due.
-
-    ``items``: by day; ``on, within``: the day asked about, and how far ahead something is due soon.
-    """
-    machines = [one for one in items if one.item == "machine"]
-    artefacts = [one for one in items if one.item == "artefact"]
+def due_document(items: Sequence[Due], on: dt.date, within: dt.timedelta) -> Document:
+    """The page of what is due, by day; within ``within`` something is due soon."""
+    each = [(say("Machines"), [one for one in items if one.item == "machine"]),
+            (say("Artefacts"), [one for one in items if one.item == "artefact"])]  # fmt: skip
+    sections = tuple(Section(title, (_table(rows, on, within, title),)) for title, rows in each if rows)
     return Document(
         title=say("What is due for calibration"),
         number=day(on),
         subject=say("on {on}, and within {days} days", on=day(on), days=within.days),
-        issuer=(),
-        particulars=(),
-        warnings=(),
-        sections=tuple(
-            Section(title, _table(rows, on, within, title))
-            for title, rows in ((say("Machines"), machines), (say("Artefacts"), artefacts))
-            if rows
-        )
-        or (Section(say("Machines"), (Paragraph(say("Nothing is due.")),)),),
-        statements=(),
-        signatures=(),
+        sections=sections or (Section(say("Machines"), (Paragraph(say("Nothing is due.")),)),),
         attachments=(Verbatim("due.json"),),
         produced_by=say("cmm-uq {version}", version=Verbatim(__version__)),
         end=say("End of list"),
@@ -61,34 +49,20 @@ def counts(items: Iterable[DueItem], on: dt.date, within: dt.timedelta) -> tuple
 
 def _overview(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) -> Overview:
     verdict, standing = counts(items, on, within)
-    blocked = sum(one.blocked is not None for one in items)
-    count = plural(blocked, one=say("one machine"), many=say("{count} machines", count=blocked))
-    rows: list[tuple[Text, Text]] = [(say("Looked at"), _looked_at(items))]
+    found, blocked = Counter(one.item for one in items), sum(one.blocked is not None for one in items)
+    machines, artefacts, out_of_date = (
+        plural(found["machine"], one=say("one machine"), many=say("{count} machines", count=found["machine"])),
+        plural(found["artefact"], one=say("one artefact"), many=say("{count} artefacts", count=found["artefact"])),
+        plural(blocked, one=say("one machine"), many=say("{count} machines", count=blocked)),
+    )
+    looked_at = say("{machines} and {artefacts}", machines=machines, artefacts=artefacts)
+    rows: list[tuple[Text, Text]] = [(say("Looked at"), looked_at)]
     if blocked:
-        rows.append((say("Artefact out of date"), count))
+        rows.append((say("Artefact out of date"), out_of_date))
     return Overview(verdict, standing, tuple(rows))
 
 
-def _looked_at(items: Sequence[DueItem]) -> Text:
-    found = Counter(one.item for one in items)
-    machines, artefacts = found["machine"], found["artefact"]
-    return say(
-        "{machines} and {artefacts}",
-        machines=plural(machines, one=say("one machine"), many=say("{count} machines", count=machines)),
-        artefacts=plural(artefacts, one=say("one artefact"), many=say("{count} artefacts", count=artefacts)),
-    )
-
-
-def _table(rows: Sequence[DueItem], on: dt.date, within: dt.timedelta, title: Text) -> tuple[Block, ...]:
-    heads = (
-        say("Due"),
-        say("State"),
-        say("Serial number"),
-        say("Name"),
-        say("Place"),
-        say("Last calibrated"),
-        say("Why"),
-    )
+def _table(rows: Sequence[Due], on: dt.date, within: dt.timedelta, title: Text) -> Table:
     cells = tuple(
         (
             DASH if one.due is None else day(one.due), STATE_WORDS[one.state(on, within)], Verbatim(one.serial),
@@ -97,9 +71,11 @@ def _table(rows: Sequence[DueItem], on: dt.date, within: dt.timedelta, title: Te
         )
         for one in rows
     )  # fmt: skip
-    whole = (True, False, False, False, False, True, False)  # dates are not broken at their hyphens
-    columns = tuple(Column(head, numeric=kept) for head, kept in zip(heads, whole, strict=True))
-    return (Table(title, columns, cells),)
+    columns = (  # dates are not broken at their hyphens
+        Column(say("Due")), *text_columns(say("State"), say("Serial number"), say("Name"), say("Place")),
+        Column(say("Last calibrated")), *text_columns(say("Why")),
+    )  # fmt: skip
+    return Table(title, columns, cells)
 
 
 def reason(one: DueItem) -> Text:
@@ -109,13 +85,12 @@ def reason(one: DueItem) -> Text:
     return sentences((told, *one.remarks))
 
 
-def due_row(one: DueItem, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:
-    date = DASH if one.due is None else day(one.due)
-    left = NOTHING if one.due is None else _left((one.due - on).days)
-    what = say("machine {serial}", serial=Verbatim(one.serial)) if one.item == "machine" else (
-        say("artefact {serial}", serial=Verbatim(one.serial)))  # fmt: skip
+def due_row(one: Due, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:
+    date: Text = DASH
+    left: Text = NOTHING
+    if one.due is not None:
+        date, days = day(one.due), (one.due - on).days
+        left = say("in {days} d", days=number(days)) if days >= 0 else say("{days} d ago", days=number(-days))
+    serial = Verbatim(one.serial)
+    what = say("machine {serial}", serial=serial) if one.item == "machine" else say("artefact {serial}", serial=serial)
     return date, STATE_WORDS[one.state(on, within)], left, what, reason(one)
-
-
-def _left(days: int) -> Text:
-    return say("in {days} d", days=number(days)) if days >= 0 else say("{days} d ago", days=number(-days))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime as dt
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,7 +10,17 @@ from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, number, plural, say
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import unit_as_written
-from cmm_uq.certificate.document import Block, Column, Document, Paragraph, Plot, Section, Table
+from cmm_uq.certificate.document import (
+    Block,
+    Column,
+    Document,
+    Paragraph,
+    Plot,
+    Section,
+    Table,
+    figure_columns,
+    text_columns,
+)
 from cmm_uq.certificate.pages.fleet_summary import (
     called,
     counted,
@@ -25,25 +34,20 @@ from cmm_uq.certificate.pages.fleet_summary import (
     signed_rate,
     usual_rate,
 )
-from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, house_style, new_figure
+from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, picture, strokes
 from cmm_uq.laboratory.due.drift import PARTS
-from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetValue, HyperParameter, UsualRate
+from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, Usual
+from cmm_uq.laboratory.due.fleet_found import FleetFound, OfValue
 
 
 def fleet_plot(
     rows: Sequence[UsualRate], names: Sequence[Text], *, axis: Text, caption: Text, alternative: Text
 ) -> Plot:
     rate, low, high = (np.array([getattr(row, name) for row in rows]) for name in ("rate", "lower", "upper"))
-    at = np.arange(len(rows), dtype=np.float64)
-    with house_style():
-        height = 14 + 5.5 * len(rows)
-        figure = new_figure(height)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height)
+    at, height = np.arange(len(rows), dtype=np.float64), 14 + 5.5 * len(rows)
+    with picture(height, left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height) as (figure, ax):
         ax.axvline(0, color=INK, lw=0.7, zorder=1)
-        gaps = np.full(len(rows), np.nan)
-        ax.plot(np.column_stack([low, high, gaps]).ravel(), np.column_stack([at, at, gaps]).ravel(), lw=1.6, color=ACCENT,
-                solid_capstyle="butt", zorder=2)  # fmt: skip
+        strokes(ax, low, high, at, at, lw=1.6, color=ACCENT, solid_capstyle="butt", zorder=2)
         dots(ax, rate, at, 4.0, ACCENT)
         ax.set_yticks(at, names)
         ax.set(xlabel=axis)
@@ -73,29 +77,22 @@ SPREADS: dict[str, Text] = {
 
 def all_values(found: FleetResult) -> Table:
     """A row a value: what is usual, and how many machines matter."""
-    until = found.in_a_year
+    until, rows = found.in_a_year, []
+    for of in found.values:
+        unlike = number(int((~of.belongs).sum())) if of.compared else say("not compared")
+        due: tuple[Text, Text] = DASH, DASH
+        if of.fleet.estimates.crossing is not None:
+            due = number(int(of.beyond.sum())), number(int(of.crosses_by(until).sum()))
+        rows.append((called(of), number(len(of.members)), usual_rate(of), unlike, *due))
     columns = (
-        Column(say("Value"), numeric=False), Column(say("Machines")), Column(say("Average drift, U (95 %)"), numeric=False),
-        Column(say("Unlike the fleet")), Column(say("Beyond the limit")), Column(say("Beyond within a year")),
-    )  # fmt: skip
-    rows = tuple(
-        (
-            called(of), number(len(of.members)), usual_rate(of),
-            number(int((~of.belongs).sum())) if of.compared else say("not compared"), *_due(of, until),
-        )
-        for of in found.values
+        *text_columns(say("Value")), Column(say("Machines")), *text_columns(say("Average drift, U (95 %)")),
+        *figure_columns(say("Unlike the fleet"), say("Beyond the limit"), say("Beyond within a year")),
     )  # fmt: skip
     note = say(
         "Beyond: at a machine's last certificate, and by {day}, a year after the newest of all, each with a probability of "
         "50 % or more.", day=date_of(until),
     )  # fmt: skip
-    return Table(say("What is usual, and how many machines matter"), columns, rows, (note,))
-
-
-def _due(of: FleetValue, until: float) -> tuple[Text, Text]:
-    if of.fleet.estimates.crossing is None:
-        return DASH, DASH
-    return number(int(of.beyond.sum())), number(int(of.crosses_by(until).sum()))
+    return Table(say("What is usual, and how many machines matter"), columns, tuple(rows), (note,))
 
 
 def groups_shown(of: FleetValue) -> tuple[UsualRate, ...]:
@@ -147,21 +144,15 @@ def outsiders(of: FleetValue) -> Block:
 def soonest(of: FleetValue) -> Table:
     """Machines beyond their limit, and those that cross it soonest; where none does, those that drift fastest."""
     N, shown = len(of.members), _soonest(of)
-    columns = (
-        *_own(of), Column(say("Limit crossed"), numeric=False), Column(say("90 % from"), numeric=False),
-        Column(say("90 % to"), numeric=False),
-    )  # fmt: skip
+    columns = (*_own(of), *text_columns(say("Limit crossed"), say("90 % from"), say("90 % to")))
     notes: list[Text] = [
         say("Rate with the fleet as prior: little history of its own is filled up from models and places like it.")
     ]
     caption: Text = say("Machines")
     if len(shown) < N:
-        crossing = np.isfinite(of.median[shown]).all()
-        caption = (
-            say("Machines beyond their limit, and those that cross it soonest")
-            if crossing
-            else say("Machines that drift fastest")
-        )
+        caption = say("Machines that drift fastest")
+        if np.isfinite(of.median[shown]).all():
+            caption = say("Machines beyond their limit, and those that cross it soonest")
         notes.append(_left_out(len(shown), N))
     return Table(caption, columns, tuple((*_own_row(of, i), *_crossed(of, i)) for i in map(int, shown)), tuple(notes))
 
@@ -183,11 +174,9 @@ def _left_out(shown: int, total: int) -> Text:
     return say("{count} of {total} machines; fleet.json and fleet.csv have all.", count=shown, total=total)
 
 
-def _own(of: FleetValue) -> tuple[Column, ...]:
-    return (
-        Column(say("Machine"), numeric=False), Column(say("Model"), numeric=False), Column(say("Place"), numeric=False),
-        Column(say("Certificates")), Column(say("Rate, U (95 %)"), per_year(of)),
-    )  # fmt: skip
+def _own(of: OfValue) -> tuple[Column, ...]:
+    rate = Column(say("Rate, U (95 %)"), per_year(of))
+    return *text_columns(say("Machine"), say("Model"), say("Place")), Column(say("Certificates")), rate
 
 
 def _own_row(of: FleetValue, i: int) -> tuple[Text, ...]:
@@ -206,49 +195,35 @@ def _crossed(of: FleetValue, i: int) -> tuple[Text, Text, Text]:
         return DASH, DASH, DASH
     if of.beyond[i]:
         return say("already"), DASH, DASH
-    one = crossing.one(i)
-    low, middle, high = (_day(one.quantile(part)) for part in PARTS)
+    days = (crossing.one(i).quantile(part) for part in PARTS)
+    low, middle, high = (say("not in 40 years") if when is None else day(when) for when in days)
     return middle, low, high
 
 
-def _day(when: dt.date | None) -> Text:
-    return say("not in 40 years") if when is None else day(when)
-
-
-def spreads_table(of: FleetValue) -> Table:
-    columns = (Column(say("Quantity"), numeric=False), Column(say("Median")), Column(say("95 % interval"), numeric=False),
-               Column(say("Unit"), numeric=False))  # fmt: skip
-    return Table(say("How machines differ"), columns, tuple(_spread(of, each) for each in of.fleet.spreads))
-
-
-def _spread(of: FleetValue, each: HyperParameter) -> tuple[Text, ...]:
-    own = unit_as_written(of.unit)
-    units = {"rate_sd": per_year(of), "model_sd": per_year(of), "place_sd": per_year(of), "steps_per_year": NOTHING}
-    return (
-        SPREADS[each.name], number(each.median, ".2g"),
-        say("{low} to {high}", low=number(each.lower, ".2g"), high=number(each.upper, ".2g")), units.get(each.name, own),
+def spreads_table(of: OfValue) -> Table:
+    yearly = {"rate_sd": per_year(of), "model_sd": per_year(of), "place_sd": per_year(of), "steps_per_year": NOTHING}
+    rows = tuple(
+        (SPREADS[each.name], number(each.median, ".2g"),
+         say("{low} to {high}", low=number(each.lower, ".2g"), high=number(each.upper, ".2g")),
+         yearly.get(each.name, unit_as_written(of.unit)))
+        for each in of.fleet.spreads
     )  # fmt: skip
+    columns = (*text_columns(say("Quantity")), Column(say("Median")), *text_columns(say("95 % interval"), say("Unit")))
+    return Table(say("How machines differ"), columns, rows)
 
 
 def fleet_document(found: FleetResult) -> Document:
     """The page of a fleet, as of its newest certificate."""
+    values = plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values)))
     return Document(
         title=say("Drift of a fleet"),
         number=date_of(found.newest),
-        subject=say(
-            "{machines}, {values}",
-            machines=counted(len(machines_of(found))),
-            values=plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values))),
-        ),
-        issuer=(),
-        particulars=(),
+        subject=say("{machines}, {values}", machines=counted(len(machines_of(found))), values=values),
         warnings=fleet_warnings(found),
         sections=(
             Section(say("All values"), (all_values(found),)),
             *(Section(called(of), _blocks(of)) for of in found.values),
         ),
-        statements=(),
-        signatures=(),
         attachments=(Verbatim("fleet.json"), Verbatim("fleet.csv")),
         produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=found.seed),
         end=say("End of page"),
@@ -256,27 +231,16 @@ def fleet_document(found: FleetResult) -> Document:
     )
 
 
-def _blocks(of: FleetValue) -> tuple[Block, ...]:
-    shown = groups_shown(of)
-    picture = fleet_plot(
+def _blocks(of: OfValue) -> tuple[Block, ...]:
+    shown, chains = groups_shown(of), of.fleet.chains
+    plot = fleet_plot(
         shown, [group_words(each) for each in shown], axis=say("Rate in {unit}, with 95 % interval", unit=per_year(of)),
         caption=say("Usual drift of models and places."),
         alternative=say("Average machine: {rate}.", rate=usual_rate(of)),
     )  # fmt: skip
-    return (
-        usual_table(of),
-        picture,
-        outsiders(of),
-        soonest(of),
-        spreads_table(of),
-        Paragraph(_sampled(of), tone="note"),
-    )
-
-
-def _sampled(of: FleetValue) -> Text:
-    chains = of.fleet.chains
-    return say(
+    sampled = say(
         "Hyper-parameters sampled by {sampler} from {machines}: R-hat at most {rhat}, at least {ess} effective samples, "
         "{steps} steps.", sampler=Verbatim(chains.sampler), machines=counted(of.fleet.learnt_from),
         rhat=number(chains.rhat_max, ".3f"), ess=number(chains.ess_min, ".0f"), steps=chains.steps,
     )  # fmt: skip
+    return usual_table(of), plot, outsiders(of), soonest(of), spreads_table(of), Paragraph(sampled, tone="note")

@@ -1,8 +1,7 @@
 """A fleet in words and as data: which machines matter, and how sure that is.
 
-A fleet for other programs: ``fleet.json``, whose ``prior`` is all that is needed to judge a further machine by it.
-
-``fleet.csv`` has its machines alone, for a spreadsheet.
+The ``prior`` of ``fleet.json`` is all that is needed to judge a further machine by it; ``fleet.csv`` has the machines alone,
+for a spreadsheet.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import csv
 import datetime as dt
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,9 +20,9 @@ from cmm_uq.base.files.csv_table import FORMULA
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, commas, day, number, plural, say, signed
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate.document import Overview, Standing
-from cmm_uq.certificate.wording import Headline as Verdict
-from cmm_uq.certificate.wording import Summary
-from cmm_uq.laboratory.due.fleet import FleetResult, FleetValue, UsualRate, seen_again
+from cmm_uq.certificate.wording import Headline, Summary
+from cmm_uq.laboratory.due.fleet import Usual
+from cmm_uq.laboratory.due.fleet_found import FleetFound, OfValue, seen_again
 
 MOST_SERIALS = 12
 """Machines in a line."""
@@ -103,15 +102,19 @@ def fleet_summary(found: FleetResult) -> Summary:
     word, standing = _verdict(found)
     outsiders = sorted(found.outsiders, key=lambda each: float(each[0].fleet.estimates.p[each[1]]))
     verdicts = tuple(
-        Verdict("DIFFERS", "open", say("machine {serial}", serial=Verbatim(of.members[i].machine)), (_differs(of, i),))
+        Headline("DIFFERS", "open", say("machine {serial}", serial=Verbatim(of.members[i].machine)), (_differs(of, i),))
         for of, i in outsiders[:MOST_VERDICTS]
     )
-    none = Verdict("ALIKE" if found.compared else "UNKNOWN", standing, word, (_compared(found),))
+    none = Headline("ALIKE" if found.compared else "UNKNOWN", standing, word, (_compared(found),))
     left = len(outsiders) - MOST_VERDICTS
     more = say("{count} more values of machines differ, less clearly: fleet.json has all", count=left)
     return Summary(
         subject=counted(len(machines_of(found))), verdicts=verdicts or (none,),
-        figures=tuple((_group(of), usual_rate(of), _counts(of, found.in_a_year)) for of in found.values),
+        figures=tuple(
+            (say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(of.fleet.usual[0])),
+             usual_rate(of), _counts(of, found.in_a_year))
+            for of in found.values
+        ),
         remarks=(*((more,) if left > 0 else ()), *_due(found)),
         details=tuple(
             (say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(each)),
@@ -126,22 +129,21 @@ def machines_of(found: FleetResult) -> set[str]:
     return {member.machine for of in found.values for member in of.members}
 
 
-def _named(of: FleetValue, which: NDArray[np.bool_]) -> Iterable[str]:
-    return (of.members[i].machine for i in np.flatnonzero(which))
+def _named(found: FleetFound, which: Callable[[OfValue], NDArray[np.bool_]]) -> set[str]:
+    return {of.members[i].machine for of in found.values for i in np.flatnonzero(which(of))}
 
 
-def _unlike(found: FleetResult) -> set[str]:
-    return {name for of in found.values for name in _named(of, ~of.belongs)}
+def _unlike(found: FleetFound) -> set[str]:
+    return _named(found, lambda of: ~of.belongs)
 
 
-def _beyond(found: FleetResult) -> set[str]:
-    return {name for of in found.values for name in _named(of, of.beyond)}
+def _beyond(found: FleetFound) -> set[str]:
+    return _named(found, lambda of: of.beyond)
 
 
 def _soon(found: FleetResult) -> set[str]:
     """That are not beyond a limit yet, and will be beyond one within a year."""
-    crossing = {name for of in found.values for name in _named(of, of.crosses_by(found.in_a_year))}
-    return crossing - _beyond(found)
+    return _named(found, lambda of: of.crosses_by(found.in_a_year)) - _beyond(found)
 
 
 def _verdict(found: FleetResult) -> tuple[Text, Standing]:
@@ -170,27 +172,18 @@ def _compared(found: FleetResult) -> Text:
 
 def _due(found: FleetResult) -> tuple[Text, ...]:
     beyond, soon = len(_beyond(found)), len(_soon(found))
-    are = plural(
-        beyond, one=say("One machine is beyond a limit"), many=say("{count} machines are beyond a limit", count=beyond)
-    )
+    many = say("{count} machines are beyond a limit", count=beyond)
+    are = plural(beyond, one=say("One machine is beyond a limit"), many=many)
     will = say("{machines:capital} will probably be beyond a limit by {day}", machines=counted(soon),
                day=date_of(found.in_a_year))  # fmt: skip
     return (*((are,) if beyond else ()), *((will,) if soon else ()))
 
 
-def _group(of: FleetValue) -> Text:
-    return say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(of.fleet.usual[0]))
-
-
-def _counts(of: FleetValue, until: float) -> Text:
+def _counts(of: OfValue, until: float) -> Text:
     unlike, beyond, soon = (int(which.sum()) for which in (~of.belongs, of.beyond, of.crosses_by(until)))
-    parts = [
-        counted(len(of.members)),
-        *([say("{count} unlike the fleet", count=unlike)] if unlike else []),
-        *([say("{count} beyond the limit", count=beyond)] if beyond else []),
-        *([say("{count} within a year", count=soon)] if soon else []),
-    ]
-    return commas(parts)
+    parts = ((unlike, say("{count} unlike the fleet", count=unlike)), (beyond, say("{count} beyond the limit", count=beyond)),
+             (soon, say("{count} within a year", count=soon)))  # fmt: skip
+    return commas((counted(len(of.members)), *(text for count, text in parts if count)))
 
 
 def _differs(of: FleetValue, i: int) -> Text:
@@ -285,19 +278,17 @@ def fleet_csv(data: Mapping[str, Any]) -> bytes:
     """
     rows = [
         {"value": of["name"], "quantity": of["quantity"], "unit": of["unit"], **one} | (one["crossing"] or {})
-        for of in data["values"]
-        for one in of["machines"]
-    ]
+        for of in data["values"] for one in of["machines"]
+    ]  # fmt: skip
     text = io.StringIO()
     columns = [*(name for name in rows[0] if name not in ("crossing", *_CROSSING)), *_CROSSING]
     writer = csv.DictWriter(text, columns, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
-    writer.writerows({name: _cell(cell) for name, cell in row.items()} for row in rows)
+    for row in rows:
+        writer.writerow({
+            name: f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell for name, cell in row.items()
+        })  # fmt: skip
     return text.getvalue().encode()
 
 
 _CROSSING = ("last", "day_5", "day_50", "day_95", "already", "within_a_year")
-
-
-def _cell(cell: Any) -> Any:
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell

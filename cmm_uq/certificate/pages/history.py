@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+from calendar import isleap
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ from cmm_uq.certificate.document import (
     Section,
     Standing,
     Table,
+    text_columns,
 )
 from cmm_uq.certificate.plots.style import (
     ACCENT,
@@ -30,18 +32,17 @@ from cmm_uq.certificate.plots.style import (
     BAND,
     INK,
     MUTED,
-    TINY,
     bars,
     dots,
     drawn,
-    house_style,
-    new_figure,
+    note,
+    picture,
 )
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.drift import HORIZON, PARTS
-from cmm_uq.laboratory.due.history import MachineHistory, ValueHistory, epochs
-from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
+from cmm_uq.laboratory.due.history import MachineHistory, ValueHistory
+from cmm_uq.laboratory.due.trend import epochs
 from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded
 
 if TYPE_CHECKING:
@@ -68,8 +69,9 @@ def value_row(history: MachineHistory, one: ValueHistory) -> tuple[Text, ...]:
     series = one.series
     value, expanded = rounded(float(series.value[-1]), COVERAGE * float(series.u[-1]))
     limit = DASH if series.limit is None else limit_in_full(series.limit)
+    trend = (DASH, DASH) if one.line is None else rounded(one.line.slope, COVERAGE * one.line.u_slope)
     return (
-        Verbatim(series.quantity), value, expanded, unit_as_written(series.unit), *_change(history, one), *_trend(one), limit,
+        Verbatim(series.quantity), value, expanded, unit_as_written(series.unit), *_change(history, one), *trend, limit,
         meets(one, history.on),
     )  # fmt: skip
 
@@ -81,12 +83,6 @@ def _change(history: MachineHistory, one: ValueHistory) -> tuple[Text, Text]:
     if one.adjusted:
         return say("{value} adjusted", value=value), expanded
     return (say("{value} significant", value=value) if history.significant(one) else value), expanded
-
-
-def _trend(one: ValueHistory) -> tuple[Text, Text]:
-    if one.line is None:
-        return DASH, DASH
-    return rounded(one.line.slope, COVERAGE * one.line.u_slope)
 
 
 def meets(one: ValueHistory, on: dt.date) -> Text:
@@ -213,14 +209,11 @@ _AHEAD = 2.0
 
 
 def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:
-    series = one.series
-    x, y, U = _years(series.day), series.value, COVERAGE * series.u
     from matplotlib.ticker import MaxNLocator
 
-    with house_style():
-        figure = new_figure(52)
-        ax = figure.subplots()
-        figure.subplots_adjust(left=0.09, right=0.985, bottom=0.16, top=0.88)
+    series = one.series
+    x, y, U = _years(series.day), series.value, COVERAGE * series.u
+    with picture(52, left=0.09, right=0.985, bottom=0.16, top=0.88) as (figure, ax):
         ax.axhline(0, color=INK, lw=0.5, zorder=1)
         right = _line(ax, one, float(x[-1]))
         for rows in epochs(series):
@@ -230,30 +223,22 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:
         dots(ax, x[~check], y[~check], 3.6, ACCENT, zorder=3)
         dots(ax, x[check], y[check], 3.6, ACCENT, hollow=True, zorder=3)
         left = float(x[0]) - 0.04 * (right - float(x[0])) - 0.05
-        adjusted = _adjustments(ax, series.adjusted_since, left)
+        since = series.adjusted_since
+        adjusted = [when for when in _years(np.unique(since[since > 0])) if when > left]
+        for when in adjusted:
+            ax.axvline(when, color=MUTED, lw=0.9, ls=(0, (1, 2)), zorder=1)
         _limit(ax, series.limit, float(np.abs(np.concatenate([y - U, y + U])).max()))
-        ax.set(xlabel=say("Year"), ylabel=_label(one), xlim=(left, right))
+        ax.set(xlabel=say("Year"), ylabel=Verbatim(series.unit), xlim=(left, right))
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.ticklabel_format(axis="x", useOffset=False, style="plain")
         ax.grid(axis="y")
-        figure.text(0.985, 0.975, _legend(one, adjusted=adjusted, checked=bool(check.any())), ha="right", va="top",
-                    fontsize=TINY, color=MUTED)  # fmt: skip
-        name = Verbatim(series.quantity)
-        caption = say("{name} over time.", name=name)
-        return drawn(figure, caption, _told(history, one))
+        note(figure, _legend(one, adjusted=bool(adjusted), checked=bool(check.any())))
+        return drawn(figure, say("{name} over time.", name=Verbatim(series.quantity)), _told(history, one))
 
 
 def _years(day: Floats | Ints) -> Floats:
     dates = [dt.date.fromordinal(int(one)) for one in day]
-    return np.array([one.year + (one.timetuple().tm_yday - 1) / (365 + _leap(one.year)) for one in dates])
-
-
-def _leap(year: int) -> int:
-    return int(year % 4 == 0 and (year % 100 != 0 or year % 400 == 0))
-
-
-def _label(one: ValueHistory) -> Text:
-    return Verbatim(one.series.unit)
+    return np.array([one.year + (one.timetuple().tm_yday - 1) / (365 + isleap(one.year)) for one in dates])
 
 
 def _line(ax: Axes, one: ValueHistory, last: float) -> float:
@@ -271,14 +256,6 @@ def _line(ax: Axes, one: ValueHistory, last: float) -> float:
     ax.fill_between(x, value - COVERAGE * u, value + COVERAGE * u, color=BAND, lw=0, zorder=0)
     ax.plot(x, value, color=ACCENT, lw=1.0, zorder=2)
     return float(x[-1])
-
-
-def _adjustments(ax: Axes, since: Ints, left: float) -> bool:
-    days = np.unique(since[since > 0])
-    shown = [one for one in _years(days) if one > left]
-    for one in shown:
-        ax.axvline(one, color=MUTED, lw=0.9, ls=(0, (1, 2)), zorder=1)
-    return bool(shown)
 
 
 def _limit(ax: Axes, limit: float | None, largest: float) -> None:
@@ -303,43 +280,33 @@ def _legend(one: ValueHistory, *, adjusted: bool, checked: bool) -> Text:
     return semicolons([part for part in parts if part])
 
 
-def _stated(series: Series, place: int) -> Text:
-    return rounded(float(series.value[place]), COVERAGE * float(series.u[place]))[0]
-
-
 def _told(history: MachineHistory, one: ValueHistory) -> Text:
     series = one.series
+    first, last = (rounded(float(series.value[i]), COVERAGE * float(series.u[i]))[0] for i in (0, -1))
     what = say(
         "{name}: {count} recordings, from {first} to {last} {unit}", name=Verbatim(series.quantity), count=len(series.day),
-        first=_stated(series, 0), last=_stated(series, -1), unit=Verbatim(series.unit),
+        first=first, last=last, unit=Verbatim(series.unit),
     )  # fmt: skip
     if series.limit is None:
         return say("{what}.", what=what)
-    return say(
-        "{what}; limit {limit}: {meets}.", what=what, limit=limit_in_full(series.limit), meets=meets(one, history.on)
-    )
+    limit = limit_in_full(series.limit)
+    return say("{what}; limit {limit}: {meets}.", what=what, limit=limit, meets=meets(one, history.on))
 
 
 def history_document(history: MachineHistory) -> Document:
     machine = history.machine
+    sections = (
+        Section(say("Values and trends"), _values(history)),
+        Section(say("Over time"), tuple(trend_plot(history, one) for one in history.values)),
+        Section(say("Certificates and interim checks"), _certificates(history)),
+    )
     return Document(
         title=say("History of a machine"),
         number=Verbatim(machine.serial),
         subject=say("{name}, up to {on}", name=Verbatim(machine.name), on=day(history.on)),
-        issuer=(),
         particulars=(Facts(_particulars(history)),),
         warnings=history.remarks,
-        sections=tuple(
-            section
-            for section in (
-                Section(say("Values and trends"), _values(history)),
-                Section(say("Over time"), tuple(trend_plot(history, one) for one in history.values)),
-                Section(say("Certificates and interim checks"), _certificates(history)),
-            )
-            if section.blocks
-        ),
-        statements=(),
-        signatures=(),
+        sections=tuple(section for section in sections if section.blocks),
         attachments=(Verbatim("history.json"),),
         produced_by=say("cmm-uq {version}", version=Verbatim(__version__)),
         end=say("End of history"),
@@ -416,22 +383,14 @@ def _values(history: MachineHistory) -> tuple[Block, ...]:
 def _certificates(history: MachineHistory) -> tuple[Block, ...]:
     if not history.certificates:
         return ()
-    heads = (
-        say("Date"),
-        say("Number"),
-        say("What"),
-        say("State"),
-        say("Artefact"),
-        say("Decision"),
-        say("Adjusted before"),
-    )
-    rows = tuple(_row(one) for one in reversed(history.certificates))
-    return (Table(say("Newest first"), tuple(Column(head, numeric=False) for head in heads), rows),)
-
-
-def _row(one: RecordedCertificate) -> tuple[Text, ...]:
-    return (
-        day(one.day), Verbatim(one.number), say("interim check") if one.interim else say("certificate"),
-        STATE_WORDS.get(one.state, Verbatim(one.state)), Verbatim(one.artefact) if one.artefact else DASH,
-        OUTCOME_WORDS.get(one.decision, DASH), DASH if one.adjusted_since is None else day(one.adjusted_since),
+    columns = text_columns(say("Date"), say("Number"), say("What"), say("State"), say("Artefact"), say("Decision"),
+                           say("Adjusted before"))  # fmt: skip
+    rows = tuple(
+        (
+            day(one.day), Verbatim(one.number), say("interim check") if one.interim else say("certificate"),
+            STATE_WORDS.get(one.state, Verbatim(one.state)), Verbatim(one.artefact) if one.artefact else DASH,
+            OUTCOME_WORDS.get(one.decision, DASH), DASH if one.adjusted_since is None else day(one.adjusted_since),
+        )
+        for one in reversed(history.certificates)
     )  # fmt: skip
+    return (Table(say("Newest first"), columns, rows),)
