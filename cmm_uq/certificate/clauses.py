@@ -1,12 +1,7 @@
 """What ISO/IEC 17025:2017, 7.8 asks of a certificate, and what a job does not state of it.
 
-ISO/IEC 17025:2017, 7.8, clause by clause: what each asks of a calibration certificate, and what of it the job states.
-
 One table for the warning of a certificate, the mark of a draft, ``results.json`` and ``cmm-uq check``. A certificate is a
 draft until nothing that the standard asks of every certificate is missing; what it asks for where there is any makes none.
-
-What ISO/IEC 17025:2017, 7.8 asks for and the job does not state, with the key that would mend it; dates out of their order.
-
 A recording that nobody measured has no certificate, so nothing is asked of it.
 """
 
@@ -76,14 +71,25 @@ class Requirement:
 
 def clauses(job: Job) -> tuple[Requirement, ...]:
     """Every clause of 7.8 that speaks of calibration certificates, in the standard's order."""
-    facts = job.facts
+    facts, machine = job.facts, job.facts.machine
+    named = (machine.manufacturer, machine.model, machine.name)
+    item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
+    serial = asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial")
     return (
-        *_reporting(facts),
-        *_of_every_report(facts),
-        *_of_a_calibration(job),
-        *_statements(facts),
-        *_replacing(facts),
-    )
+        _done("7.8.1.1", "results reviewed and authorised before release", "[laboratory] four_eyes"),
+        asked("7.8.1.2", "results and all that their interpretation needs, in a report", facts.job.number or facts.job.id),
+        _done("7.8.1.3", "a simplified report only as agreed with the customer"),
+        *of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial),
+        *_of_a_calibration(job), *_statements(facts), *_replacing(facts),
+    )  # fmt: skip
+
+
+def _traceable(job: Job) -> tuple[Requirement, ...]:
+    """How the results are traceable; where that is not shown, all that each certificate which they rest on lacks."""
+    chain = claimed(job)
+    if chain.claim != "not shown":
+        return (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
+    return tuple(Requirement("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
 
 
 def missing(job: Job) -> tuple[Requirement, ...]:
@@ -133,22 +139,6 @@ def _plain(stated: object) -> str:
 
 def _lines(parts: Iterable[str]) -> str:
     return ", ".join(line for part in parts for line in part.splitlines() if line)
-
-
-def _reporting(facts: JobFile) -> tuple[Requirement, ...]:
-    return (
-        _done("7.8.1.1", "results reviewed and authorised before release", "[laboratory] four_eyes"),
-        asked("7.8.1.2", "results and all that their interpretation needs, in a report", _number(facts)),
-        _done("7.8.1.3", "a simplified report only as agreed with the customer"),
-    )
-
-
-def _of_every_report(facts: JobFile) -> tuple[Requirement, ...]:
-    machine = facts.machine
-    named = (machine.manufacturer, machine.model, machine.name)
-    item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
-    serial = asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial")
-    return of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial)
 
 
 def of_every_report(
@@ -203,14 +193,6 @@ def _of_a_calibration(of: Job) -> tuple[Requirement, ...]:
     )  # fmt: skip
 
 
-def _traceable(job: Job) -> tuple[Requirement, ...]:
-    """How the results are traceable; where that is not shown, all that each certificate which they rest on lacks."""
-    chain = claimed(job)
-    if chain.claim != "not shown":
-        return (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
-    return tuple(Requirement("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
-
-
 def _statements(facts: JobFile) -> tuple[Requirement, ...]:
     decided = bool(facts.conformity or facts.model.tolerances)
     named = (
@@ -247,10 +229,6 @@ def _standards(facts: JobFile) -> str:
     return "; ".join(dict.fromkeys((*(wish.standard for wish in facts.conformity), *held)))
 
 
-def _number(facts: JobFile) -> str:
-    return facts.job.number or facts.job.id
-
-
 _INTERIM = say(
     "An interim check{key}: no calibration certificate, whatever the title says.", key=at_key("[job] interim")
 )
@@ -267,7 +245,11 @@ def formal_warnings(job: Job) -> tuple[Text, ...]:
 
 def contradictions(job: Job) -> tuple[Text, ...]:
     """Dates out of their order, and an artefact that was certified on the machine which it tests."""
-    return (*_circular(job.facts), *dates_out_of_order(job))
+    circular = say(
+        "The artefact was certified on the machine that it now tests{key}: errors that both "
+        "measurements have in common are not seen here.", key=at_key("[artefact.certificate] machine"),
+    )  # fmt: skip
+    return (*((circular,) if certified_on_this_machine(job.facts) else ()), *dates_out_of_order(job))
 
 
 def not_stated(lacking: Iterable[Requirement]) -> list[Text]:
@@ -279,15 +261,3 @@ def not_stated(lacking: Iterable[Requirement]) -> list[Text]:
     if not wanted:
         return []
     return [say("Not complete by ISO/IEC 17025:2017; the job does not state: {missing}.", missing=semicolons(wanted))]
-
-
-def _circular(facts: JobFile) -> list[Text]:
-    if not certified_on_this_machine(facts):
-        return []
-    return [
-        say(
-            "The artefact was certified on the machine that it now tests{key}: errors that both "
-            "measurements have in common are not seen here.",
-            key=at_key("[artefact.certificate] machine"),
-        )
-    ]

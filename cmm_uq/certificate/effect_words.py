@@ -49,8 +49,9 @@ def size_of(effect: Effect | None, parameters: Mapping[str, Quantity], *, factor
         for name, quantity in parameters.items()
     }
     if effect is not None:
-        meaning = effect.meaning({name: _amount(quantity, factors) for name, quantity in quantities.items()})
-        if meaning:
+        positive = {name: q.times(-1.0, q.unit) if q.value < 0 else q for name, q in quantities.items()}
+        amounts = {name: Amount(_figures(q, factors), quantities[name].value < 0) for name, q in positive.items()}
+        if meaning := effect.meaning(amounts):
             return meaning
     sizes = {name: _figures(quantity, factors) for name, quantity in quantities.items()}
     if len(sizes) == 1:
@@ -59,17 +60,8 @@ def size_of(effect: Effect | None, parameters: Mapping[str, Quantity], *, factor
 
 
 def _what(effect: Effect | None, name: str) -> Text:
-    found = (
-        ()
-        if effect is None
-        else (p.what for p in (*effect.reported, *effect.coefficients) if p.name == name and p.what)
-    )
-    return next(iter(found), Verbatim(name))
-
-
-def _amount(quantity: Quantity, factors: bool) -> Amount:
-    negative = quantity.value < 0
-    return Amount(_figures(quantity.times(-1.0, quantity.unit) if negative else quantity, factors), negative)
+    parameters = () if effect is None else (*effect.reported, *effect.coefficients)
+    return next((p.what for p in parameters if p.name == name and p.what), Verbatim(name))
 
 
 def _figures(quantity: Quantity, factors: bool) -> Text:

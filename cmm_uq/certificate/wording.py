@@ -108,9 +108,8 @@ def title_of(key: tuple[str, str], result: Result) -> Text:
 
 def title_of_parameter(effect: Effect, name: str) -> Text:
     """A parameter of an effect in words: the effect alone where it has no other."""
-    return (
-        effect.title if len(effect.reported) == 1 else say("{title}, {name}", title=effect.title, name=Verbatim(name))
-    )
+    alone = len(effect.reported) == 1
+    return effect.title if alone else say("{title}, {name}", title=effect.title, name=Verbatim(name))
 
 
 def refusal(error: CmmUqError) -> Text:
@@ -133,9 +132,8 @@ def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, 
 
     ``what``: deviates, with a verb: ``12 lengths: as recorded they deviate``; ``before_um, after_um``: deviations, µm.
     """
-    low, high, low_after, high_after = (
-        number(float(end), spec) for end in (before_um.min(), before_um.max(), after_um.min(), after_um.max())
-    )
+    ends = (before_um.min(), before_um.max(), after_um.min(), after_um.max())
+    low, high, low_after, high_after = (number(float(end), spec) for end in ends)
     if reference:
         return say(
             "{what} by {low} to {high} µm {reference}; after the fitted model {low_after} to {high_after} µm remain.",

@@ -163,9 +163,6 @@ def gain_plot(
     ratio = pairs / np.where(largest > 0, largest, 1.0)[:, None]
     shown = np.where(np.isfinite(ratio), ratio, 1.3)
     height, never = 20.0 + 5.2 * len(labels), say("not at all")
-    # the right end of the axis leaves room for the text of its last tick, at 1.3
-    axis, beside = 0.62 * WIDTH_MM, width_mm(lettered(never), SMALL) / 2 - 0.02 * WIDTH_MM
-    edge = max(1.38, 1.3 * axis / (axis - beside))
     with picture(height, left=0.36, right=0.98, bottom=11 / height, top=1 - 8 / height) as (figure, ax):
         y = np.arange(len(labels), dtype=np.float64)[::-1]
         for i, row in enumerate(y):
@@ -173,7 +170,7 @@ def gain_plot(
         dots(ax, shown[:, 0], y, 5.0, MUTED, hollow=True)
         dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
         ax.set_yticks(y, labels)
-        ax.set(xlim=(0.0, edge), ylim=(-0.7, len(labels) - 0.3))
+        ax.set(xlim=(0.0, _edge(never)), ylim=(-0.7, len(labels) - 0.3))
         ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", never])
         ax.grid(axis="x")
         ax.set_xlabel(say("{quantity}, over the larger of the two", quantity=quantity))
@@ -195,6 +192,12 @@ def _title(title: Text) -> list[Text]:
 def _size(title: Text) -> float:
     """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
     return SMALL * min(1.0, _ROOM_MM / width_mm(lettered(title), SMALL, "bold"))
+
+
+def _edge(last: Text) -> float:
+    """Right end of the axis, so that the text of its last tick, at 1.3, has room."""
+    axis, beside = 0.62 * WIDTH_MM, width_mm(lettered(last), SMALL) / 2 - 0.02 * WIDTH_MM
+    return max(1.38, 1.3 * axis / (axis - beside))
 
 
 def _figure(value: float | None) -> Text:

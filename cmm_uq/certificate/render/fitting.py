@@ -1,9 +1,7 @@
 """What is moved or shortened so that the first page holds all that is decided.
 
-What decides on one page: of long remarks and warnings it carries the beginnings, the whole texts stand behind it.
-
-Heights are reckoned, in mm, from letters, so that both views say the same on the same page; the PDF then makes the picture as
-large as the page has room for.
+Of long remarks and warnings the page carries the beginnings, the whole texts stand behind it. Heights are reckoned, in mm,
+from letters, so that both views say the same on the same page; the PDF then makes the picture as large as there is room for.
 """
 
 from __future__ import annotations
@@ -71,15 +69,13 @@ def _remarks_behind(document: Document) -> Document:
     long = [row for facts in document.particulars for row in facts.rows if _may_continue(row)]
     if not long:
         return document
-    shown = tuple(
-        Facts(
-            tuple(
-                (name, _begun(document, text)) if _may_continue((name, text)) else (name, text)
-                for name, text in facts.rows
-            )
-        )
-        for facts in document.particulars
-    )
+
+    def begun(row: tuple[Text, Text]) -> tuple[Text, Text]:
+        if not _may_continue(row):
+            return row
+        return row[0], sentences((_beginning(row[1]), _said(document, _IN_FULL)))
+
+    shown = tuple(Facts(tuple(map(begun, facts.rows))) for facts in document.particulars)
     behind = Section(_said(document, WORDS["particulars"]), (Facts(tuple(long)),))
     *others, annex = _around(document)
     return replace(document, particulars=shown, sections=(*chain(*others), behind, *annex))
@@ -115,10 +111,6 @@ def _pattern(text: Text) -> str:
     return str.__str__(text)
 
 
-def _begun(document: Document, text: Text) -> Text:
-    return sentences((_beginning(text), _said(document, _IN_FULL)))
-
-
 def _beginning(text: Text) -> Text:
     whole = str.__str__(text)
     if letters(whole) <= _LONG:
@@ -151,20 +143,16 @@ def _parts(document: Document) -> Iterator[float]:
     yield 17 + head + (8 if head else 0) + 4.1 * _lines(document.subject, 170, 10)
     yield _MEASURED * sum(_middle(document))
     if document.statements or document.signatures:
-        yield (
-            9
-            + sum(3 + 3.7 * _lines(text, 170, 9) for text in document.statements)
-            + 23 * -(-len(document.signatures) // 3)
-        )
+        said = sum(3 + 3.7 * _lines(text, 170, 9) for text in document.statements)
+        yield 9 + said + 23 * -(-len(document.signatures) // 3)
 
 
 def _middle(document: Document) -> Iterator[float]:
     narrow, wide = ((31, 46) if document.language == "en" else (38, 46)), (31, 132)
     yield max((_rows(facts, *narrow) for facts in document.particulars[:2]), default=0) + 6
     if document.overview:
-        yield 24 + sum(
-            1.1 + 4.1 * max(_lines(name, 50, 10.5), _lines(text, 106, 10)) for name, text in document.overview.rows
-        )
+        rows = [max(_lines(name, 50, 10.5), _lines(text, 106, 10)) for name, text in document.overview.rows]
+        yield 24 + sum(1.1 + 4.1 * lines for lines in rows)
     yield from (13.0 for section in document.sections if section.first)
     for block in _first(document):
         if isinstance(block, Plot):

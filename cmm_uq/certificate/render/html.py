@@ -1,8 +1,6 @@
 """A document as one self-contained HTML page.
 
-A document as one HTML file: opens anywhere, prints to A4, needs nothing else.
-
-What it looks like is in ``templates/document.html`` and ``templates/document.css``.
+It opens anywhere, prints to A4, needs nothing else; what it looks like is in ``templates/document.html`` and ``.css``.
 """
 
 from __future__ import annotations
@@ -28,11 +26,8 @@ def template_folder() -> Path:
     for folder in (package / "templates", package.parent / "templates"):
         if (folder / "document.html").is_file():
             return folder
-    raise CmmUqError(
-        "the templates of the certificate are missing",
-        where=str(package),
-        fix="Install cmm-uq again, from a whole wheel",
-    )
+    raise CmmUqError("the templates of the certificate are missing", where=str(package),
+                     fix="Install cmm-uq again, from a whole wheel")  # fmt: skip
 
 
 def render_html(document: Document) -> str:

@@ -1,7 +1,5 @@
 """A document as PDF/A-3a and PDF/UA-1: for the archive, for screen readers, with its files inside.
 
-A document as PDF/A-3a and PDF/UA-1: for the archive, for screen readers, with its files inside.
-
 What it looks like is in ``templates/document.typ``. The text goes to Typst as data and is never read as its markup. Only
 the fonts inside the typst wheel are used, so that the file looks the same from every machine; where they lack a
 character (Chinese, Japanese and Korean names), the machine's own fonts are asked, and what these lack too is shown as □,
@@ -22,8 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code, code_of
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Text, Verbatim, commas, say, sentences
-from cmm_uq.certificate.document import Document, view_words
-from cmm_uq.certificate.document import attachment_title as described
+from cmm_uq.certificate.document import Document, attachment_title, view_words
 from cmm_uq.certificate.plots.style import COLOURS, JAPANESE, fonts_of
 from cmm_uq.certificate.render.fitting import SMALLEST, fitted
 from cmm_uq.certificate.render.html import template_folder
@@ -50,7 +47,8 @@ _TYPES = {
 def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
     """The document as PDF, with files embedded.
 
-    ``attachments``: by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the.
+    ``attachments``: by name, what is embedded byte for byte: ``.json``, ``.npz`` and ``.xml`` files as *data* of the
+    document, others as its *source* (the relationships of ISO 19005-3).
     """
     language = code_of(document.language)
     content = {
@@ -89,7 +87,7 @@ def _attachment(name: str, data: bytes, language: Code) -> dict[str, Any]:
         "data": body,
         "relationship": "data" if outcome else "source",
         "type": _TYPES.get(suffix, "application/octet-stream"),
-        "description": str.__str__(said_in(described(name, outcome=outcome), language)),
+        "description": str.__str__(said_in(attachment_title(name, outcome=outcome), language)),
     }
 
 
@@ -97,22 +95,16 @@ def _with_fallback(content: dict[str, Any], folders: list[str], compiled: Callab
     """Compile with the embedded fonts; then with the machine's too; then without the characters that both lack."""
     from typst import TypstError
 
-    made = compiled or _compile
-    try:
-        return made(content, folders, system_fonts=False)
-    except TypstError as error:
-        if not _missing(error):
-            raise _refused(error) from error
-    try:
-        return made(content, folders, system_fonts=True)
-    except TypstError as error:
-        missing = _missing(error)
-        if not missing:
-            raise _refused(error) from error
-    try:
-        return made(_without(content, missing), folders, system_fonts=True)
-    except TypstError as error:
-        raise _refused(error) from error
+    make, missing = compiled or _compile, list[str]()
+    for system_fonts in (False, True, True):
+        try:
+            return make(_without(content, missing) if missing else content, folders, system_fonts=system_fonts)
+        except TypstError as error:
+            lacking = _missing(error)
+            if not lacking or missing:
+                raise _refused(error) from error
+            missing = lacking if system_fonts else []
+    raise AssertionError("unreachable")
 
 
 def _compile(

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Decided, Statement
-from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, Diagnosis, OmittedEffect
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, LeftOut
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.languages.translation import ENGLISH
@@ -18,7 +18,6 @@ from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.certificate.diagnosis.sections import costs_data, next_data, unseen_data
 from cmm_uq.certificate.origin import software
 from cmm_uq.certificate.result import Diagnosed, Result
-from cmm_uq.certificate.result import SimulatedTwin as Simulated
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import corrections, periods_data, withheld_data
 from cmm_uq.jobs.job import Job
@@ -100,9 +99,11 @@ def results(result: Result) -> dict[str, Any]:
 
 def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
     """The ``diagnosis`` part."""
-    d, changes = found.diagnosis, found.consequences
+    d, changes, simulated = found.diagnosis, found.consequences, found.simulated
     return {
-        **({} if found.simulated is None else {"simulation": _simulation(found.simulated, d)}),
+        **({} if simulated is None else {"simulation": simulated.data({
+            owner: _quantities(values) for owner, values in corrections(simulated, d.after, d.posterior).items()
+        })}),
         "verdict": d.verdict,
         "p_value": d.p_value,
         **false_alarms(d.alpha),
@@ -145,14 +146,7 @@ def false_alarms(alpha: float) -> dict[str, float]:
     return {} if alpha == FALSE_ALARMS else {"false_alarms": alpha}
 
 
-def _simulation(simulated: Simulated, diagnosis: Diagnosis) -> dict[str, Any]:
-    """What the recording was compared with, and what of it was estimated anew."""
-    found = corrections(simulated, diagnosis.after, diagnosis.posterior)
-    return simulated.data({owner: _quantities(values) for owner, values in found.items()})
-
-
-def effect_data(item: OmittedEffect, gain: Improvement) -> dict[str, Any]:
-    """One effect that was left out."""
+def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
         "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),

@@ -1,7 +1,5 @@
 """What the keys of results.json mean.
 
-What each key of a ``results.json`` of the schema ``cmm-uq/results/1`` is, in a sentence.
-
 A part in capitals stands for any name, ``[]`` for each entry of a list; what a kind adds of its own stands with the kind.
 """
 

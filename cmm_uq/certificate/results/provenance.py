@@ -1,12 +1,5 @@
 """`provenance.json`: from what a certificate was made, by what, and on what, in the words of W3C PROV (PROV-JSON).
 
-On what a certificate was computed: versions of packages, platform, and the kernels of linear algebra.
-
-These decide over the last bits of a figure and nothing else, so they stand in the provenance alone: ``results.json`` is
-the same on every machine.
-
-``provenance.json``: from what a certificate was made, by what, and on what, in the words of W3C PROV (PROV-JSON).
-
 Files are entities with their SHA-256, the recording and the report are activities, the program and the laboratory agents.
 PROV was chosen, and not RO-Crate, because it says how a result came about, which is what is asked here, and because its
 file may have any name and lie in a PDF; an RO-Crate is a folder.
@@ -193,18 +186,15 @@ def _agents(job: Behind, results: Mapping[str, Any]) -> dict[str, Record]:
 def _relations(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, dict[str, Record]]:
     entities = _entities(job, results, outputs)
     behind = [name for name in entities if name.startswith("package:") or name in (PLATFORM, _ARTEFACT)]
-    measured = (
-        [] if job.recording not in job.inputs else [_linked("entity", _file(job.recording), "activity", _RECORDING)]
-    )
+    measured = [_linked("entity", _file(name), "activity", _RECORDING) for name in job.inputs if name == job.recording]
     made = [_linked("entity", name, "activity", _REPORT) for name in (*map(_file, outputs), _CERTIFICATE)]
     agents = [_linked("activity", _REPORT, "agent", _PROGRAM)]
     if job.laboratory.name:
         agents.append(_linked("activity", _RECORDING, "agent", _LABORATORY))
     revised = _linked("generatedEntity", _CERTIFICATE, "usedEntity", _REPLACED) | {"prov:type": _name("prov:Revision")}
+    used = [_linked("activity", _REPORT, "entity", name) for name in (*map(_file, job.inputs), *behind)]
     return {
-        "used": _numbered(
-            "u", [_linked("activity", _REPORT, "entity", name) for name in (*map(_file, job.inputs), *behind)]
-        ),
+        "used": _numbered("u", used),
         "wasGeneratedBy": _numbered("g", measured + made),
         "wasAssociatedWith": _numbered("a", agents),
         "hadMember": _numbered("m", [_linked("collection", _CERTIFICATE, "entity", _file(name)) for name in outputs]),

@@ -1,7 +1,5 @@
 """Results in the Quality Information Framework (QIF 3.0).
 
-Values of tests and error factors as a document of QIF 3.0 (ISO 23952:2020), from ``results.json`` alone.
-
 Every value that a standard decides on is a characteristic with a unit of its own: its definition is the standard's
 characteristic, its nominal 0 with the limits, its measurement the value with the combined standard uncertainty. So is an error
 factor whose tolerance the job gives; QIF knows no characteristic without limits, and other factors are attributes of the
@@ -84,11 +82,8 @@ def qif(results: Reported) -> bytes:
     measurement = SubElement(sets, "MeasurementResults", {"id": str(numbered.last + 2)})
     _attributes(measurement, results, [one for one in values if one.limit is None])
     if limited:
-        _listed(
-            SubElement(measurement, "MeasuredCharacteristics"),
-            "CharacteristicMeasurements",
-            numbered.lists["Measurement"],
-        )
+        held = SubElement(measurement, "MeasuredCharacteristics")
+        _listed(held, "CharacteristicMeasurements", numbered.lists["Measurement"])
     # of anything between, an incomplete test among them, QIF can only say that it is not known
     whole = _STATUS.get(_verdicts(results).overall, "UNKNOWN")
     _text(SubElement(measurement, "InspectionStatus"), "InspectionStatusEnum", whole)

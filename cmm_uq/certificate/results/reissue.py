@@ -34,9 +34,8 @@ class ChangedFigure:
 
     @property
     def sentence(self) -> Text:
-        return say(
-            "{what}: {before} → {after}", what=self.what, before=self._shown(self.before), after=self._shown(self.after)
-        )
+        before, after = self._shown(self.before), self._shown(self.after)
+        return say("{what}: {before} → {after}", what=self.what, before=before, after=after)
 
     def _shown(self, printed: Text) -> Text:
         if not printed:
@@ -68,13 +67,11 @@ class Reissue:
         if self.compared is None:
             return NOT_COMPARED
         if not self.differences:
-            return plural(
-                self.compared,
-                one=say("Both results were compared: the one decision or figure does not differ."),
-                many=say(
-                    "Both results were compared: of {count} decisions and figures none differs.", count=self.compared
-                ),
+            one = say("Both results were compared: the one decision or figure does not differ.")
+            many = say(
+                "Both results were compared: of {count} decisions and figures none differs.", count=self.compared
             )
+            return plural(self.compared, one=one, many=many)
         named: list[Text] = [one.sentence for one in self.differences[:_NAMED]]
         if (more := len(self.differences) - _NAMED) > 0:
             named.append(say("{more} more in the table of differences", more=more))

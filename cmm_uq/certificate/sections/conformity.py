@@ -8,8 +8,7 @@ from dataclasses import replace
 from cmm_uq.analysis.conformity.statement import Decided, Statement, least_favourable
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, in_a_row, number, plural, say, sentences, signed
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.certificate.document import Block, Column, Plot, Section, Table
-from cmm_uq.certificate.document import DecisionBlock as Decision
+from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.plots.conformity import trumpet
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
@@ -27,15 +26,10 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     turned = any(line.unit != budget.unit or line.sensitivity != 1.0 for line, _ in there)
     several = len(there) > 1
     columns = (
-        Column(say("Cause"), numeric=False),
-        *(
-            (Column(say("Standard uncertainty"), numeric=False), Column(say("Sensitivity"), numeric=False))
-            if turned
-            else ()
-        ),
+        *text_columns(say("Cause"), *((say("Standard uncertainty"), say("Sensitivity")) if turned else ())),
         Column(say("Contribution"), unit("µm")),
-        *((Column(say("Share")),) if several else ()),
-        Column(say("Origin"), numeric=False),
+        *(figure_columns(say("Share")) if several else ()),
+        *text_columns(say("Origin")),
     )
     rows = tuple(
         (
@@ -83,27 +77,20 @@ def conformity_section(statements: Sequence[Statement]) -> Section:
     blocks: list[Block] = [decision_block(statement) for statement in statements]
     for statement in statements:
         if len(statement.errors) > 1:
-            blocks += _evidence(statement)
-        elif statement.budget is not None:
-            blocks.append(budget_table(_subject(statement), statement.budget))
+            blocks += [*([picture(statement)] if has_picture(statement) else []), _table(statement)]
+        if statement.budget is not None:
+            subject = say("the uncertainty of the test value named, {standard}", standard=named(statement))
+            blocks.append(budget_table(subject, statement.budget))
     return Section(say("Statements of conformity"), tuple(blocks))
 
 
-def decision_block(statement: Statement) -> Decision:
+def decision_block(statement: Statement) -> DecisionBlock:
     """One statement: what was compared with what, by which rule, and what follows."""
-    decision = statement.decision
     value = stated_value(statement.value_um, 2 * statement.u_um, signed=statement.signed)
     measured = say("{value} µm (k = 2)", value=value) if statement.u_um > 0 else say("{value} µm", value=value)
-    return Decision(
-        named(statement),
-        statement.quantity,
-        measured,
-        _limit(statement),
-        decision.rule,
-        statement.outcome,
-        sentences((*_what_follows(statement), *_chances(statement), *statement.remarks)),
-        statement.missing,
-    )
+    told = sentences((*_what_follows(statement), *_chances(statement), *statement.remarks))
+    return DecisionBlock(named(statement), statement.quantity, measured, _limit(statement), statement.decision.rule,
+                         statement.outcome, told, statement.missing)  # fmt: skip
 
 
 def named(statement: Statement) -> Text:
@@ -138,58 +125,32 @@ def _limit(statement: Statement) -> Text:
 
 
 def _what_follows(statement: Statement) -> list[Text]:
-    decision = statement.decision
-    said: list[Text] = []
+    band, said = statement.decision.guard_band, list[Text]()
     if statement.outcome == "incomplete":
-        said.append(
-            say(
-                "The {measured} measured conform; the test lacks what is named as missing.", measured=statement.measured
-            )
-        )
-    if decision.guard_band is None:
+        said.append(say("The {measured} measured conform; the test lacks what is named as missing.",
+                        measured=statement.measured))  # fmt: skip
+    if band is None:
         said.append(say("The uncertainty is too large for any value to be accepted."))
-    elif decision.guard_band > 0:
-        said.append(say("The guard band is {guard_band} µm.", guard_band=significant(decision.guard_band)))
+    elif band > 0:
+        said.append(say("The guard band is {guard_band} µm.", guard_band=significant(band)))
     return said
 
 
 def _chances(statement: Statement) -> list[Text]:
-    decision, count = statement.decision, len(statement.errors)
-    said: list[Text] = []
-    if decision.probability_conforming is not None:
-        chance = probability(decision.probability_conforming)
-        said.append(say("Probability that the quantity is within the limit: {chance}.", chance=chance))
+    count, risks, said = len(statement.errors), statement.risks, list[Text]()
+    if (p := statement.decision.probability_conforming) is not None:
+        said.append(say("Probability that the quantity is within the limit: {chance}.", chance=probability(p)))
     if statement.joint is not None and count > 1:
-        said.append(
-            say(
-                "Probability that all {count} are, with what they share, by the measurement alone: {chance}.", count=count,
-                chance=probability(statement.joint),
-            )
-        )  # fmt: skip
-    if statement.risks is not None:
-        said.append(
-            say(
-                "Of all such machines, by the prior stated, {consumer} would be wrongly accepted by this rule and {producer} "
-                "wrongly not accepted.",
-                consumer=probability(statement.risks.consumer), producer=probability(statement.risks.producer),
-            )
-        )  # fmt: skip
+        said.append(say(
+            "Probability that all {count} are, with what they share, by the measurement alone: {chance}.", count=count,
+            chance=probability(statement.joint),
+        ))  # fmt: skip
+    if risks is not None:
+        said.append(say(
+            "Of all such machines, by the prior stated, {consumer} would be wrongly accepted by this rule and {producer} "
+            "wrongly not accepted.", consumer=probability(risks.consumer), producer=probability(risks.producer),
+        ))  # fmt: skip
     return said
-
-
-def _evidence(statement: Statement) -> list[Block]:
-    """Table of all errors, their picture where lengths differ, and the budget of the named one."""
-    blocks: list[Block] = []
-    if has_picture(statement):
-        blocks.append(picture(statement))
-    blocks.append(_table(statement))
-    if statement.budget is not None:
-        blocks.append(budget_table(_subject(statement), statement.budget))
-    return blocks
-
-
-def _subject(statement: Statement) -> Text:
-    return say("the uncertainty of the test value named, {standard}", standard=named(statement))
 
 
 def has_picture(statement: Statement) -> bool:
@@ -233,33 +194,29 @@ _STANDING = {"counts": NOTHING, "again": say("to be measured again"), "replaced"
 
 def _table(statement: Statement) -> Table:
     """Every error; those of one length in one measurement in one row, in the order of their repeats."""
-    rows = _together(statement.errors)
+    rows, count = _together(statement.errors), len(statement.errors)
     notes: list[Text] = [
-        plural(
-            len(statement.errors),
-            one=say("{count} value.", count=len(statement.errors)),
-            many=say("{count} values.", count=len(statement.errors)),
-        )
+        plural(count, one=say("{count} value.", count=count), many=say("{count} values.", count=count))
     ]
     if len(rows) > _LISTED:
         rows = sorted(rows, key=lambda row: min(item.limit_um - abs(item.error_um) for item in row))[:_LISTED]
         notes.append(say("The {count} rows nearest to their limits; results.json has all.", count=_LISTED))
     lengths = any(item.length_mm is not None for item in statement.errors)
     known = any(item.u_um > 0 for item in statement.errors)
-    columns = [
-        Column(say("Measurement"), numeric=False),
+    columns = (
+        *text_columns(say("Measurement")),
         *((Column(say("Length"), unit("mm")),) if lengths else ()),
         Column(say("Errors") if statement.signed else say("Values"), unit("µm"), numeric=False),
-        *((Column(say("U"), unit("µm")), Column(say("P"), numeric=False)) if known else ()),
-        Column(say("Limit"), unit("µm")), Column(say("Decision"), numeric=False),
-    ]  # fmt: skip
+        *((Column(say("U"), unit("µm")), *text_columns(say("P"))) if known else ()),
+        Column(say("Limit"), unit("µm")), *text_columns(say("Decision")),
+    )  # fmt: skip
     if known:
         notes.append(
             say("U: expanded uncertainty, k = 2. P: lowest probability in the row that a value is within its limit.")
         )
     title = say("All values decided by {standard}", standard=named(statement))
     cells = tuple(_row(row, lengths=lengths, known=known, signed_values=statement.signed) for row in rows)
-    return Table(title, tuple(columns), cells, tuple(notes))
+    return Table(title, columns, cells, tuple(notes))
 
 
 def _together(errors: Sequence[Decided]) -> list[list[Decided]]:

@@ -11,9 +11,9 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
+from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.effect_words import parameter_title, titles
-from cmm_uq.certificate.result import SimulatedTwin as Simulated
+from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import expanded, probability, with_uncertainty
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.posterior import Posterior
@@ -25,13 +25,12 @@ _TOLD = 8
 
 
 def sentences(withheld: Sequence[Withheld]) -> list[Text]:
-    return [
-        say(
-            "{title} (probability {probability}) is not asserted: {why}.",
-            title=item.title, probability=probability(item.probability), why=_told(item.why, item.modes),
-        )
-        for item in withheld
-    ]  # fmt: skip
+    told: list[Text] = []
+    for item in withheld:
+        why = say("{why} ({periods})", why=item.why, periods=_listed(item.modes)) if item.modes else item.why
+        told.append(say("{title} (probability {probability}) is not asserted: {why}.",
+                        title=item.title, probability=probability(item.probability), why=why))  # fmt: skip
+    return told
 
 
 def other_periods(item: LeftOut) -> Text:
@@ -48,42 +47,24 @@ def other_periods(item: LeftOut) -> Text:
 
 
 def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
-    return [
-        {
-            "effect": item.effect, "probability": item.probability, "why": item.why,
-            "periods_mm": periods_data(item.modes),
-        }
-        for item in withheld
-    ]  # fmt: skip
+    return [{"effect": item.effect, "probability": item.probability, "why": item.why,
+             "periods_mm": periods_data(item.modes)} for item in withheld]  # fmt: skip
 
 
 def periods_data(modes: Sequence[Mode]) -> list[dict[str, Any]]:
-    return [
-        {
-            "value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
-            "probability": m.probability,
-        }
-        for m in modes
-    ]  # fmt: skip
-
-
-def _told(why: Text, modes: Sequence[Mode]) -> Text:
-    return say("{why} ({periods})", why=why, periods=_listed(modes)) if modes else why
+    return [{"value": m.period.value, "u": m.period.u, "interval95": list(m.period.interval95),
+             "probability": m.probability} for m in modes]  # fmt: skip
 
 
 def _listed(modes: Sequence[Mode]) -> Text:
-    told = [_one(mode) for mode in modes[:_TOLD]]
+    told: list[Text] = []
+    for mode in modes[:_TOLD]:
+        value, U = rounded(mode.period.value, mode.period.expanded)
+        told.append(say("{value} ± {U} {unit}: {probability}",
+                        value=value, U=U, unit=mode.period.unit, probability=probability(mode.probability)))  # fmt: skip
     if len(modes) > _TOLD:
         told.append(say("and {count} more", count=len(modes) - _TOLD))
     return commas(told)
-
-
-def _one(mode: Mode) -> Text:
-    value, U = rounded(mode.period.value, mode.period.expanded)
-    return say(
-        "{value} ± {U} {unit}: {probability}",
-        value=value, U=U, unit=mode.period.unit, probability=probability(mode.probability),
-    )  # fmt: skip
 
 
 VERDICTS: Mapping[str, Text] = {
@@ -94,7 +75,9 @@ VERDICTS: Mapping[str, Text] = {
 }
 
 
-def corrections(simulated: Simulated, model: MeasurementModel, posterior: Posterior) -> dict[str, dict[str, Quantity]]:
+def corrections(
+    simulated: SimulatedTwin, model: MeasurementModel, posterior: Posterior
+) -> dict[str, dict[str, Quantity]]:
     """What the effects that were estimated anew differ by from what the simulation contains, by effect and parameter."""
     found: dict[str, dict[str, Quantity]] = {}
     for (owner, name), (values, of) in model.reported(posterior.draws, simulated.refitted).items():
@@ -102,7 +85,7 @@ def corrections(simulated: Simulated, model: MeasurementModel, posterior: Poster
     return found
 
 
-def simulation_section(simulated: Simulated, refitted: Mapping[str, Mapping[str, Quantity]]) -> Section:
+def simulation_section(simulated: SimulatedTwin, refitted: Mapping[str, Mapping[str, Quantity]]) -> Section:
     """Which simulation it was, and what of it was estimated anew."""
     rows: list[tuple[Text, Text]] = [
         (say("Error map") if simulated.maps else say("Prediction"), Verbatim(file)) for file in simulated.files
@@ -125,7 +108,7 @@ def simulation_section(simulated: Simulated, refitted: Mapping[str, Mapping[str,
     return Section(say("Simulation"), tuple(blocks))
 
 
-def _uncertainty(simulated: Simulated) -> Text:
+def _uncertainty(simulated: SimulatedTwin) -> Text:
     if not simulated.u_um and not simulated.u_common_um:
         return say("not stated: taken as exact")
     own = say("{u:.3g} µm", u=simulated.u_um)
@@ -135,20 +118,16 @@ def _uncertainty(simulated: Simulated) -> Text:
 
 
 def _corrections(refitted: Mapping[str, Mapping[str, Quantity]]) -> Table:
-    rows = []
-    for owner, quantities in refitted.items():
-        for name, quantity in quantities.items():
-            rows.append(
-                (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
-            )
-    heads = (
-        Column(say("Parameter"), numeric=False), Column(say("Machine minus simulation")),
-        Column(say("Unit"), numeric=False), Column(say("k")),
+    rows = tuple(
+        (parameter_title(owner, name), with_uncertainty(quantity), quantity.unit, expanded(quantity)[2])
+        for owner, quantities in refitted.items() for name, quantity in quantities.items()
     )  # fmt: skip
-    return Table(say("What the simulation contains, estimated anew"), heads, tuple(rows))
+    heads = (*text_columns(say("Parameter")), Column(say("Machine minus simulation")), *text_columns(say("Unit")),
+             Column(say("k")))  # fmt: skip
+    return Table(say("What the simulation contains, estimated anew"), heads, rows)
 
 
-def contained(simulated: Simulated | None, effect: str) -> Text:
+def contained(simulated: SimulatedTwin | None, effect: str) -> Text:
     """To follow the sentence on an effect that the simulation contains: what was found is what it lacks of it."""
     if simulated is None or effect not in simulated.contains:
         return NOTHING
@@ -156,24 +135,12 @@ def contained(simulated: Simulated | None, effect: str) -> Text:
 
 
 def improvement_table(gain: Improvement, rms: Text, heldout: Text, note: Text) -> Table:
-    """Rms in µm, and the gain in log predictive density.
-
-    ``note``: what was held out, and what ± is.
-    """
+    """Rms in µm, and the gain in log predictive density; ``note``: what was held out, and what ± is."""
+    density = say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se)
     rows = (
         (rms, *alike(gain.rms_before_um, gain.rms_after_um, decimals=2), unit("µm")),
         (heldout, *alike(gain.heldout_rms_before_um, gain.heldout_rms_after_um, decimals=2), unit("µm")),
-        (
-            say("Gain in log predictive density"),
-            NOTHING,
-            say("{elpd_gain:.1f} ± {elpd_gain_se:.1f}", elpd_gain=gain.elpd_gain, elpd_gain_se=gain.elpd_gain_se),
-            NOTHING,
-        ),
+        (say("Gain in log predictive density"), NOTHING, density, NOTHING),
     )
-    heads = (
-        Column(say("Quantity"), numeric=False),
-        Column(say("Before")),
-        Column(say("After")),
-        Column(say("Unit"), numeric=False),
-    )
+    heads = (*text_columns(say("Quantity")), *figure_columns(say("Before"), say("After")), *text_columns(say("Unit")))
     return Table(say("Improvement"), heads, rows, (note,))

@@ -15,6 +15,7 @@ from cmm_uq.certificate.sections.conformity import has_picture, named, picture
 from cmm_uq.certificate.wording import (
     CERTAIN,
     OUTCOME_WORDS,
+    Headline,
     Summary,
     figure_row,
     measured,
@@ -23,50 +24,43 @@ from cmm_uq.certificate.wording import (
     stated_value,
     title_of,
 )
-from cmm_uq.certificate.wording import Headline as Verdict
-from cmm_uq.jobs.verdicts import GRAVEST, NONE, gravest, standing_of
-from cmm_uq.jobs.verdicts import Verdict as Stated
-from cmm_uq.jobs.verdicts import Verdict as Verdict_of_verdicts
+from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
 from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded, significant
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> Summary:
     """What was measured, the decisions, the figures, the warnings."""
-    facts = result.job.facts
-    subject = say(
-        "{machine}, {artefact:small}, {count} observations",
-        machine=Verbatim(facts.machine.name), artefact=result.artefact.title, count=len(result.residuals),
-    )  # fmt: skip
+    facts, artefact = result.job.facts, result.artefact
+    machine = Verbatim(facts.machine.name)
+    subject = say("{machine}, {artefact:small}, {count} observations",
+                  machine=machine, artefact=artefact.title, count=len(result.residuals))  # fmt: skip
     figures = [figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
-    figures += [
-        figure_row(size.title, result.sizes[size.name]) for size in result.artefact.sizes if size.role == "sought"
-    ]
+    figures += [figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"]
     for effect in result.model.effects:
         for name, quantity in result.parameters[effect.name].items():
             key = (effect.name, name)
             figures.append(figure_row(title_of(key, result), quantity, known=key not in result.not_given))
     remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
     decided = tuple(
-        Verdict(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
+        Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
         for one, told in zip(result.verdicts, remarks, strict=True)
     )
     return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
 
 
-def subject_of(one: Stated) -> Text:
+def subject_of(one: Verdict) -> Text:
     """What is decided: standard and characteristic, or a parameter with its tolerance."""
     if one.by:
         return say("{standard}, {what}", standard=Verbatim(one.by), what=Verbatim(one.name))
-    return say(
-        "{title}, tolerance {limit} {unit}", title=one.title, limit=limit_in_full(one.limit or 0.0), unit=one.unit
-    )
+    limit = limit_in_full(one.limit or 0.0)
+    return say("{title}, tolerance {limit} {unit}", title=one.title, limit=limit, unit=one.unit)
 
 
-def tolerances_of(result: Result) -> list[Stated]:
+def tolerances_of(result: Result) -> list[Verdict]:
     return [one for one in result.verdicts if not one.by]
 
 
-def _tolerance_remarks(one: Stated) -> list[Text]:
+def _tolerance_remarks(one: Verdict) -> list[Text]:
     if one.value is None or one.U is None:
         return list(one.missing)
     value, U = rounded(one.value, one.U)
@@ -120,13 +114,10 @@ def overview_of(result: Result) -> Overview | None:
         return None
     signed = {i: statement.signed for i, statement in enumerate(result.statements)}
     rows = [(subject_of(one), _row(one, signed=signed.get(i, True))) for i, one in enumerate(verdicts)]
-    if len(rows) > _MOST:
+    if (more := len(rows) - _MOST) > 0:
         order = sorted(range(len(rows)), key=lambda i: _gravity(verdicts[i].outcome))[:_MOST]
-        more = len(rows) - _MOST
-        rows = [
-            *(rows[i] for i in sorted(order)),
-            (say("Further statements"), say("{count}, behind this page", count=more)),
-        ]
+        further = say("Further statements"), say("{count}, behind this page", count=more)
+        rows = [*(rows[i] for i in sorted(order)), further]
     return Overview(_verdict(verdicts), standing_of(verdicts.overall), (*rows, *_lacking(verdicts), *_rules(result)))
 
 
@@ -134,36 +125,34 @@ def _gravity(outcome: str) -> int:
     return GRAVEST.index(outcome) if outcome in GRAVEST else GRAVEST.index("undecided")
 
 
-def _verdict(verdicts: Sequence[Verdict_of_verdicts]) -> Text:
+def _verdict(verdicts: Sequence[Verdict]) -> Text:
     overall, count = gravest(one.outcome for one in verdicts), len(verdicts)
     if overall == "pass":
-        return plural(
-            count, one=say("Conforms"), many=say("Conforms: all {count} statements of conformity", count=count)
-        )
+        many = say("Conforms: all {count} statements of conformity", count=count)
+        return plural(count, one=say("Conforms"), many=many)
     words = _WORDS.get(overall, OUTCOME_WORDS.get(overall, say("Not decided")))
-    alike = sum(one.outcome == overall for one in verdicts)
     if count == 1:
         return words
+    alike = sum(one.outcome == overall for one in verdicts)
     return say("{words}: {alike} of {count} statements of conformity", words=words, alike=alike, count=count)
 
 
-def _row(one: Verdict_of_verdicts, *, signed: bool) -> Text:
+def _row(one: Verdict, *, signed: bool) -> Text:
     if one.value is None:
         outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
         return say("{outcome}: not determined by this recording", outcome=outcome)
-    return stated_row(
-        one.outcome, stated_value(one.value, one.U, signed=signed), one.unit, one.limit if one.by else None
-    )
+    value = stated_value(one.value, one.U, signed=signed)
+    return stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
 
 
-def _lacking(verdicts: Sequence[Verdict_of_verdicts]) -> list[tuple[Text, Text]]:
+def _lacking(verdicts: Sequence[Verdict]) -> list[tuple[Text, Text]]:
     """The first of what statements lack, and how much more there is."""
     lacking = list(dict.fromkeys(what for one in verdicts if one.value is not None for what in one.missing))
     if not lacking:
         return []
-    shown = semicolons(lacking[:2])
-    return [(say("Missing"), shown if len(lacking) < 3 else say("{shown}; {count} more behind this page", shown=shown,
-                                                                 count=len(lacking) - 2))]  # fmt: skip
+    shown, more = semicolons(lacking[:2]), len(lacking) - 2
+    return [(say("Missing"),
+             say("{shown}; {count} more behind this page", shown=shown, count=more) if more > 0 else shown)]  # fmt: skip
 
 
 def _rules(result: Result) -> list[tuple[Text, Text]]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say
 from cmm_uq.certificate.document import Facts, Paragraph, Section
 from cmm_uq.certificate.plots.corner import corner_plot
-from cmm_uq.certificate.result import NoiseEstimate as Noise
-from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.result import NoiseEstimate, Result
 from cmm_uq.certificate.wording import title_of
 from cmm_uq.machine.model.certified_places import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -19,34 +18,28 @@ _SHOWN = 0.8
 _WIDER = 1.05
 
 
-def noise_found(noise: Noise, *, heavy_tails: bool) -> Text:
+def noise_found(noise: NoiseEstimate, *, heavy_tails: bool) -> Text:
     """What was found, what could not show, and what it does to the uncertainties.
 
     ``heavy_tails``: whether the diagnosis found heavy tails, which are no component of the estimate.
     """
-    there = _found(noise)
+    there = _components(noise)
     if heavy_tails:
         there.append(say("heavier tails than those of the normal distribution that the estimate assumes"))
-    found: Text = (
-        say("independent readings, and {what}", what=listed(there))
-        if there
-        else say("independent readings, nothing else")
-    )
+    found: Text = say("independent readings, nothing else")
+    if there:
+        found = say("independent readings, and {what}", what=listed(there))
     if noise.wider >= _WIDER:
-        found = say(
-            "{found}; standard uncertainties are up to {times:.2f} times those under white noise",
-            found=found, times=noise.wider,
-        )  # fmt: skip
-    hidden: list[Text] = []
-    if "placing" not in noise.components:
-        hidden.append(say("set-up offsets (no repeats)"))
-    hidden.append(
+        found = say("{found}; standard uncertainties are up to {times:.2f} times those under white noise",
+                    found=found, times=noise.wider)  # fmt: skip
+    slow = (
         say("what had drifted before the first reading") if "slow" in noise.components else say("slow noise (no times)")
     )
+    hidden = [*([] if "placing" in noise.components else [say("set-up offsets (no repeats)")]), slow]
     return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
 
 
-def _found(noise: Noise) -> list[Text]:
+def _components(noise: NoiseEstimate) -> list[Text]:
     there: list[Text] = []
     components = noise.components
     if noise.axes_apart > _SHOWN:
@@ -57,20 +50,11 @@ def _found(noise: Noise) -> list[Text]:
     size = {name: components[name].size.value for name in ("placing", "growth", "slow") if name in components}
     p = {name: components[name].probability for name in size}
     if p.get("placing", 0.0) > _SHOWN:
-        there.append(
-            say(
-                "an offset of {size:.2g} µm of each set-up, shared by its repeats (probability {p:.2f})",
-                size=size["placing"], p=p["placing"],
-            )
-        )  # fmt: skip
+        there.append(say("an offset of {size:.2g} µm of each set-up, shared by its repeats (probability {p:.2f})",
+                         size=size["placing"], p=p["placing"]))  # fmt: skip
     if p.get("growth", 0.0) > _SHOWN:
-        there.append(
-            say(
-                "scatter that grows with length to {size:.2g} µm (probability {p:.2f})",
-                size=size["growth"],
-                p=p["growth"],
-            )
-        )
+        there.append(say("scatter that grows with length to {size:.2g} µm (probability {p:.2f})",
+                         size=size["growth"], p=p["growth"]))  # fmt: skip
     if p.get("slow", 0.0) > _SHOWN:
         there.append(say("slow noise in time of {size:.2g} µm (probability {p:.2f})", size=size["slow"], p=p["slow"]))
     return there
@@ -97,58 +81,42 @@ def posterior_section(result: Result) -> Section:
 
 def method(result: Result) -> Section:
     ls, posterior, noise = result.least_squares, result.posterior, result.noise
-    sigma, (low, high) = noise.coordinate.value, noise.coordinate.interval95
-    spread = (
-        say(
-            "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals",
-            sigma=sigma,
-            low=low,
-            high=high,
-        )
-        if noise.stated_um is None
-        else say(
+    sigma, (low, high), stated = noise.coordinate.value, noise.coordinate.interval95, noise.stated_um
+    if stated is None:
+        spread = say("{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the residuals",
+                     sigma=sigma, low=low, high=high)  # fmt: skip
+    else:
+        spread = say(
             "{sigma:.3g} µm, 95 % interval {low:.3g} to {high:.3g} µm, from the stated {stated:.3g} µm and the residuals",
-            sigma=sigma,
-            low=low,
-            high=high,
-            stated=noise.stated_um,
-        )
-    )
+            sigma=sigma, low=low, high=high, stated=stated,
+        )  # fmt: skip
     if noise.p_value is not None:
         spread = say("{spread}; residuals under the stated figure: p = {p:.2g}", spread=spread, p=noise.p_value)
-    sizes = say(
-        "{count}, {rank}, {condition:.3g}", count=ls.rank + ls.null_space.shape[1], rank=ls.rank, condition=ls.condition
-    )
-    sampler = say(
-        "{sampler}, seed {seed}, {count} draws",
-        sampler=Verbatim(posterior.sampler), seed=posterior.seed, count=len(posterior.draws),
-    )  # fmt: skip
+    count = ls.rank + ls.null_space.shape[1]
     rows = (
         (say("Observations used"), number(len(ls.residuals))),
-        (say("Parameters, rank, condition number"), sizes),
+        (say("Parameters, rank, condition number"),
+         say("{count}, {rank}, {condition:.3g}", count=count, rank=ls.rank, condition=ls.condition)),
         (say("Degrees of freedom"), number(ls.degrees_of_freedom)),
-        (
-            say("Residual standard deviation"),
-            NOTHING if ls.residual_sd is None else say("{sd} µm", sd=alike(ls.residual_sd * 1e3)[0]),
-        ),
+        (say("Residual standard deviation"),
+         NOTHING if ls.residual_sd is None else say("{sd} µm", sd=alike(ls.residual_sd * 1e3)[0])),
         (say("Standard uncertainty of a coordinate"), spread),
         (say("Noise"), noise_found(noise, heavy_tails=result.diagnosed.diagnosis.noise.heavy_tails)),
-        (say("Sampler"), sampler),
+        (say("Sampler"), say("{sampler}, seed {seed}, {count} draws", sampler=Verbatim(posterior.sampler),
+                             seed=posterior.seed, count=len(posterior.draws))),
         (say("Convergence"), _convergence(posterior)),
         (say("Averaged"), _averaged(result)),
         (say("Stated of the artefact"), _stated(result)),
         (say("Calibrated lengths together"), _calibration(result)),
+    )  # fmt: skip
+    text = say(
+        "{what} are estimated from the observations with a linear measurement "
+        "model, by least squares (orthogonal factorisation) and as a posterior distribution with "
+        "priors as wide as physics allows; the certified length enters with its uncertainty. The "
+        "attached job, recording and results.json suffice to run it again.",
+        what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
     )
-    text = Paragraph(
-        say(
-            "{what} are estimated from the observations with a linear measurement "
-            "model, by least squares (orthogonal factorisation) and as a posterior distribution with "
-            "priors as wide as physics allows; the certified length enters with its uncertainty. The "
-            "attached job, recording and results.json suffice to run it again.",
-            what=say("Rigid-body error factors") if result.model.effects else say("Sizes of the artefact"),
-        )
-    )
-    return Section(say("Method"), (text, Facts(tuple((label, value) for label, value in rows if value))))
+    return Section(say("Method"), (Paragraph(text), Facts(tuple((label, value) for label, value in rows if value))))
 
 
 def _averaged(result: Result) -> Text:

@@ -8,7 +8,7 @@ from typing import Any
 from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, day, listed, names, number, say
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
+from cmm_uq.certificate.document import Block, Paragraph, Section, Table, figure_columns, text_columns
 from cmm_uq.certificate.plots.conformity import tolerance_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.first_page import subject_of, tolerances_of
@@ -28,16 +28,10 @@ UNCERTAINTY = say(
 
 
 def stated_table(
-    caption: Text,
-    named: Iterable[tuple[Text, Quantity]],
-    notes: tuple[Text, ...] = (),
-    *,
-    what: Text = say("Quantity"),
+    caption: Text, named: Iterable[tuple[Text, Quantity]], notes: tuple[Text, ...] = (), *, what: Text = say("Quantity"),
     value: Text = say("Value"),
-) -> Table:
-    columns = (
-        Column(what, numeric=False), Column(value), Column(say("U")), Column(say("k")), Column(say("Unit"), numeric=False),
-    )  # fmt: skip
+) -> Table:  # fmt: skip
+    columns = (*text_columns(what), *figure_columns(value, say("U"), say("k")), *text_columns(say("Unit")))
     return Table(caption, columns, tuple((name, *expanded(one), one.unit) for name, one in named), notes)
 
 
@@ -46,16 +40,13 @@ def performance(result: Result) -> Section:
     title = say("Figures of performance")
     if not result.accuracy:
         return Section(title, ())
-    notes = (
-        UNCERTAINTY,
-        say(
-            "Each figure estimates what the machine would show on average if the recording were "
-            "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
-            "this recording alone, and its U is the test uncertainty."
-        ),
+    measurand = say(
+        "Each figure estimates what the machine would show on average if the recording were "
+        "repeated; all recorded lengths count. The test value of a statement of conformity is another quantity, that of "
+        "this recording alone, and its U is the test uncertainty."
     )
     named = [(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
-    return Section(title, (stated_table(title, named, notes),))
+    return Section(title, (stated_table(title, named, (UNCERTAINTY, measurand)),))
 
 
 def error_factors(result: Result) -> Section:
@@ -74,14 +65,11 @@ def error_factors(result: Result) -> Section:
                 continue
             least = rounded(float(fitted[key]), quantity.expanded)[0] if key in fitted else NOTHING
             rows.append((title_of(key, result), value, U, k, least, quantity.unit))
+    least_squares = say("Least squares, named model") if result.averaged else say("Least squares")
     columns = (
-        Column(say("Error factor"), numeric=False),
-        Column(say("Estimate")),
-        Column(say("U")),
-        Column(say("k")),
-        Column(say("Least squares, named model") if result.averaged else say("Least squares")),
-        Column(say("Unit"), numeric=False),
-    )
+        *text_columns(say("Error factor")), *figure_columns(say("Estimate"), say("U"), say("k"), least_squares),
+        *text_columns(say("Unit")),
+    )  # fmt: skip
     notes = (SIGN, UNCERTAINTY)
     blocks: list[Block] = [Table(say("Error factors of the machine"), columns, tuple(rows), notes)] if rows else []
     for combination in result.undetermined:
@@ -91,14 +79,11 @@ def error_factors(result: Result) -> Section:
 
 def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) -> list[Block]:
     """A combination that no such recording determines, and the differences inside it that this one does."""
-    titles = [title_of(key, result) for key in combination]
-    words = Paragraph(
-        say(
-            "{titles} can change together without changing any observation: the recording does not "
-            "determine their common part. A certified length of the artefact would.",
-            titles=listed(titles),
-        )
-    )
+    words = Paragraph(say(
+        "{titles} can change together without changing any observation: the recording does not "
+        "determine their common part. A certified length of the artefact would.",
+        titles=listed([title_of(key, result) for key in combination]),
+    ))  # fmt: skip
     named = [
         (
             say("{second} − {first}", second=title_of(one.second, result), first=title_of(one.first, result)),
@@ -135,18 +120,16 @@ def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict]
         if (before := found.figure(group, name)) is not None
     )
     if rows:
-        heads = (
-            Column(say("Quantity"), numeric=False), Column(say("As found")), Column(say("U")), Column(say("As left")),
-            Column(say("U")), Column(say("Unit"), numeric=False),
-        )  # fmt: skip
+        heads = (*text_columns(say("Quantity")), *figure_columns(say("As found"), say("U"), say("As left"), say("U")),
+                 *text_columns(say("Unit")))  # fmt: skip
         note = say("U is the expanded uncertainty for a coverage probability of 95 %.")
         blocks.append(Table(say("The machine as found and as left"), heads, rows, (note,)))
     decided = tuple(
-        (subject_of(now), _outcome(before.outcome), _outcome(now.outcome))
+        (subject_of(now), *(OUTCOME_WORDS.get(name, Verbatim(name)) for name in (before.outcome, now.outcome)))
         for now in verdicts for before in found.stated if (before.by, before.name) == (now.by, now.name)
     )  # fmt: skip
     if decided:
-        columns = tuple(Column(one, numeric=False) for one in (say("Statement"), say("As found"), say("As left")))
+        columns = text_columns(say("Statement"), say("As found"), say("As left"))
         blocks.append(Table(say("Statements of conformity as found and as left"), columns, decided))
     return Section(title, tuple(blocks))
 
@@ -174,10 +157,6 @@ def _quantity(figure: Figure, now: Quantity) -> Quantity:
     return Quantity(figure.value, figure.u, (low, high), now.unit)
 
 
-def _outcome(name: str) -> Text:
-    return OUTCOME_WORDS.get(name, Verbatim(name))
-
-
 _WORDS = {"pass": say("in"), "fail": say("out"), "undecided": say("open")}
 
 
@@ -198,20 +177,13 @@ def tolerance_sections(result: Result) -> list[Section]:
         rows.append((one.title, value, U, number(tolerance, "g"), one.unit, _WORDS[one.outcome]))
         part = quantity.times(1 / tolerance, unit("1"))
         ratios.append((part.value, *part.interval95))
-    columns = (
-        Column(say("Parameter"), numeric=False), Column(say("Estimate")), Column(say("U")), Column(say("Tolerance")),
-        Column(say("Unit"), numeric=False), Column(say("Verdict"), numeric=False),
-    )  # fmt: skip
-    notes = [say("In or out: the whole 95 % interval is; otherwise open.")]
-    if left_out:
-        notes.append(unknown)
+    columns = (*text_columns(say("Parameter")), *figure_columns(say("Estimate"), say("U"), say("Tolerance")),
+               *text_columns(say("Unit"), say("Verdict")))  # fmt: skip
+    notes = (say("In or out: the whole 95 % interval is; otherwise open."), *((unknown,) if left_out else ()))
     out = [one.title for one in judged if one.outcome == "fail"]
     plot = tolerance_plot(
-        [one.title for one in judged],
-        *map(list, zip(*ratios, strict=True)),
+        [one.title for one in judged], *map(list, zip(*ratios, strict=True)),
         caption=say("Each parameter over its tolerance, with its 95 % interval."),
-        alternative=say("Out of tolerance: {out}.", out=listed(out))
-        if out
-        else say("No parameter is out of tolerance."),
-    )
-    return [Section(title, (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), tuple(notes))))]
+        alternative=say("Out of tolerance: {out}.", out=listed(out)) if out else say("No parameter is out of tolerance."),
+    )  # fmt: skip
+    return [Section(title, (plot, Table(say("Parameters and tolerances"), columns, tuple(rows), notes)))]

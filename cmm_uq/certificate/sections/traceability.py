@@ -27,29 +27,24 @@ if TYPE_CHECKING:
 
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
     """The artefact and the statement of traceability."""
-    read = tuple((say("Imported file"), recognised.sentence) for recognised in job.imported)
-    facts = Facts(tuple((label, text) for label, text in (*rows, *_thermometers(job), *read, *_acquired(job)) if text))
+    facts = Facts(tuple((label, text) for label, text in (*rows, *_instruments(job)) if text))
     said = (Paragraph(claimed(job).statement),) if job.origin == MEASURED else ()
     return Section(say("Artefact and traceability"), (facts, *said, *further))
 
 
-def _thermometers(job: Job) -> list[tuple[Text, Text]]:
-    """What temperatures were read from, each with its certificate."""
-    return [
+def _instruments(job: Job) -> list[tuple[Text, Text]]:
+    """What temperatures were read from, each with its certificate; by what a recording was taken live, and what it lacks."""
+    rows: list[tuple[Text, Text]] = [
         (say("Thermometer"), sentences((*names(filter(None, (one.name, one.serial))), *_listed(one.certificate))))
         for one in job.facts.thermometer
     ]
-
-
-def _acquired(job: Job) -> list[tuple[Text, Text]]:
-    if job.acquired is None:
-        return []
-    return [
-        (say("Recording"), job.acquired.sentence),
-        (say("Instruments"), semicolons(job.acquired.instruments)),
-        (say("Joined by time"), semicolons(job.acquired.joins)),
-        (say("Gaps"), semicolons(job.acquired.gaps)),
-    ]
+    rows += [(say("Imported file"), recognised.sentence) for recognised in job.imported]
+    if (taken := job.acquired) is not None:
+        rows += [
+            (say("Recording"), taken.sentence), (say("Instruments"), semicolons(taken.instruments)),
+            (say("Joined by time"), semicolons(taken.joins)), (say("Gaps"), semicolons(taken.gaps)),
+        ]  # fmt: skip
+    return rows
 
 
 def artefact_rows(job: Job, otherwise: Text) -> list[tuple[Text, Text]]:
@@ -92,9 +87,8 @@ def traceability(result: Result) -> Section:
     dimensions = [size for size in result.artefact.sizes if size.role == "dimension"]
     certified = [] if compared else [size for size in dimensions if size.certified]
     rows += [_certified(size) for size in certified]
-    rows += (
-        [(say("Uncertainty by its certificate"), stated_uncertainty(artefact, result.job.points))] if certified else []
-    )
+    if certified:
+        rows.append((say("Uncertainty by its certificate"), stated_uncertainty(artefact, result.job.points)))
     if compared:
         rows.append((say("References"), say("the earlier recording {file}", file=Verbatim(compared))))
     elif dimensions and not certified:
@@ -116,9 +110,8 @@ def stated_uncertainty(facts: ArtefactFacts, points: Points) -> Text:
     elif facts.degrees_of_freedom is not None and facts.U_um is not None:
         factor = say("k = {k}", k=figure(factor_of(None, facts.degrees_of_freedom) or 0.0, 3))
     if facts.degrees_of_freedom is not None:
-        factor = commas(
-            (*filter(None, (factor,)), say("{count} degrees of freedom", count=figure(facts.degrees_of_freedom, 10)))
-        )
+        count = say("{count} degrees of freedom", count=figure(facts.degrees_of_freedom, 10))
+        factor = commas((*filter(None, (factor,)), count))
     told: list[Text] = []
     if facts.U_um is not None:
         told.append(commas((say("U = {formula}", formula=_formula(facts.U_um)), factor)))

@@ -19,20 +19,8 @@ IMPLAUSIBLE = 4.0
 
 
 def warnings(result: Result) -> tuple[Text, ...]:
-    return tuple(
-        text
-        for texts in (
-            not_converged(result.posterior),
-            _mismatch(result),
-            _noise(result),
-            _expansion(result),
-            _implausible(result),
-            _undetermined(result),
-            _contradicted(result),
-            _screening(result),
-        )
-        for text in texts
-    )
+    each = (_mismatch, _noise, _expansion, _implausible, _undetermined, _contradicted, _screening)
+    return *not_converged(result.posterior), *(text for of in each for text in of(result))
 
 
 class Sampled(Protocol):
@@ -50,26 +38,21 @@ class Sampled(Protocol):
 
 def not_converged(sampled: Sampled) -> list[Text]:
     """That figures must not be used, where the sampling did not converge."""
-    if sampled.converged:
-        return []
-    return [
-        say(
-            "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
-            "{rhat_max:.3f}): estimates and uncertainties must not be used.",
-            ess_min=sampled.ess_min,
-            rhat_max=sampled.rhat_max,
-        )
-    ]
+    told = say(
+        "The sampling did not converge (least effective sample size {ess_min:.0f}, R-hat "
+        "{rhat_max:.3f}): estimates and uncertainties must not be used.",
+        ess_min=sampled.ess_min, rhat_max=sampled.rhat_max,
+    )  # fmt: skip
+    return [] if sampled.converged else [told]
 
 
 def _mismatch(result: Result) -> list[Text]:
     diagnosis = result.diagnosed.diagnosis
     if diagnosis.verdict == "consistent":
         return []
-    named = [item.title for item in diagnosis.effects]
     said = [VERDICTS[diagnosis.verdict]]
-    if named:
-        said.append(say("It shows: {named}.", named=listed(named)))
+    if diagnosis.effects:
+        said.append(say("It shows: {named}.", named=listed([item.title for item in diagnosis.effects])))
     holds = say("The figures below hold for the named model; see the diagnosis.")
     if result.averaged:
         holds = say(
@@ -81,30 +64,22 @@ def _mismatch(result: Result) -> list[Text]:
 
 
 def _noise(result: Result) -> list[Text]:
-    noise, ls = result.noise, result.least_squares
+    noise, freedom = result.noise, result.least_squares.degrees_of_freedom
     texts: list[Text] = []
     if noise.contradicts_stated and noise.stated_um is not None and noise.p_value is not None:
-        texts.append(
-            say(
-                "The residuals contradict the stated uncertainty of a coordinate, {stated_um} µm (p = "
-                "{p_value:.1g}): the model leaves something out, or the recording is noisier than stated. "
-                "The uncertainties below rest on the residuals ({value} µm), not on the stated figure.",
-                stated_um=significant(noise.stated_um),
-                p_value=noise.p_value,
-                value=significant(noise.coordinate.value),
-            )
-        )
-    if ls.degrees_of_freedom < 3 and noise.stated_um is None:
-        texts.append(
-            say(
-                "Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.",
-                degrees_of_freedom=ls.degrees_of_freedom,
-            )
-        )
+        stated, value = significant(noise.stated_um), significant(noise.coordinate.value)
+        texts.append(say(
+            "The residuals contradict the stated uncertainty of a coordinate, {stated_um} µm (p = "
+            "{p_value:.1g}): the model leaves something out, or the recording is noisier than stated. "
+            "The uncertainties below rest on the residuals ({value} µm), not on the stated figure.",
+            stated_um=stated, p_value=noise.p_value, value=value,
+        ))  # fmt: skip
+    if freedom < 3 and noise.stated_um is None:
+        texts.append(say("Only {degrees_of_freedom} degrees of freedom are left to estimate the noise from.",
+                         degrees_of_freedom=freedom))  # fmt: skip
+    exact = [size.title for size in result.artefact.sizes if size.certified and size.sd == 0]
     return texts + [
-        say("{title} is given without an uncertainty and is taken as exact.", title=size.title)
-        for size in result.artefact.sizes
-        if size.certified and size.sd == 0
+        say("{title} is given without an uncertainty and is taken as exact.", title=title) for title in exact
     ]
 
 
@@ -139,25 +114,18 @@ def _implausible(result: Result) -> list[Text]:
 
 def _undetermined(result: Result) -> list[Text]:
     texts: list[Text] = [
-        say(
-            "Not determined by this recording: the common part of {parameters}.",
-            parameters=listed([title_of(key, result) for key in combination]),
-        )
+        say("Not determined by this recording: the common part of {parameters}.",
+            parameters=listed([title_of(key, result) for key in combination]))
         for combination in result.undetermined
-    ]
+    ]  # fmt: skip
     for unknown in result.posterior.unknowns:
         share = result.prior_share(unknown.key)
         if share > ASSUMED and unknown.key not in result.not_given and not unknown.known:
-            texts.append(
-                say(
-                    "{parameter} is hardly determined by this recording: {share:.0f} % of its variance is the "
-                    "assumption that it lies within about ±{prior_sd:g} {unit}.",
-                    parameter=title_of(unknown.key, result),
-                    share=100 * share,
-                    prior_sd=2 * unknown.prior_sd,
-                    unit=unknown.unit,
-                )
-            )
+            texts.append(say(
+                "{parameter} is hardly determined by this recording: {share:.0f} % of its variance is the "
+                "assumption that it lies within about ±{prior_sd:g} {unit}.",
+                parameter=title_of(unknown.key, result), share=100 * share, prior_sd=2 * unknown.prior_sd, unit=unknown.unit,
+            ))  # fmt: skip
     return texts
 
 
