@@ -39,9 +39,7 @@ from cmm_uq.certificate.sections.results import (
 )
 from cmm_uq.certificate.sections.traceability import claimed, traceability
 from cmm_uq.certificate.sections.warnings import warnings
-from cmm_uq.jobs.identification import Identification
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.laboratory import Laboratory
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED

@@ -9,14 +9,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
 from cmm_uq.certificate.document import Column, Document, Overview, Paragraph, Section, Standing, Table, text_columns
-from cmm_uq.laboratory.due.due import Due, State
+from cmm_uq.laboratory.due.due import DueItem, State
 
 STATE_WORDS: Mapping[State, Text] = {
     "overdue": say("overdue"), "due": say("due soon"), "later": say("later"), "unknown": say("no date"),
 }  # fmt: skip
 
 
-def due_document(items: Sequence[Due], on: dt.date, within: dt.timedelta) -> Document:
+def due_document(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) -> Document:
     """The page of what is due, by day; within ``within`` something is due soon."""
     each = [(say("Machines"), [one for one in items if one.item == "machine"]),
             (say("Artefacts"), [one for one in items if one.item == "artefact"])]  # fmt: skip
@@ -62,7 +62,7 @@ def _overview(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) -> Ov
     return Overview(verdict, standing, tuple(rows))
 
 
-def _table(rows: Sequence[Due], on: dt.date, within: dt.timedelta, title: Text) -> Table:
+def _table(rows: Sequence[DueItem], on: dt.date, within: dt.timedelta, title: Text) -> Table:
     cells = tuple(
         (
             DASH if one.due is None else day(one.due), STATE_WORDS[one.state(on, within)], Verbatim(one.serial),
@@ -85,7 +85,7 @@ def reason(one: DueItem) -> Text:
     return sentences((told, *one.remarks))
 
 
-def due_row(one: Due, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:
+def due_row(one: DueItem, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:
     date: Text = DASH
     left: Text = NOTHING
     if one.due is not None:

@@ -36,8 +36,7 @@ from cmm_uq.certificate.pages.fleet_summary import (
 )
 from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, picture, strokes
 from cmm_uq.laboratory.due.drift import PARTS
-from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, Usual
-from cmm_uq.laboratory.due.fleet_found import FleetFound, OfValue
+from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetValue, UsualRate
 
 
 def fleet_plot(
@@ -119,7 +118,7 @@ def usual_table(of: FleetValue) -> Table:
             left, one=say("One more model or place has fewer machines; fleet.json has all."),
             many=say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
         ))  # fmt: skip
-    return Table(say("Usual drift"), columns, rows, tuple(notes))
+    return Table(say("UsualRate drift"), columns, rows, tuple(notes))
 
 
 def outsiders(of: FleetValue) -> Block:
@@ -174,7 +173,7 @@ def _left_out(shown: int, total: int) -> Text:
     return say("{count} of {total} machines; fleet.json and fleet.csv have all.", count=shown, total=total)
 
 
-def _own(of: OfValue) -> tuple[Column, ...]:
+def _own(of: FleetValue) -> tuple[Column, ...]:
     rate = Column(say("Rate, U (95 %)"), per_year(of))
     return *text_columns(say("Machine"), say("Model"), say("Place")), Column(say("Certificates")), rate
 
@@ -200,7 +199,7 @@ def _crossed(of: FleetValue, i: int) -> tuple[Text, Text, Text]:
     return middle, low, high
 
 
-def spreads_table(of: OfValue) -> Table:
+def spreads_table(of: FleetValue) -> Table:
     yearly = {"rate_sd": per_year(of), "model_sd": per_year(of), "place_sd": per_year(of), "steps_per_year": NOTHING}
     rows = tuple(
         (SPREADS[each.name], number(each.median, ".2g"),
@@ -231,11 +230,11 @@ def fleet_document(found: FleetResult) -> Document:
     )
 
 
-def _blocks(of: OfValue) -> tuple[Block, ...]:
+def _blocks(of: FleetValue) -> tuple[Block, ...]:
     shown, chains = groups_shown(of), of.fleet.chains
     plot = fleet_plot(
         shown, [group_words(each) for each in shown], axis=say("Rate in {unit}, with 95 % interval", unit=per_year(of)),
-        caption=say("Usual drift of models and places."),
+        caption=say("UsualRate drift of models and places."),
         alternative=say("Average machine: {rate}.", rate=usual_rate(of)),
     )  # fmt: skip
     sampled = say(

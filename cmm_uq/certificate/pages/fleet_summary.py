@@ -21,8 +21,7 @@ from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, commas, day, n
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.wording import Headline, Summary
-from cmm_uq.laboratory.due.fleet import Usual
-from cmm_uq.laboratory.due.fleet_found import FleetFound, OfValue, seen_again
+from cmm_uq.laboratory.due.fleet import FleetResult, FleetValue, UsualRate, seen_again
 
 MOST_SERIALS = 12
 """Machines in a line."""
@@ -129,15 +128,15 @@ def machines_of(found: FleetResult) -> set[str]:
     return {member.machine for of in found.values for member in of.members}
 
 
-def _named(found: FleetFound, which: Callable[[OfValue], NDArray[np.bool_]]) -> set[str]:
+def _named(found: FleetResult, which: Callable[[FleetValue], NDArray[np.bool_]]) -> set[str]:
     return {of.members[i].machine for of in found.values for i in np.flatnonzero(which(of))}
 
 
-def _unlike(found: FleetFound) -> set[str]:
+def _unlike(found: FleetResult) -> set[str]:
     return _named(found, lambda of: ~of.belongs)
 
 
-def _beyond(found: FleetFound) -> set[str]:
+def _beyond(found: FleetResult) -> set[str]:
     return _named(found, lambda of: of.beyond)
 
 
@@ -179,7 +178,7 @@ def _due(found: FleetResult) -> tuple[Text, ...]:
     return (*((are,) if beyond else ()), *((will,) if soon else ()))
 
 
-def _counts(of: OfValue, until: float) -> Text:
+def _counts(of: FleetValue, until: float) -> Text:
     unlike, beyond, soon = (int(which.sum()) for which in (~of.belongs, of.beyond, of.crosses_by(until)))
     parts = ((unlike, say("{count} unlike the fleet", count=unlike)), (beyond, say("{count} beyond the limit", count=beyond)),
              (soon, say("{count} within a year", count=soon)))  # fmt: skip

@@ -9,7 +9,8 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Decided, Statement
-from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, LeftOut
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
+from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect as LeftOut
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.languages.translation import ENGLISH
