@@ -19,7 +19,7 @@ from cmm_uq.jobs.verdicts import NO_VERDICTS, Verdicts
 from cmm_uq.maths.inference.draws import Draws
 
 
-class Found(Protocol):
+class AnalysisResult(Protocol):
     """What an analysis found, in the kind's own terms; of most kinds a :class:`~cmm_uq.certificate.result.Result`."""
 
     @property
@@ -43,7 +43,7 @@ class Outcome:
     draws : of the posterior of all that is reported, where the kind's analysis draws from one.
     """
 
-    found: Found
+    found: AnalysisResult
     composed: Callable[[], Document]
     results: Mapping[str, Any]
     summary: Summary
@@ -111,7 +111,7 @@ class Recipe:
     of the seed.
     """
 
-    analyse: Callable[..., Found]
+    analyse: Callable[..., AnalysisResult]
     outcome: Callable[[Any, int], Outcome]
 
 

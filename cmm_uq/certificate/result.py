@@ -42,12 +42,10 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 class SimulatedTwin:
     """The simulation that a recording was compared with.
 
-    ``files``: with their SHA-256; ``program``: that made it, in the user's words; ``maps``: whether it is error maps;
-    ``u_um, u_common_um``: of a predicted coordinate, root mean square, and of the artefact's size, as stated;
-    ``u_turned_um``: what there is besides because the artefact was taken to lie in another direction, root mean square;
-    ``contains``: effects that it contains; ``refitted``: those that were estimated anew; ``shift_mm, turn_deg``: of its
-    frame against the recording's; ``farthest_mm``: from a recorded point to the predicted one; ``rms_predicted_um``: of
-    the errors that it predicts, as the observations show them.
+    ``files``: with their SHA-256; ``u_um, u_common_um``: of a predicted coordinate, root mean square, and of the artefact's
+    size; ``u_turned_um``: what there is besides because the artefact was taken to lie in another direction; ``contains``,
+    ``refitted``: its effects, and those that were estimated anew; ``shift_mm, turn_deg``: of its frame against the
+    recording's; ``farthest_mm``: from a recorded point to the predicted one; ``rms_predicted_um``: in the observations.
     """
 
     files: Mapping[str, str]
@@ -67,10 +65,6 @@ class SimulatedTwin:
     def of(
         cls, facts: SimulationFacts, job: Job, found: PredictedErrors, named: Sequence[Effect], model: MeasurementModel
     ) -> SimulatedTwin:
-        """As a job names it.
-
-        ``facts``: ``[simulation]``.
-        """
         files = [given.file for given in facts.map] if facts.file is None else [facts.file]
         hashes = sha256(job.inputs)
         contains = tuple(effect.name for effect in named)
@@ -112,10 +106,9 @@ CAPABILITY_FACTOR = 2.0
 
 @dataclass(frozen=True)
 class StatedUncertainty:
-    """States quantities of one certificate, and keeps what was raised.
+    """Quantities of a certificate with U not below the laboratory's capability, that of lengths taken at ``length_mm``.
 
-    ``capability``: of the laboratory, if it gives one; ``length_mm``: that the capability of lengths is taken at;
-    ``raised``: by name, U as evaluated and as stated.
+    ``raised``: by name as in results.json, U as evaluated and as stated.
     """
 
     capability: Capability | None
@@ -130,22 +123,19 @@ class StatedUncertainty:
         return cls(job.facts.laboratory.cmc, length_mm or longest)
 
     def stated(self, name: str, quantity: Quantity) -> Quantity:
-        """The quantity with U not below the capability; ``name`` as in results.json."""
-        least = self.capability.least(quantity.unit, self.length_mm) if self.capability else 0.0
+        least = self._least(quantity.unit, self.length_mm)
         if quantity.expanded < least:
             self.raised[name] = {"evaluated_U": quantity.expanded, "U": least}
         return quantity.at_least(least)
 
+    def _least(self, of: str, length_mm: float) -> float:
+        return self.capability.least(of, length_mm) if self.capability else 0.0
+
     def raised_to(
         self, name: str, expanded: float, factor: float, unit_: str, length_mm: float | None = None
     ) -> tuple[float, float]:
-        """U and k of a figure that is no :class:`Quantity`, U not below the capability, k = 2 where it is that.
-
-        ``expanded, factor``: as evaluated; U in ``unit_``.
-        """
-        least = (
-            self.capability.least(unit_, self.length_mm if length_mm is None else length_mm) if self.capability else 0.0
-        )
+        """U and k of a figure that is no :class:`Quantity`, U not below the capability, k = 2 where it is that."""
+        least = self._least(unit_, self.length_mm if length_mm is None else length_mm)
         if expanded >= least:
             return expanded, factor
         self.raised.setdefault(name, {"evaluated_U": expanded, "U": least})
@@ -156,16 +146,11 @@ class StatedUncertainty:
         return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
 
     def warnings(self) -> list[Text]:
-        if not self.raised:
-            return []
-        return [
-            say(
-                "U is stated as the laboratory's calibration and measurement capability (k = 2){key} where that is larger "
-                "than what was evaluated{names}.",
-                names=at_key(", ".join(self.raised)),
-                key=at_key("[laboratory.cmc]"),
-            )
-        ]
+        told = say(
+            "U is stated as the laboratory's calibration and measurement capability (k = 2){key} where that is larger "
+            "than what was evaluated{names}.", names=at_key(", ".join(self.raised)), key=at_key("[laboratory.cmc]"),
+        )  # fmt: skip
+        return [told] if self.raised else []
 
     def data(self) -> dict[str, Any]:
         return {"cmc": {"length_mm": self.length_mm, "raised": self.raised}} if self.raised else {}
@@ -176,7 +161,7 @@ LACK_OF_FIT = 0.01
 
 
 @dataclass(frozen=True)
-class Component:
+class NoiseComponent:
     """Standard deviation of a component of the noise, µm, and the probability that it is there at all."""
 
     size: Quantity
@@ -184,7 +169,7 @@ class Component:
 
 
 @dataclass(frozen=True, eq=False)
-class NoiseEstimate:
+class RecordingNoise:
     """The noise of a recording, and what it does to the uncertainties.
 
     ``coordinate``: standard deviation of one reading of one coordinate, root mean square of the axes, µm;
@@ -196,7 +181,7 @@ class NoiseEstimate:
     """
 
     coordinate: Quantity
-    components: Mapping[str, Component]
+    components: Mapping[str, NoiseComponent]
     axes_apart: float
     wider: float
     stated_um: float | None
@@ -220,15 +205,12 @@ class NoiseEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosed:
-    """A job with its diagnosis.
+class JobDiagnosis:
+    """A job with its diagnosis: what is missing, what to measure next, and what follows.
 
-    ``job, findings``: what was read, and what the screening found; ``diagnosis``: what is missing; ``suggestions``:
-    what to measure next; ``consequences``: what correcting for what was found would change; ``None`` where nothing is
-    found or nothing depends on it; ``simulated``: the simulation that the recording was compared with, if it was with
-    one; ``unseen``: the smallest amplitude of each effect that the recording would have shown; ``next_plan``: the
-    fewest set-ups that would part what cannot be told apart, or show what was not seen; ``None`` without any;
-    ``costs``: what each explanation that remains makes of figures and decisions; ``None`` where one alone does.
+    ``consequences``: of a correction, ``None`` where nothing depends on one; ``unseen``: smallest amplitude of each effect
+    that the recording would have shown; ``next_plan``: the fewest set-ups that part or show more, ``None`` without any;
+    ``costs``: what each explanation that remains makes of figures and decisions, ``None`` where one alone does.
     """
 
     job: Job
@@ -298,10 +280,10 @@ class Result:
     draws: Draws
     parameters: Mapping[str, Mapping[str, Quantity]]
     sizes: Mapping[str, Quantity]
-    noise: NoiseEstimate
+    noise: RecordingNoise
     accuracy: Mapping[str, Quantity]
     statements: tuple[Statement, ...]
-    diagnosed: Diagnosed
+    diagnosed: JobDiagnosis
     stating: StatedUncertainty | None = None
     causes: tuple[Cause, ...] = ()
     doubt: Doubt = field(default_factory=lambda: Doubt(()))
@@ -352,10 +334,9 @@ class Result:
     @cached_property
     def undetermined(self) -> tuple[tuple[tuple[str, str], ...], ...]:
         """Keys of the parameters in each combination that the recording leaves free."""
-        ls = self.least_squares
-        return tuple(
-            tuple(u.key for u, part in zip(ls.unknowns, column, strict=True) if part) for column in ls.null_space.T
-        )
+        keys = [unknown.key for unknown in self.least_squares.unknowns]
+        free = self.least_squares.null_space.T
+        return tuple(tuple(key for key, part in zip(keys, column, strict=True) if part) for column in free)
 
     @cached_property
     def free(self) -> frozenset[str]:
@@ -376,13 +357,12 @@ class Result:
         columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
         units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
         alike = [key for key in combination if units[key] == units[combination[0]]]
-        draws = self.values
-        stating, found = StatedUncertainty.of(self.job), []
+        stating, found, each = StatedUncertainty.of(self.job), [], np.eye(len(columns))
         for first, second in zip(alike, alike[1:] + alike[:1] if len(alike) > 2 else alike[1:], strict=False):
-            quantity = Quantity.of_draws(draws[:, columns[second]] - draws[:, columns[first]], units[first])
+            one, other = columns[second], columns[first]
+            quantity = Quantity.of_draws(self.values[:, one] - self.values[:, other], units[first])
             if self.causes:
-                each = np.eye(len(columns))
-                quantity = self.doubt.larger(quantity, each[columns[second]] - each[columns[first]])
+                quantity = self.doubt.larger(quantity, each[one] - each[other])
             found.append(ParameterDifference(second, first, stating.stated("differences", quantity)))
         return tuple(found)
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.result import Component, NoiseEstimate
+from cmm_uq.certificate.result import NoiseComponent, RecordingNoise
 from cmm_uq.certificate.sections.method import noise_found
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
-def size(value: float, probability: float = 1.0) -> Component:
-    return Component(Quantity(value, 0.1, (value - 0.2, value + 0.2), unit("µm")), probability)
+def size(value: float, probability: float = 1.0) -> NoiseComponent:
+    return NoiseComponent(Quantity(value, 0.1, (value - 0.2, value + 0.2), unit("µm")), probability)
 
 
-def noise(components: dict[str, Component], *, apart: float = 0.2, wider: float = 1.0) -> NoiseEstimate:
-    return NoiseEstimate(size(1.2).size, components, apart, wider, None, None)
+def noise(components: dict[str, NoiseComponent], *, apart: float = 0.2, wider: float = 1.0) -> RecordingNoise:
+    return RecordingNoise(size(1.2).size, components, apart, wider, None, None)
 
 
 def test_white_noise_is_said_to_be_nothing_else_and_what_could_not_show_is_named() -> None:

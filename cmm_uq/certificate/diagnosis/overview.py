@@ -13,7 +13,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, alternatives, c
 from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, without_power
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.effect_words import effect_of, size_of, title_of, titles
-from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.sections.findings import VERDICTS as AGAINST
 from cmm_uq.certificate.sections.findings import contained, other_periods
 from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
@@ -39,7 +39,7 @@ _RAREST = 1e-4  # probability below which only this is told
 _TOLD = 0.05  # probability from which another explanation is told beside what is asserted
 
 
-def overview_of(result: Diagnosed) -> Overview:
+def overview_of(result: JobDiagnosis) -> Overview:
     d = result.diagnosis
     rows = (
         (say("Found"), _found(result)), (say("Where"), _where(d)), (say("How sure"), _sure(result)),
@@ -53,7 +53,7 @@ def overview_of(result: Diagnosed) -> Overview:
     return Overview(title, standing, tuple(row for row in rows if row[1]))
 
 
-def _found(result: Diagnosed) -> Text:
+def _found(result: JobDiagnosis) -> Text:
     d = result.diagnosis
     if d.verdict == "consistent":
         if result.simulated is None:
@@ -67,7 +67,7 @@ def _found(result: Diagnosed) -> Text:
     return lines(told)
 
 
-def _one(result: Diagnosed, item: OmittedEffect) -> Text:
+def _one(result: JobDiagnosis, item: OmittedEffect) -> Text:
     d = result.diagnosis
     effect = effect_of(item.effect, d.after.effects)
     told = say("{title}: {size}.", title=item.title, size=size_of(effect, item.parameters, factors=False))
@@ -94,7 +94,7 @@ def _where(d: Diagnosis) -> Text:
     return say("{places:capital}.", places=semicolons([place_words(place) for place in d.where[:2]]))
 
 
-def _sure(result: Diagnosed) -> Text:
+def _sure(result: JobDiagnosis) -> Text:
     d = result.diagnosis
     if d.verdict == "consistent":
         told = say("Noise alone looks like this in {share} recordings.", share=share_of(d.p_value))
@@ -145,7 +145,7 @@ def share_of(p_value: float) -> Text:
     return say("{many:.0f} of 100", many=100 * p_value)
 
 
-def _to_do(result: Diagnosed) -> Text:
+def _to_do(result: JobDiagnosis) -> Text:
     d = result.diagnosis
     told: list[Text] = []
     if result.next_plan is not None and d.verdict != "consistent":
@@ -205,12 +205,12 @@ VERDICTS_IN_SHORT: Mapping[str, Text] = {
 """The same, to begin a summary with."""
 
 
-def verdict_of(result: Diagnosed) -> Text:
+def verdict_of(result: JobDiagnosis) -> Text:
     told = VERDICTS if result.simulated is None else AGAINST
     return told[result.diagnosis.verdict]
 
 
-def summary_lines(result: Diagnosed) -> list[Text]:
+def summary_lines(result: JobDiagnosis) -> list[Text]:
     """Verdict, the overview and what else follows, a sentence or two each."""
     d = result.diagnosis
     own = d.after.effects
@@ -229,7 +229,7 @@ def ambiguous(group: Sequence[Text]) -> Text:
     return say("This recording cannot tell apart: {effects}.", effects=commas(group))
 
 
-def stated_um(result: Diagnosed) -> float | None:
+def stated_um(result: JobDiagnosis) -> float | None:
     """Standard uncertainty of a coordinate, µm, that the job states; with that of the prediction that it is compared with."""
     stated = result.job.facts.recording.u_coordinate_um
     return (

@@ -30,7 +30,7 @@ from cmm_uq.certificate.origin import came_about, program
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.plots.residuals import length_plot, residual_plot
 from cmm_uq.certificate.plots.style import lettered_in
-from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.results.contents import diagnosis_data, head
 from cmm_uq.certificate.sections.findings import (
     contained,
@@ -48,7 +48,7 @@ from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
 from cmm_uq.maths.uncertainty.rounding import alike, figure
 
 
-def diagnosis_results(result: Diagnosed) -> dict[str, Any]:
+def diagnosis_results(result: JobDiagnosis) -> dict[str, Any]:
     posterior = result.diagnosis.posterior
     return {
         **head(result.job),
@@ -63,7 +63,7 @@ def diagnosis_results(result: Diagnosed) -> dict[str, Any]:
     }
 
 
-def diagnosis_document(result: Diagnosed) -> Document:
+def diagnosis_document(result: JobDiagnosis) -> Document:
     facts, d = result.job.facts, result.diagnosis
     return working_page(
         facts,
@@ -93,12 +93,12 @@ def diagnosis_document(result: Diagnosed) -> Document:
     )
 
 
-def diagnosis_sections(result: Diagnosed) -> tuple[Section, ...]:
+def diagnosis_sections(result: JobDiagnosis) -> tuple[Section, ...]:
     """What a diagnosis says, as sections of any document, the overview first."""
     return (Section(say("Diagnosis"), (overview_of(result),)), *_sections(result))
 
 
-def _sections(result: Diagnosed) -> tuple[Section, ...]:
+def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
     """What is to be done first, what it rests on behind it, long tables last."""
     noise = noise_words(result.diagnosis, stated_um(result))
     sections = (
@@ -117,21 +117,21 @@ def _sections(result: Diagnosed) -> tuple[Section, ...]:
     return tuple(section for section in sections if section.blocks)
 
 
-def _explained_by(result: Diagnosed) -> tuple[Text, Text]:
+def _explained_by(result: JobDiagnosis) -> tuple[Text, Text]:
     """What the recording is compared with, in short."""
     if result.simulated is None:
         return say("Effects that the job names"), commas(titles(result.job.facts.model.effects)) or say("none")
     return say("Compared with the simulation"), commas(names(result.simulated.files))
 
 
-def _simulation(result: Diagnosed) -> tuple[Section, ...]:
+def _simulation(result: JobDiagnosis) -> tuple[Section, ...]:
     if result.simulated is None:
         return ()
     d = result.diagnosis
     return (simulation_section(result.simulated, corrections(result.simulated, d.after, d.posterior)),)
 
 
-def _left_out(result: Diagnosed) -> tuple[Block, ...]:
+def _left_out(result: JobDiagnosis) -> tuple[Block, ...]:
     d = result.diagnosis
     if d.verdict == "consistent":
         return ()
@@ -142,7 +142,7 @@ def _left_out(result: Diagnosed) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _effect(result: Diagnosed, item: OmittedEffect) -> Facts:
+def _effect(result: JobDiagnosis, item: OmittedEffect) -> Facts:
     """One effect: what it is, how large, what to look at, how sure."""
     d = result.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
@@ -156,7 +156,7 @@ def _effect(result: Diagnosed, item: OmittedEffect) -> Facts:
     ))  # fmt: skip
 
 
-def _consistent(result: Diagnosed) -> tuple[Block, ...]:
+def _consistent(result: JobDiagnosis) -> tuple[Block, ...]:
     """The residuals of a recording that agrees with its model: within their uncertainty, and no other picture."""
     d = result.diagnosis
     if d.verdict != "consistent":
@@ -175,7 +175,7 @@ def _consistent(result: Diagnosed) -> tuple[Block, ...]:
     return Paragraph(verdict_of(result)), plot
 
 
-def _before_after(result: Diagnosed) -> tuple[Block, ...]:
+def _before_after(result: JobDiagnosis) -> tuple[Block, ...]:
     """Where something was found: each observation before and after, and what is gained."""
     d = result.diagnosis
     if not d.effects:
@@ -217,16 +217,16 @@ def _expanded(d: Diagnosis) -> Floats:
     return factor_of_noise(d.noise.coordinate) * d.noise.coordinate.value * d.before.artefact.noise_scale
 
 
-def _odd(result: Diagnosed) -> NDArray[np.bool_]:
+def _odd(result: JobDiagnosis) -> NDArray[np.bool_]:
     """(m,) whether the screening found the measurement odd."""
     return np.isin(result.diagnosis.before.artefact.measurement, [m for f in result.findings for m in f.measurements])
 
 
-def _label_before(result: Diagnosed) -> Text:
+def _label_before(result: JobDiagnosis) -> Text:
     return say("Residuals of the job's model") if result.simulated is None else say("Recorded minus predicted")
 
 
-def _changes(result: Diagnosed) -> Table | None:
+def _changes(result: JobDiagnosis) -> Table | None:
     """Estimates of the effects that the job names, before and after: how biased they were."""
     d = result.diagnosis
     if not d.effects:
@@ -260,7 +260,7 @@ def _title_of(key: tuple[str, str], model: MeasurementModel) -> Text:
     return parameter_title(owner, name, model.effects)
 
 
-def _consequences(result: Diagnosed) -> tuple[Block, ...]:
+def _consequences(result: JobDiagnosis) -> tuple[Block, ...]:
     """Figures and decisions of the recording, and of the same recording corrected for what was left out."""
     if result.consequences is None:
         return ()
@@ -299,7 +299,7 @@ def _consequences(result: Diagnosed) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _rivals(result: Diagnosed) -> Table:
+def _rivals(result: JobDiagnosis) -> Table:
     rows = tuple((title_of(name), probability(p)) for name, p in result.diagnosis.rivals)
     heads = (Column(say("Explanation"), numeric=False), Column(say("Probability")))
     notes: list[Text] = [say("Nothing missing has the rest.")]
@@ -313,7 +313,7 @@ def _rivals(result: Diagnosed) -> Table:
     return Table(say("Model comparison: one explanation alone"), heads, rows, tuple(notes))
 
 
-def diagnosed_outcome(result: Diagnosed) -> Outcome:
+def diagnosed_outcome(result: JobDiagnosis) -> Outcome:
     short = summary_of(result.job.facts, result.diagnosis.verdict, summary_lines(result), result.findings)
     with lettered_in(result.job.facts.job.language):
         document = diagnosis_document(result)

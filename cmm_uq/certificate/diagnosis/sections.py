@@ -31,7 +31,7 @@ from cmm_uq.base.units import Unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.effect_words import parameter_title, title_of, titles
 from cmm_uq.certificate.plots.plans import placing_pictures
-from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
 from cmm_uq.machine.model.artefact import Artefact
@@ -44,7 +44,7 @@ _PARTED = 3.0  # odds from which on two are parted at all
 TO_FILL_IN = "next_plan.csv"  # file that a diagnosis writes the set-ups to
 
 
-def next_section(result: Diagnosed) -> Section:
+def next_section(result: JobDiagnosis) -> Section:
     """The set-ups that would part what this recording cannot, or show what it could not have shown."""
     title, plan = say("What to measure next"), result.next_plan
     if plan is None:
@@ -57,7 +57,7 @@ def next_section(result: Diagnosed) -> Section:
     return Section(title, (*blocks, *placing_pictures(plan.placings, plan.box, plan.first)))
 
 
-def next_sentence(result: Diagnosed) -> Text:
+def next_sentence(result: JobDiagnosis) -> Text:
     """The set-ups in a sentence, with the odds that they are expected to reach; nothing without any."""
     plan = result.next_plan
     if plan is None:
@@ -86,7 +86,7 @@ def next_sentence(result: Diagnosed) -> Text:
     return say("{told} Odds of {odds} : 1 or more for the true one are then expected.", told=told, odds=rounded(least))
 
 
-def _what(result: Diagnosed, plan: NextPlan) -> Text:
+def _what(result: JobDiagnosis, plan: NextPlan) -> Text:
     times = plural(plan.repeats, one=say("once"), many=say("{times} times", times=plan.repeats))
     count = plural(len(plan.placings), one=say("one set-up"), many=say("{count} set-ups", count=len(plan.placings)))
     what = say(
@@ -181,7 +181,7 @@ def _shown_data(change: DetectionChange, effect: Effect) -> dict[str, Any]:
 _SHOWN = 4  # explanations that a table has columns for
 
 
-def costs_section(result: Diagnosed) -> Section:
+def costs_section(result: JobDiagnosis) -> Section:
     """A table of what remains; without blocks where one explanation is settled, or nothing depends on it."""
     title, rivals = say("What the choice of an explanation costs"), result.diagnosis.remaining.rivals
     rows = tuple(_cost_rows(result)) if rivals else ()
@@ -215,7 +215,7 @@ def costs_section(result: Diagnosed) -> Section:
     return Section(title, (Table(say("What follows from each explanation that remains"), heads, rows, tuple(notes)),))
 
 
-def costs_data(result: Diagnosed) -> dict[str, Any]:
+def costs_data(result: JobDiagnosis) -> dict[str, Any]:
     """For results.json: what remains, and the average; nothing where one explanation is settled."""
     remaining, costs = result.diagnosis.remaining, result.costs
     if not remaining.rivals:
@@ -242,7 +242,7 @@ def explanation(rival: Rival) -> Text:
     return commas(words) if words else say("nothing missing")
 
 
-def _cost_rows(result: Diagnosed) -> Iterator[tuple[Text, ...]]:
+def _cost_rows(result: JobDiagnosis) -> Iterator[tuple[Text, ...]]:
     """Of what the job names, of every figure and of every decision: under each explanation, and averaged."""
     remaining, costs = result.diagnosis.remaining, result.costs
     for effect, parameters in remaining.averaged.items():
@@ -278,7 +278,7 @@ _NAMED = 5  # effects that the sentence beside the verdict names
 _RANGES = 3
 
 
-def without_power(result: Diagnosed) -> Text:
+def without_power(result: JobDiagnosis) -> Text:
     """What follows a verdict of agreement where even a plausible common effect would not have shown; else nothing."""
     if result.diagnosis.verdict != "consistent":
         return NOTHING
@@ -300,7 +300,7 @@ def without_power(result: Diagnosed) -> Text:
     return say("But this recording could not have shown: {effects}.", effects=listed(words))
 
 
-def unseen_section(result: Diagnosed) -> Section:
+def unseen_section(result: JobDiagnosis) -> Section:
     """The smallest amplitude of each common effect that the recording would have shown, and rarer ones that it would not."""
     rows = tuple(
         (row.title, _found(row, row.detected), _found(row, row.named), _size(row.allowed, row.unit), _why(row))

@@ -1,7 +1,5 @@
 """Administrative data of a digital certificate: from the job; what it does not state says so.
 
-Administrative data of a digital certificate: from the job; what it does not state says so.
-
 A recording that nobody measured, a draft and an interim check are no certificates: their identifier begins with that, in
 capitals, their laboratory is named as nobody, and no word of conformity is said.
 """

@@ -31,7 +31,7 @@ from cmm_uq.certificate.digital_certificate.administration import (
     words_of,
 )
 from cmm_uq.certificate.digital_certificate.conformity import evidence, of_tolerances, statements
-from cmm_uq.certificate.digital_certificate.figures import Figures
+from cmm_uq.certificate.digital_certificate.figures import DigitalFigures
 from cmm_uq.certificate.digital_certificate.measurement import conditions, equipment, metadata, methods, software
 from cmm_uq.certificate.digital_certificate.quantities import (
     P95,
@@ -81,7 +81,7 @@ def digital_certificate(
     """The certificate, in the language that results.json names, and in English."""
     say_in = speaking(results["job"].get("language", ENGLISH))
     real, decided = certifies(job), results.get("conformity", ())
-    figures = Figures(say_in, free(results), of_tolerances(Verdicts.of_results(results), say_in, certifies=real))
+    figures = DigitalFigures(say_in, free(results), of_tolerances(Verdicts.of_results(results), say_in, certifies=real))
     stated = statements(decided, say_in, figures, certifies=real)
     return Certificate(
         administrative=Administrative(
@@ -134,7 +134,7 @@ def free(results: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(name for combination in known.get("undetermined", ()) for name in combination)
 
 
-def _results(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> list[Result]:
+def _results(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> list[Result]:
     keys = [key for key in (*_TITLES, *results) if key in results and key not in _NOT_STATED_THERE]
     found = []
     for key in dict.fromkeys(keys):
@@ -153,7 +153,7 @@ def _results(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> lis
     return found if together is None else [*found, together]
 
 
-def _together(results: Mapping[str, Any], say_in: SayIn, figures: Figures) -> Result | None:
+def _together(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> Result | None:
     """Estimates and their covariance as an ellipsoidal region; without what the recording does not determine."""
     data = results.get("covariance")
     if data is None:

@@ -15,7 +15,7 @@ from typing import Any
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.digital_certificate.administration import SayIn, english, one_line, rich_of, words_of
-from cmm_uq.certificate.digital_certificate.figures import Figures, Part
+from cmm_uq.certificate.digital_certificate.figures import DigitalFigures, Part
 from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, dsi_of, ratio
 from cmm_uq.certificate.wording import stated_row, stated_value
 from cmm_uq.jobs.dcc.administrative import Rich
@@ -70,7 +70,7 @@ def _of_tolerance(one: Verdict, say_in: SayIn, *, certifies: bool) -> Statement:
 
 
 def statements(
-    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool
+    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
 ) -> tuple[Statement, ...]:
     """A statement for each decision of results.json.
 
@@ -79,7 +79,7 @@ def statements(
     return tuple(_statement(i, one, say_in, figures, certifies=certifies) for i, one in enumerate(decided))
 
 
-def _statement(i: int, one: Mapping[str, Any], say_in: SayIn, figures: Figures, *, certifies: bool) -> Statement:
+def _statement(i: int, one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures, *, certifies: bool) -> Statement:
     decision = one["decision"]
     named = say(
         "{standard}, {characteristic}",
@@ -114,7 +114,7 @@ def _described(one: Mapping[str, Any]) -> Rich | None:
     return english(told) if told else None
 
 
-def _figures(path: tuple[str, ...], one: Mapping[str, Any], say_in: SayIn, figures: Figures) -> Iterator[Part]:
+def _figures(path: tuple[str, ...], one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> Iterator[Part]:
     """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
 
     def quantity(key: str, name: Text, value: Real, *ref_type: str) -> Quantity:
@@ -144,7 +144,9 @@ def _figures(path: tuple[str, ...], one: Mapping[str, Any], say_in: SayIn, figur
         yield from figures.parts((*path, key), one[key])
 
 
-def _permissible(path: tuple[str, ...], mpe: Mapping[str, Any], say_in: SayIn, figures: Figures) -> Iterator[Part]:
+def _permissible(
+    path: tuple[str, ...], mpe: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures
+) -> Iterator[Part]:
     """A, K and B of a maximum permissible error A + L/K, at most B."""
     units = {"a_um": _MICROMETRE, "k": ratio(_MILLIMETRE, _MICROMETRE), "b_um": _MICROMETRE}
     for key, value in mpe.items():
@@ -158,7 +160,7 @@ def _permissible(path: tuple[str, ...], mpe: Mapping[str, Any], say_in: SayIn, f
 
 
 def evidence(
-    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool
+    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
 ) -> tuple[Result, ...]:
     """Every value that was decided, and the budget of the one that is named."""
     found = []
@@ -173,7 +175,12 @@ def evidence(
 
 
 def _values(
-    path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], say_in: SayIn, figures: Figures, *, certifies: bool
+    path: tuple[str, ...],
+    errors: Sequence[Mapping[str, Any]],
+    say_in: SayIn,
+    figures: DigitalFigures,
+    *,
+    certifies: bool,
 ) -> Iterator[Part]:
     if not errors:
         return

@@ -59,7 +59,7 @@ _NO_RESULT = ("noise", "least_squares")
 """Keys of what is there for comparison, which nobody who looks for measured values should find."""
 
 
-class Figures:
+class DigitalFigures:
     """Makes quantities.
 
     ``say_in``: a text in the languages of the certificate; ``free``: paths of estimates that the recording does not

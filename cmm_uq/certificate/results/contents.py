@@ -18,7 +18,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.overview import sentence
 from cmm_uq.certificate.diagnosis.sections import costs_data, next_data, unseen_data
 from cmm_uq.certificate.origin import software
-from cmm_uq.certificate.result import Diagnosed, Result
+from cmm_uq.certificate.result import JobDiagnosis, Result
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import corrections, periods_data, withheld_data
 from cmm_uq.jobs.job import Job
@@ -98,7 +98,7 @@ def results(result: Result) -> dict[str, Any]:
     }
 
 
-def diagnosis_data(found: Diagnosed) -> dict[str, Any]:
+def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
     """The ``diagnosis`` part."""
     d, changes, simulated = found.diagnosis, found.consequences, found.simulated
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, listed, number, say
 from cmm_uq.certificate.document import Facts, Paragraph, Section
 from cmm_uq.certificate.plots.corner import corner_plot
-from cmm_uq.certificate.result import NoiseEstimate, Result
+from cmm_uq.certificate.result import RecordingNoise, Result
 from cmm_uq.certificate.wording import title_of
 from cmm_uq.machine.model.certified_places import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -18,7 +18,7 @@ _SHOWN = 0.8
 _WIDER = 1.05
 
 
-def noise_found(noise: NoiseEstimate, *, heavy_tails: bool) -> Text:
+def noise_found(noise: RecordingNoise, *, heavy_tails: bool) -> Text:
     """What was found, what could not show, and what it does to the uncertainties.
 
     ``heavy_tails``: whether the diagnosis found heavy tails, which are no component of the estimate.
@@ -39,7 +39,7 @@ def noise_found(noise: NoiseEstimate, *, heavy_tails: bool) -> Text:
     return say("{found}; not to be seen in this recording: {what}", found=found, what=listed(hidden))
 
 
-def _components(noise: NoiseEstimate) -> list[Text]:
+def _components(noise: RecordingNoise) -> list[Text]:
     there: list[Text] = []
     components = noise.components
     if noise.axes_apart > _SHOWN:

@@ -13,14 +13,14 @@ import pytest
 from cmm_uq.analysis.conformity.accuracy import figures
 from cmm_uq.app.commands.diagnose import diagnose_job
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.result import JobDiagnosis
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "iota-1102-20C-compensated"
 LIMIT_UM = 150.0
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
+def found(tmp_path_factory: pytest.TempPathFactory) -> JobDiagnosis:
     """With 150″ of squareness XY added to the compensated recording, and a model of scale alone."""
     job = tmp_path_factory.mktemp("squareness") / "job"
     shutil.copytree(EXAMPLE, job)
@@ -47,7 +47,7 @@ def lengths(file: Path) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.linalg.norm(xyz[1::2] - xyz[::2], axis=1)
 
 
-def test_corrected_figures_are_those_of_the_recording_before_the_squareness_was_added(found: Diagnosed) -> None:
+def test_corrected_figures_are_those_of_the_recording_before_the_squareness_was_added(found: JobDiagnosis) -> None:
     assert [item.effect for item in found.diagnosis.effects] == ["squareness_xy"]
     assert found.consequences is not None
     before = figures(lengths(EXAMPLE / "ballbar.csv"))
@@ -57,7 +57,7 @@ def test_corrected_figures_are_those_of_the_recording_before_the_squareness_was_
             assert as_recorded.value > corrected.value + 2 * corrected.u
 
 
-def test_a_decision_that_the_squareness_spoilt_is_mended_by_its_correction(found: Diagnosed) -> None:
+def test_a_decision_that_the_squareness_spoilt_is_mended_by_its_correction(found: JobDiagnosis) -> None:
     """As far as measured: position 18 is a copy of 14 and stays one."""
     assert found.consequences is not None
     (before, after), *_ = found.consequences.statements

@@ -21,7 +21,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.diagnosis.sections import costs_data, costs_section
 from cmm_uq.certificate.document import Table
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.result import Diagnosed, Result
+from cmm_uq.certificate.result import JobDiagnosis, Result
 from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import EVERY, effects
@@ -80,7 +80,7 @@ def certified(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 
 @pytest.fixture(scope="module")
-def found(certified: Result) -> Diagnosed:
+def found(certified: Result) -> JobDiagnosis:
     return certified.diagnosed
 
 
@@ -94,7 +94,7 @@ def results(outcome: Outcome) -> dict[str, Any]:
     return dict(json.loads(as_json(outcome.results)))
 
 
-def test_several_explanations_remain_and_the_true_one_is_among_them(found: Diagnosed) -> None:
+def test_several_explanations_remain_and_the_true_one_is_among_them(found: JobDiagnosis) -> None:
     remaining = found.diagnosis.remaining
     assert set(TRUTH) in [set(rival.effects) for rival in remaining.rivals]
     assert sorted(remaining.weights, reverse=True) == remaining.weights
@@ -102,7 +102,7 @@ def test_several_explanations_remain_and_the_true_one_is_among_them(found: Diagn
     assert remaining.weights[0] < SETTLED
 
 
-def test_under_the_explanation_that_is_asserted_it_is_the_joint_posterior(found: Diagnosed) -> None:
+def test_under_the_explanation_that_is_asserted_it_is_the_joint_posterior(found: JobDiagnosis) -> None:
     """Sampled by emcee under the same noise: means within a third of u, u within a third."""
     asserted = {item.effect: item for item in found.diagnosis.effects}
     rival = next(one for one in found.diagnosis.remaining.rivals if set(one.effects) == set(asserted))
@@ -182,7 +182,7 @@ def test_the_reader_is_told_what_is_averaged_and_what_is_not(certified: Result, 
     assert "Least squares, named model" in [column.heading for column in columns]
 
 
-def test_figures_under_an_explanation_are_those_of_the_lengths_corrected_for_it(found: Diagnosed) -> None:
+def test_figures_under_an_explanation_are_those_of_the_lengths_corrected_for_it(found: JobDiagnosis) -> None:
     """Without effects they are those recorded; with the three scales they are of the bar's own 400 mm again, but for noise."""
     costs, rivals = found.costs, found.diagnosis.remaining.rivals
     assert costs is not None
@@ -199,7 +199,7 @@ def test_figures_under_an_explanation_are_those_of_the_lengths_corrected_for_it(
         assert quantity.value == pytest.approx(p @ [cost.figures[name].value for cost in costs.each] / p.sum())
 
 
-def test_decisions_are_counted_by_the_probabilities_of_the_explanations(found: Diagnosed) -> None:
+def test_decisions_are_counted_by_the_probabilities_of_the_explanations(found: JobDiagnosis) -> None:
     costs = found.costs
     assert costs is not None
     (decided,) = costs.decisions
@@ -210,7 +210,7 @@ def test_decisions_are_counted_by_the_probabilities_of_the_explanations(found: D
         assert p == pytest.approx(sum(own) / whole)
 
 
-def test_page_and_results_have_a_column_for_each(found: Diagnosed) -> None:
+def test_page_and_results_have_a_column_for_each(found: JobDiagnosis) -> None:
     (table,) = costs_section(found).blocks
     assert isinstance(table, Table)
     assert table.columns[0].heading == "Quantity"

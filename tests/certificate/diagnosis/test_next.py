@@ -11,7 +11,6 @@ import pytest
 from cmm_uq.analysis.planning.advice import DetectionChange, NextPlan, Separation
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.certificate.diagnosis.sections import next_data, next_sentence
-from cmm_uq.certificate.result import Diagnosed
 from cmm_uq.machine.physics.catalogue import every
 from tests.artefacts.constructions import plate
 
@@ -50,6 +49,8 @@ def test_set_ups_that_would_part_nothing_are_no_advice(odds: tuple[float, ...], 
     plan = NextPlan((), 3, 5, pairs, (), reached=False, box=np.zeros((3, 2)))
     artefact = artefact_of(artefact_facts(kind="plate"), plate())
     before = SimpleNamespace(artefact=artefact)
-    told = next_sentence(cast("Diagnosed", SimpleNamespace(next_plan=plan, diagnosis=SimpleNamespace(before=before))))
+    told = next_sentence(
+        cast("JobDiagnosis", SimpleNamespace(next_plan=plan, diagnosis=SimpleNamespace(before=before)))
+    )
     assert expected in told
     assert told.startswith("Measure next: ") == (max(odds) > 3)

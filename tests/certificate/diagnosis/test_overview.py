@@ -18,7 +18,7 @@ from cmm_uq.certificate.diagnosis.overview import overview_of, share_of
 from cmm_uq.certificate.diagnosis.page import diagnosis_document
 from cmm_uq.certificate.document import Document, Overview, Plot, Table
 from cmm_uq.certificate.render.html import render_html
-from cmm_uq.certificate.result import Diagnosed
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.certificate.sections.where import place_words, region_words
 from cmm_uq.machine.physics.catalogue import EVERY
 from tests.artefacts.simulated import diagnosed
@@ -29,17 +29,17 @@ IDENTIFIER = re.compile(r"\b[a-z]+(?:_[a-z0-9]+)+\b")  # words that no technicia
 
 
 @cache
-def recorded() -> Diagnosed:
+def recorded() -> JobDiagnosis:
     return diagnose_job(ROOT / "examples" / "iota-1102-20C")
 
 
-def consistent() -> Diagnosed:
+def consistent() -> JobDiagnosis:
     """The same as if it could have shown everything, so that nothing more were to be measured."""
     return replace(recorded(), unseen=(), next_plan=None)
 
 
 @pytest.fixture(scope="module")
-def explained(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
+def explained(tmp_path_factory: pytest.TempPathFactory) -> JobDiagnosis:
     """The real recording, its squareness of X and Y left out."""
     folder = tmp_path_factory.mktemp("left out")
     for file in (ROOT / "examples" / "iota-1102-20C").iterdir():
@@ -49,7 +49,7 @@ def explained(tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     return diagnose_job(folder)
 
 
-def rows(found: Diagnosed) -> dict[str, str]:
+def rows(found: JobDiagnosis) -> dict[str, str]:
     return {str.__str__(label): str.__str__(text) for label, text in overview_of(found).rows}
 
 
@@ -57,7 +57,7 @@ def plots(document: Document) -> list[Plot]:
     return [block for section in document.sections for block in section.blocks if isinstance(block, Plot)]
 
 
-def test_what_was_found_is_said_with_its_sense_its_place_and_what_to_do(explained: Diagnosed) -> None:
+def test_what_was_found_is_said_with_its_sense_its_place_and_what_to_do(explained: JobDiagnosis) -> None:
     """−173″ by the machine's own calibration (Harris 2004, table 7): the angle is smaller than 90°."""
     told = rows(explained)
     assert list(told) == ["Found", "Where", "How sure", "What to do"]
@@ -91,7 +91,7 @@ def test_a_consistent_one_that_could_not_have_shown_much_says_so_and_what_to_mea
     assert titles.index("What to measure next") < titles.index("What would not have been seen")
 
 
-def test_an_explained_one_has_the_field_the_profile_and_each_observation(explained: Diagnosed) -> None:
+def test_an_explained_one_has_the_field_the_profile_and_each_observation(explained: JobDiagnosis) -> None:
     document = diagnosis_document(replace(explained, next_plan=None))
     assert len(plots(document)) == 3
     titles = [str.__str__(section.title) for section in document.sections]
@@ -99,14 +99,14 @@ def test_an_explained_one_has_the_field_the_profile_and_each_observation(explain
     assert titles[-1] == "Candidate explanations"  # long tables are detail
 
 
-def test_no_text_of_the_page_is_an_identifier(explained: Diagnosed) -> None:
+def test_no_text_of_the_page_is_an_identifier(explained: JobDiagnosis) -> None:
     document = diagnosis_document(explained)
     texts = [str.__str__(text) for text in leaves(replace(document, attachments=(), produced_by=document.title))]
     assert [text for text in texts if IDENTIFIER.search(text)] == []
     assert not [name for name in EVERY for text in texts if name in text]
 
 
-def test_an_unexplained_one_says_so_and_sends_nobody_to_compensate(explained: Diagnosed) -> None:
+def test_an_unexplained_one_says_so_and_sends_nobody_to_compensate(explained: JobDiagnosis) -> None:
     d = explained.diagnosis
     found = replace(
         explained, diagnosis=replace(d, verdict="unexplained", effects=(), after=d.before, indistinguishable=())
@@ -118,7 +118,7 @@ def test_an_unexplained_one_says_so_and_sends_nobody_to_compensate(explained: Di
     assert [text for text in field.lettering if "After" in text] == []
 
 
-def test_of_two_that_cannot_be_told_apart_both_causes_are_told(explained: Diagnosed) -> None:
+def test_of_two_that_cannot_be_told_apart_both_causes_are_told(explained: JobDiagnosis) -> None:
     group = (("squareness_xy", "straightness_x_y"),)
     told = rows(replace(explained, diagnosis=replace(explained.diagnosis, indistinguishable=group)))
     assert "It could as well be: straightness of X along Y." in told["Found"]
@@ -126,12 +126,12 @@ def test_of_two_that_cannot_be_told_apart_both_causes_are_told(explained: Diagno
     assert "If it is straightness of X along Y: a bowed guideway" in told["What to do"]
 
 
-def test_where_nothing_stands_out_by_itself_it_says_so(explained: Diagnosed) -> None:
+def test_where_nothing_stands_out_by_itself_it_says_so(explained: JobDiagnosis) -> None:
     told = rows(replace(explained, diagnosis=replace(explained.diagnosis, where=())))
     assert told["Where"] == "Spread over the recording: no reading or direction by itself stands out."
 
 
-def test_a_place_is_told_with_axis_covariate_and_region(explained: Diagnosed) -> None:
+def test_a_place_is_told_with_axis_covariate_and_region(explained: JobDiagnosis) -> None:
     (place,) = explained.diagnosis.where
     y = replace(place, covariate="y_mm", region=(300.4, 412.7), along="x")
     assert place_words(y) == "along X, depending on Y, most from 300 to 413\u00a0mm"
@@ -151,7 +151,7 @@ def test_a_p_value_is_told_as_a_share_of_recordings(p: float, told: str) -> None
     assert share_of(p) == told
 
 
-def test_the_verdict_is_said_in_colour_by_a_sign_and_in_words(explained: Diagnosed) -> None:
+def test_the_verdict_is_said_in_colour_by_a_sign_and_in_words(explained: JobDiagnosis) -> None:
     for found, sign, name in ((consistent(), "✓", "good"), (explained, "!", "open")):
         page = render_html(diagnosis_document(found))
         title = overview_of(found).verdict
@@ -160,14 +160,14 @@ def test_the_verdict_is_said_in_colour_by_a_sign_and_in_words(explained: Diagnos
         assert page.index('class="overview') < page.index('class="particulars"')
 
 
-def test_the_terminal_says_the_same_four_lines_first(explained: Diagnosed, tmp_path: Path) -> None:
+def test_the_terminal_says_the_same_four_lines_first(explained: JobDiagnosis, tmp_path: Path) -> None:
     job = explained.job.folder
     remarks = cmm_uq.diagnose(job).outcome.summary.remarks
     for (label, text), said in zip(rows(explained).items(), remarks, strict=False):
         assert str.__str__(said) == f"{label}: {text}"
 
 
-def test_an_overview_is_a_block_of_any_document(explained: Diagnosed) -> None:
+def test_an_overview_is_a_block_of_any_document(explained: JobDiagnosis) -> None:
     from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 
     first = diagnosis_sections(explained)[0].blocks[0]
@@ -175,7 +175,7 @@ def test_an_overview_is_a_block_of_any_document(explained: Diagnosed) -> None:
     assert first == overview_of(explained)
 
 
-def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(explained: Diagnosed) -> None:
+def test_what_remains_as_probable_without_what_is_asserted_is_said_beside_it(explained: JobDiagnosis) -> None:
     d, free = explained.diagnosis, np.zeros((0, 0))
 
     def rival(probability: float, *effects: str, unknown: bool = False) -> Rival:
