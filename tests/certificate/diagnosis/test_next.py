@@ -11,6 +11,7 @@ import pytest
 from cmm_uq.analysis.planning.advice import DetectionChange, NextPlan, Separation
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.certificate.diagnosis.sections import next_data, next_sentence
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.machine.physics.catalogue import every
 from tests.artefacts.constructions import plate
 
