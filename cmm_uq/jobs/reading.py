@@ -46,7 +46,7 @@ from cmm_uq.jobs.tables.machine import MachineFacts
 from cmm_uq.jobs.tables.origin import altered, check_examples, check_mark, is_planned
 
 if TYPE_CHECKING:
-    from cmm_uq.jobs.recording.certified import CertifiedValues as Read
+    from cmm_uq.jobs.recording.certified import CertifiedValues
 
 PART = "part"
 """The table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`."""
@@ -157,7 +157,7 @@ def _pictures(source: JobFiles, names: Sequence[str]) -> dict[str, bytes]:
 
 
 def _certified_points(
-    facts: JobFile, points: Points, inputs: Mapping[str, bytes], source: JobFiles, says: Read | None,
+    facts: JobFile, points: Points, inputs: Mapping[str, bytes], source: JobFiles, says: CertifiedValues | None,
     told: Sequence[Recognition | None],
 ) -> tuple[JobFile, Points, Recognition | None]:  # fmt: skip
     """A recording with certified values and their uncertainties, the job with covariances, how their file was read."""
@@ -251,10 +251,10 @@ def read_machine(folder: Path, nameable: Nameable) -> Job:
     return Job(path.parent, facts, _no_points(_machine(facts.machine)), inputs)
 
 
-def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Read | None]:
+def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, CertifiedValues | None]:
     """job.toml: its bytes, what it says with the digital certificate of its artefact, and what that says alone."""
     content = source.job_file(JOB_BYTES, "A job is a folder with a job.toml and the recording that it names")
-    says: list[Read] = []
+    says: list[CertifiedValues] = []
 
     def beside(data: dict[str, Any]) -> dict[str, Any]:
         found = _certified(data, source, nameable)
@@ -273,7 +273,7 @@ def _facts(source: JobFiles, nameable: Nameable) -> tuple[bytes, JobFile, Read |
     return content, facts, says[0] if says else None
 
 
-def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> Read | None:
+def _certified(data: dict[str, Any], source: JobFiles, nameable: Nameable) -> CertifiedValues | None:
     """What the digital certificate of the artefact says, where the job names one."""
     artefact = data.get("artefact")
     if not isinstance(artefact, dict) or not isinstance(artefact.get("certificate"), dict):

@@ -28,8 +28,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self, get_args
 
-from cmm_uq.base.messages import Argument, Day, Message, Number, Plural, Text, fields_of
-from cmm_uq.base.messages import PatternFormatter as Filled
+from cmm_uq.base.messages import Argument, Day, Message, Number, PatternFormatter, Plural, Text, fields_of
 
 Code = Literal["en", "de", "fr", "ja"]
 """Of a language, by BCP 47."""
@@ -235,7 +234,7 @@ def _arguments(message: Message) -> Mapping[str, Argument]:
     return {**message.one.arguments, **message.many.arguments, **message.arguments}
 
 
-class _Localised(Filled):
+class _Localised(PatternFormatter):
     """Numbers as the language writes them; in one without capitals nothing is changed to one."""
 
     def __init__(self, language: Language) -> None:

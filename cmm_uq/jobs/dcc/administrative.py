@@ -21,11 +21,11 @@ from cmm_uq.jobs.dcc.fields import (
     Child,
     Choice,
     Content,
+    Element,
+    ForeignElements,
     Many,
     one_of,
 )
-from cmm_uq.jobs.dcc.fields import Element as Part
-from cmm_uq.jobs.dcc.fields import ForeignElements as Foreign
 from cmm_uq.jobs.dcc.quantities import Complex, Constant, Hybrid, Real, RealList
 from cmm_uq.jobs.dcc.tree import Node
 
@@ -34,7 +34,20 @@ RefId = Annotated[tuple[str, ...], Attribute("refId", NAMES)]
 RefType = Annotated[tuple[str, ...], Attribute("refType", STRINGS)]
 
 
-class LanguageText(Part, kw_only=False):
+class Identified(Element):
+    """With an id, and what it is by the vocabularies of good practice."""
+
+    id: Id = None
+    ref_type: RefType = ()
+
+
+class Referring(Identified):
+    """That may refer to others by their ids."""
+
+    ref_id: RefId = ()
+
+
+class LanguageText(Element, kw_only=False):
     """A text in a language (``stringWithLangType``)."""
 
     text: Annotated[str, Content(STRING)]
@@ -44,7 +57,7 @@ class LanguageText(Part, kw_only=False):
     ref_type: RefType = ()
 
 
-class Words(Part, kw_only=False):
+class Words(Element, kw_only=False):
     """The same text in its languages (``textType``)."""
 
     contents: Annotated[tuple[LanguageText, ...], Many("content")]
@@ -54,7 +67,7 @@ class Words(Part, kw_only=False):
         return text_of(self.contents)
 
 
-class Latex(Part, kw_only=False):
+class Latex(Element, kw_only=False):
     """A formula (``formulaType``), as LaTeX or MathML."""
 
     latex: Annotated[str | None, Child("latex", STRING)] = None
@@ -64,16 +77,16 @@ class Latex(Part, kw_only=False):
     ref_type: RefType = ()
 
 
-class Markup(Part, kw_only=False):
+class Markup(Element, kw_only=False):
     """XML of another namespace (``xmlType``)."""
 
-    nodes: Annotated[tuple[Node, ...], Foreign()] = ()
+    nodes: Annotated[tuple[Node, ...], ForeignElements()] = ()
     id: Id = None
     ref_id: RefId = ()
     ref_type: RefType = ()
 
 
-class Attached(Part):
+class Attached(Referring):
     """A file (``byteDataType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -81,12 +94,9 @@ class Attached(Part):
     file_name: Annotated[str, Child("fileName", NOT_EMPTY)]
     mime_type: Annotated[str, Child("mimeType", NOT_EMPTY)]
     data: Annotated[bytes, Child("dataBase64", BYTES)]
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class Rich(Part, kw_only=False):
+class Rich(Element, kw_only=False):
     """A text with what belongs to it (``richContentType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -136,18 +146,16 @@ Flag = bool | None
 String = Annotated[str | None, Child("value", NOT_EMPTY)]
 
 
-class Software(Part):
+class Software(Identified):
     """A program (``softwareType``)."""
 
     name: Annotated[Words, Child("name")]
     release: Annotated[str, Child("release", NOT_EMPTY)]
     type: Annotated[str | None, Child("type", one_of(*SOFTWARE_TYPES))] = None
     description: Annotated[Rich | None, Child("description")] = None
-    id: Id = None
-    ref_type: RefType = ()
 
 
-class RefTypeDefinition(Part):
+class RefTypeDefinition(Element):
     """Where a family of ``refType`` is defined."""
 
     name: Annotated[Words, Child("name")]
@@ -160,20 +168,18 @@ class RefTypeDefinition(Part):
     ref_type: RefType = ()
 
 
-class IdentificationNumber(Part):
+class IdentificationNumber(Identified):
     """A serial number, an inventory number, ... with who issued it."""
 
     issuer: Annotated[str, Child("issuer", one_of(*ISSUERS))]
     value: Annotated[str, Child("value", NOT_EMPTY)]
     name: Annotated[Words | None, Child("name")] = None
-    id: Id = None
-    ref_type: RefType = ()
 
 
 Identifications = Annotated[tuple[IdentificationNumber, ...], Many("identification", within="identifications")]
 
 
-class Coordinates(Part):
+class Coordinates(Referring):
     """A place by coordinates."""
 
     system: Annotated[str, Child("positionCoordinateSystem", NOT_EMPTY)]
@@ -182,12 +188,9 @@ class Coordinates(Part):
     first: Annotated[Real, Child("positionCoordinate1")]
     second: Annotated[Real, Child("positionCoordinate2")]
     third: Annotated[Real | None, Child("positionCoordinate3")] = None
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class Location(Part):
+class Location(Element):
     """An address (``locationType``), whose parts stand in any order."""
 
     UNORDERED: ClassVar[bool] = True
@@ -203,7 +206,7 @@ class Location(Part):
     coordinates: Annotated[tuple[Coordinates, ...], Many("positionCoordinates")] = ()
 
 
-class Somebody(Part):
+class Somebody(Referring):
     """Somebody, perhaps without an address (``contactNotStrictType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -212,9 +215,6 @@ class Somebody(Part):
     fax: Annotated[str | None, Child("fax", NOT_EMPTY)] = None
     location: Annotated[Location | None, Child("location")] = None
     description: Annotated[Attached | None, Child("descriptionData")] = None
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
 class Contact(Somebody):
@@ -223,7 +223,7 @@ class Contact(Somebody):
     location: Annotated[Location, Child("location")]
 
 
-class Hash(Part):
+class Hash(Identified):
     """Another document, with its hash (``hashType``)."""
 
     referral: Annotated[Words, Child("referral")]
@@ -234,26 +234,22 @@ class Hash(Part):
     in_validity_range: Annotated[Flag, Child("inValidityRange", BOOLEAN)] = None
     traceable: Annotated[Flag, Child("traceable", BOOLEAN)] = None
     linked: Annotated[Hash | None, Child("linkedReport")] = None
-    id: Id = None
-    ref_type: RefType = ()
 
 
-class EquipmentClass(Part):
+class EquipmentClass(Identified):
     """A class of equipment by some classification."""
 
     reference: Annotated[str, Child("reference", NOT_EMPTY)]
     class_id: Annotated[str, Child("classID", NOT_EMPTY)]
-    id: Id = None
-    ref_type: RefType = ()
 
 
-class Characters(Part, kw_only=False):
+class Characters(Element, kw_only=False):
     """Words in place of a quantity."""
 
     words: Annotated[tuple[str, ...], Content(STRINGS)]
 
 
-class PrimitiveQuantity(Part):
+class PrimitiveQuantity(Referring):
     """A quantity of an item or of equipment (``primitiveQuantityType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -264,12 +260,9 @@ class PrimitiveQuantity(Part):
             ("noQuantity", "charsXMLList", "si:real", "si:hybrid", "si:complex", "si:constant", "si:realListXMLList")
         ),
     ]
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class Item(Part):
+class Item(Identified):
     """What is calibrated."""
 
     name: Annotated[Words, Child("name")]
@@ -280,11 +273,9 @@ class Item(Part):
     model: Annotated[str | None, Child("model", NOT_EMPTY)] = None
     identifications: Identifications
     quantities: Annotated[tuple[PrimitiveQuantity, ...], Many("itemQuantity", within="itemQuantities")] = ()
-    id: Id = None
-    ref_type: RefType = ()
 
 
-class Items(Part):
+class Items(Element):
     """The items, and what they have in common."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -296,25 +287,20 @@ class Items(Part):
     items: Annotated[tuple[Item, ...], Many("item")]
 
 
-class PerformanceLocation(Part):
+class PerformanceLocation(Referring):
     """Where it was calibrated."""
 
     place: Annotated[str, Content(one_of(*LOCATIONS))]
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class ReplacedReport(Part):
+class ReplacedReport(Identified):
     """A certificate that this one amends or substitutes."""
 
     change: Annotated[str, Child("typeOfChange", one_of(*CHANGES))]
     identifier: Annotated[str, Child("replacedUniqueIdentifier", NOT_EMPTY)]
-    id: Id = None
-    ref_type: RefType = ()
 
 
-class CoreData(Part):
+class CoreData(Element):
     """Identifier, languages and dates."""
 
     country: Annotated[str, Child("countryCodeISO3166_1", COUNTRY)]
@@ -331,7 +317,7 @@ class CoreData(Part):
     previous: Annotated[Hash | None, Child("previousReport")] = None
 
 
-class CalibrationLaboratory(Part):
+class CalibrationLaboratory(Element):
     """The calibration laboratory."""
 
     code: Annotated[str | None, Child("calibrationLaboratoryCode", NOT_EMPTY)] = None
@@ -341,7 +327,7 @@ class CalibrationLaboratory(Part):
     time_stamp: Annotated[Flag, Child("cryptElectronicTimeStamp", BOOLEAN)] = None
 
 
-class Person(Part):
+class Person(Identified):
     """Somebody responsible (``respPersonType``)."""
 
     person: Annotated[Somebody, Child("person")]
@@ -351,5 +337,3 @@ class Person(Part):
     seal: Annotated[Flag, Child("cryptElectronicSeal", BOOLEAN)] = None
     signature: Annotated[Flag, Child("cryptElectronicSignature", BOOLEAN)] = None
     time_stamp: Annotated[Flag, Child("cryptElectronicTimeStamp", BOOLEAN)] = None
-    id: Id = None
-    ref_type: RefType = ()

@@ -7,28 +7,27 @@ from typing import Annotated, ClassVar
 
 from cmm_uq.jobs.dcc.administrative import (
     Attached,
+    CalibrationLaboratory,
     Characters,
     Contact,
     CoreData,
     EquipmentClass,
     Hash,
-    Id,
     Identifications,
+    Identified,
     Items,
     Latex,
     Location,
     Markup,
     Person,
     PrimitiveQuantity,
-    RefId,
-    RefType,
+    Referring,
     RefTypeDefinition,
     Rich,
     Software,
     Somebody,
     Words,
 )
-from cmm_uq.jobs.dcc.administrative import CalibrationLaboratory as Laboratory
 from cmm_uq.jobs.dcc.fields import (
     BOOLEAN,
     BOOLEANS,
@@ -41,13 +40,13 @@ from cmm_uq.jobs.dcc.fields import (
     Attribute,
     Child,
     Choice,
+    Element,
+    ForeignElements,
     Many,
     Simple,
     listed,
     one_of,
 )
-from cmm_uq.jobs.dcc.fields import Element as Part
-from cmm_uq.jobs.dcc.fields import ForeignElements as Foreign
 from cmm_uq.jobs.dcc.quantities import Complex, Constant, Hybrid, Lists, Real, RealList
 from cmm_uq.jobs.dcc.tree import Node
 
@@ -57,22 +56,20 @@ STATES = ("beforeAdjustment", "afterAdjustment", "beforeRepair", "afterRepair")
 Strings = tuple[str, ...]
 
 
-class Method(Part):
+class Method(Identified):
     """A method that was used (``usedMethodType``)."""
 
     name: Annotated[Words, Child("name")]
     description: Annotated[Rich | None, Child("description")] = None
     norms: Annotated[Strings, Many("norm", NOT_EMPTY)] = ()
     references: Annotated[Strings, Many("reference", NOT_EMPTY)] = ()
-    id: Id = None
-    ref_type: RefType = ()
 
 
 Methods = Annotated[tuple[Method, ...], Many("usedMethod", within="usedMethods")]
 UsedSoftware = Annotated[tuple[Software, ...], Many("software", within="usedSoftware")]
 
 
-class Equipment(Part):
+class Equipment(Identified):
     """A piece of equipment (``measuringEquipmentType``); its certificate is how the result is traceable."""
 
     name: Annotated[Words, Child("name")]
@@ -85,11 +82,9 @@ class Equipment(Part):
     quantities: Annotated[
         tuple[PrimitiveQuantity, ...], Many("measuringEquipmentQuantity", within="measuringEquipmentQuantities")
     ] = ()
-    id: Id = None
-    ref_type: RefType = ()
 
 
-class Equipments(Part):
+class Equipments(Element):
     """The equipment, and what it has in common."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -100,19 +95,16 @@ class Equipments(Part):
     equipment: Annotated[tuple[Equipment, ...], Many("measuringEquipment")]
 
 
-class Data(Part):
+class Data(Referring):
     """What a result or a condition says, in its order (``dataType``)."""
 
     parts: Annotated[
         tuple[Rich | Latex | Attached | Markup | DccQuantity | QuantityList, ...],
         Choice(("text", "formula", "byteData", "xml", "quantity", "list"), many=True),
     ]
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class InfluenceCondition(Part):
+class InfluenceCondition(Identified):
     """Something that influences (``conditionType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -120,14 +112,12 @@ class InfluenceCondition(Part):
     status: Annotated[str | None, Child("status", one_of(*STATES))] = None
     certificate: Annotated[Hash | None, Child("certificate")] = None
     data: Annotated[Data, Child("data")]
-    id: Id = None
-    ref_type: RefType = ()
 
 
 Conditions = Annotated[tuple[InfluenceCondition, ...], Many("influenceCondition", within="influenceConditions")]
 
 
-class StatementMetadata(Part):
+class StatementMetadata(Referring):
     """A statement, or metadata of a measurement (``statementMetaDataType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -151,21 +141,18 @@ class StatementMetadata(Part):
     non_si_definition: Annotated[str | None, Child("nonSIDefinition", NOT_EMPTY)] = None
     non_si_unit: Annotated[str | None, Child("nonSIUnit", NOT_EMPTY)] = None
     location: Annotated[Location | None, Child("location")] = None
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
 Statements = Annotated[tuple[StatementMetadata, ...], Many("metaData", within="measurementMetaData")]
 
 
-class RelativeUncertainty(Part):
+class RelativeUncertainty(Element):
     """Relative uncertainty of a quantity."""
 
     stated: Annotated[RealList | Real, Choice(("relativeUncertaintyXmlList", "relativeUncertaintySingle"))]
 
 
-class DccQuantity(Part):
+class DccQuantity(Referring):
     """A quantity (``quantityType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -182,12 +169,9 @@ class DccQuantity(Part):
     equipment: Annotated[Equipments | None, Child("measuringEquipments")] = None
     conditions: Conditions = ()
     metadata: Statements = ()
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class QuantityList(Part):
+class QuantityList(Referring):
     """Quantities that belong together, a table (``listType``)."""
 
     name: Annotated[Words | None, Child("name")] = None
@@ -200,23 +184,17 @@ class QuantityList(Part):
     equipment: Annotated[Equipments | None, Child("measuringEquipments")] = None
     conditions: Conditions = ()
     metadata: Statements = ()
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class DccResult(Part):
+class DccResult(Referring):
     """A result."""
 
     name: Annotated[Words, Child("name")]
     description: Annotated[Rich | None, Child("description")] = None
     data: Annotated[Data, Child("data")]
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
-class Measurement(Part):
+class Measurement(Referring):
     """A measurement with its results (``measurementResultType``)."""
 
     name: Annotated[Words, Child("name")]
@@ -227,9 +205,6 @@ class Measurement(Part):
     conditions: Conditions = ()
     results: Annotated[tuple[DccResult, ...], Many("result", within="results")]
     metadata: Statements = ()
-    id: Id = None
-    ref_id: RefId = ()
-    ref_type: RefType = ()
 
 
 VERSION = "3.2.1"
@@ -242,7 +217,7 @@ def _version(text: str) -> str:
     return text
 
 
-class Administrative(Part):
+class Administrative(Element):
     """Administrative data; its parts stand in any order."""
 
     UNORDERED: ClassVar[bool] = True
@@ -251,19 +226,19 @@ class Administrative(Part):
     ref_types: Annotated[tuple[RefTypeDefinition, ...], Many("refTypeDefinition", within="refTypeDefinitions")] = ()
     core: Annotated[CoreData, Child("coreData")]
     items: Annotated[Items, Child("items")]
-    laboratory: Annotated[Laboratory, Child("calibrationLaboratory")]
+    laboratory: Annotated[CalibrationLaboratory, Child("calibrationLaboratory")]
     persons: Annotated[tuple[Person, ...], Many("respPerson", within="respPersons")]
     customer: Annotated[Contact, Child("customer")]
     statements: Annotated[tuple[StatementMetadata, ...], Many("statement", within="statements")] = ()
 
 
-class Comment(Part):
+class Comment(Element):
     """Whatever else is said, in XML of any kind."""
 
-    nodes: Annotated[tuple[Node, ...], Foreign()] = ()
+    nodes: Annotated[tuple[Node, ...], ForeignElements()] = ()
 
 
-class Certificate(Part):
+class Certificate(Element):
     """A certificate.
 
     version : of the schema.
@@ -276,4 +251,4 @@ class Certificate(Part):
     measurements: Annotated[tuple[Measurement, ...], Many("measurementResult", within="measurementResults")]
     comment: Annotated[Comment | None, Child("comment")] = None
     document: Annotated[Attached | None, Child("document")] = None
-    signatures: Annotated[tuple[Node, ...], Foreign()] = ()
+    signatures: Annotated[tuple[Node, ...], ForeignElements()] = ()

@@ -132,6 +132,10 @@ FACTORS = listed(FACTOR, "coverage factors, 1 or more")
 PROBABILITIES = listed(PROBABILITY, "probabilities")
 
 
+_LAST = "id ref_id ref_type"
+"""Fields that stand behind all others of a class, in this order."""
+
+
 class _Missing:
     """In place of a default."""
 
@@ -150,7 +154,8 @@ class Element:
 
     def __init_subclass__(cls, *, kw_only: bool = True) -> None:
         own = [name for name, hint in cls.__annotations__.items() if not hint.startswith("ClassVar")]
-        cls.FIELDS = MappingProxyType({**cls.FIELDS, **{name: cls.__dict__.get(name, _Missing) for name in own}})
+        fields = {**cls.FIELDS, **{name: cls.__dict__.get(name, _Missing) for name in own}}
+        cls.FIELDS = MappingProxyType({name: fields[name] for name in sorted(fields, key=_LAST.find)})
 
     def __init__(self, *given: Any, **named: Any) -> None:
         values = {**self.FIELDS, **dict(zip(self.FIELDS, given, strict=False)), **named}

@@ -12,13 +12,12 @@ from decimal import Decimal
 from typing import Any
 
 from cmm_uq.jobs.dcc.administrative import Characters, Latex, Rich, Words
-from cmm_uq.jobs.dcc.certificate import Certificate, Data, Measurement, QuantityList
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.certificate import Certificate, Data, DccQuantity, Measurement, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.quantities import (
     Complex,
     Complexes,
     Constant,
+    EllipsoidalRegion,
     Expanded,
     ExpandedList,
     ExpandedListMU,
@@ -32,13 +31,12 @@ from cmm_uq.jobs.dcc.quantities import (
     RealInList,
     RealList,
     Reals,
+    RectangularRegion,
     StandardListMU,
     StandardMU,
     Univariate,
     UnivariateList,
 )
-from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion as Ellipsoid
-from cmm_uq.jobs.dcc.quantities import RectangularRegion as Box
 
 
 @dataclass(frozen=True)
@@ -114,13 +112,13 @@ def figures(certificate: Certificate) -> tuple[QuantityFigures, ...]:
 def of_data(data: Data, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
     """Of a result or an influence condition."""
     for part in data.parts:
-        if isinstance(part, (Quantity, QuantityList)):
+        if isinstance(part, (DccQuantity, QuantityList)):
             yield from _of(part, place)
         elif isinstance(part, (Rich, Latex)):
             yield QuantityFigures(place, "", words=(_words(part),))
 
 
-def _of(part: Quantity | QuantityList, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
+def _of(part: DccQuantity | QuantityList, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
     name = _name(part.name)
     if isinstance(part, QuantityList):
         for inner in part.parts:
@@ -131,16 +129,16 @@ def _of(part: Quantity | QuantityList, place: tuple[str, ...]) -> Iterator[Quant
         yield replace(own, **given)
 
 
-def statements(measurement: Measurement) -> Iterator[Statement]:
+def statements(measurement: Measurement) -> Iterator[StatementMetadata]:
     """What is stated of a measurement, and of the lists and quantities of its results."""
     yield from measurement.metadata
     for result in measurement.results:
         for part in result.data.parts:
-            if isinstance(part, (Quantity, QuantityList)):
+            if isinstance(part, (DccQuantity, QuantityList)):
                 yield from _statements(part)
 
 
-def _statements(part: Quantity | QuantityList) -> Iterator[Statement]:
+def _statements(part: DccQuantity | QuantityList) -> Iterator[StatementMetadata]:
     yield from part.metadata
     for inner in part.parts if isinstance(part, QuantityList) else ():
         yield from _statements(inner)
@@ -226,7 +224,9 @@ def _each(given: Sequence[Any], count: int, otherwise: Any) -> tuple[Any, ...]:
     return (given[0],) * count if len(given) == 1 else (otherwise,) * count
 
 
-def _covariance(region: Ellipsoid | Box | None) -> tuple[tuple[tuple[Decimal, ...], ...], str] | None:
+def _covariance(
+    region: EllipsoidalRegion | RectangularRegion | None,
+) -> tuple[tuple[tuple[Decimal, ...], ...], str] | None:
     if region is None:
         return None
     units = {one.unit for column in region.columns for one in column.covariances}

@@ -24,9 +24,9 @@ from cmm_uq.jobs.dcc.fields import (
     UNCERTAINTY,
     Child,
     Choice,
+    Element,
     Many,
 )
-from cmm_uq.jobs.dcc.fields import Element as Part
 
 Decimals = tuple[Decimal, ...]
 Label = Annotated[str | None, Child("label", STRING)]
@@ -35,7 +35,7 @@ Distribution = Annotated[str | None, Child("distribution", STRING)]
 Distributions = Annotated[tuple[str, ...], Child("distributionXMLList", STRINGS)]
 
 
-class _Si(Part):
+class _Si(Element):
     """Of the namespace of D-SI."""
 
     SPACE: ClassVar[str] = "si"

@@ -14,19 +14,26 @@ from typing import Any, cast
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.jobs.dcc.administrative import CoreData, Markup
 from cmm_uq.jobs.dcc.certificate import VERSION, Certificate, Comment
-from cmm_uq.jobs.dcc.fields import Attribute, Choice, Content, Field, Many, Simple, by_tag, fields_of
-from cmm_uq.jobs.dcc.fields import Element as Part
-from cmm_uq.jobs.dcc.fields import ForeignElements as Foreign
-from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion as Ellipsoid
-from cmm_uq.jobs.dcc.quantities import Interval, RealList, Region
-from cmm_uq.jobs.dcc.quantities import RectangularRegion as Box
+from cmm_uq.jobs.dcc.fields import (
+    Attribute,
+    Choice,
+    Content,
+    Element,
+    Field,
+    ForeignElements,
+    Many,
+    Simple,
+    by_tag,
+    fields_of,
+)
+from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion, Interval, RealList, RectangularRegion, Region
 from cmm_uq.jobs.dcc.tree import Node, parsed
 
 Problem = tuple[str, str]
 """What is wrong, and how to mend it."""
 
 
-def problems_of(part: Part) -> Iterator[Problem]:
+def problems_of(part: Element) -> Iterator[Problem]:
     """What is wrong with a part by itself."""
     check = _CHECKS.get(type(part))
     if check is not None:
@@ -81,8 +88,8 @@ def _core(core: CoreData) -> Iterator[Problem]:
         yield f"the mandatory language {missing[0]!r} is not used", "Name it among the used ones"
 
 
-_CHECKS: Mapping[type[Part], Callable[[Any], Iterator[Problem]]] = MappingProxyType({
-    RealList: _list, Ellipsoid: _region, Box: _region, Interval: _interval, CoreData: _core,
+_CHECKS: Mapping[type[Element], Callable[[Any], Iterator[Problem]]] = MappingProxyType({
+    RealList: _list, EllipsoidalRegion: _region, RectangularRegion: _region, Interval: _interval, CoreData: _core,
 })  # fmt: skip
 
 
@@ -128,7 +135,7 @@ class _Reader:
         self.gathered, self.wrong = Gathered(), 0
         self.unread: list[str] = []
 
-    def read(self, node: Node, cls: type[Part]) -> Any:
+    def read(self, node: Node, cls: type[Element]) -> Any:
         """An element as a class; None where something of it is wrong."""
         fields, before = fields_of(cls), self.wrong
         children = self._sorted(node, cls)
@@ -146,10 +153,10 @@ class _Reader:
         for node, (problem, fix) in ids_and_references(root):
             self._wrong(node, problem, fix)
 
-    def _sorted(self, node: Node, cls: type[Part]) -> list[list[Node]]:
+    def _sorted(self, node: Node, cls: type[Element]) -> list[list[Node]]:
         """Children by the field that they belong to, in the order of the schema."""
         fields, places = fields_of(cls), by_tag(cls)
-        rest = next((i for i, field in enumerate(fields) if isinstance(field.place, Foreign)), None)
+        rest = next((i for i, field in enumerate(fields) if isinstance(field.place, ForeignElements)), None)
         found: list[list[Node]] = [[] for _ in fields]
         last, ordered = -1, not cls.UNORDERED
         for child in node.children:
@@ -177,7 +184,7 @@ class _Reader:
             return None if text is None else self._simple(node, place.simple, text, f"@{place.tag}")
         if isinstance(place, Content):
             return self._simple(node, place.simple, node.text)
-        if isinstance(place, Foreign):
+        if isinstance(place, ForeignElements):
             return tuple(children)
         return self._elements(node, field, list(self._inner(field, children)))
 
@@ -219,7 +226,7 @@ class _Reader:
         for inner in child.children:
             self._unknown(inner, [])
         place = field.place
-        simple = None if isinstance(place, Foreign | Choice | Content) else place.simple
+        simple = None if isinstance(place, ForeignElements | Choice | Content) else place.simple
         return None if simple is None else self._simple(child, simple, child.text)
 
     def _simple(self, node: Node, simple: Simple, text: str, which: str = "") -> Any:

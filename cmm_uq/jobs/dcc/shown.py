@@ -8,13 +8,9 @@ from decimal import Decimal
 from typing import Any
 
 from cmm_uq.base.units import UNITS
-from cmm_uq.jobs.dcc.administrative import Contact, Hash, Somebody, Words
-from cmm_uq.jobs.dcc.administrative import IdentificationNumber as Identification
-from cmm_uq.jobs.dcc.certificate import Certificate, Measurement
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
-from cmm_uq.jobs.dcc.figures import QuantityFigures as Figures
-from cmm_uq.jobs.dcc.figures import ValueUncertainty as Stated
-from cmm_uq.jobs.dcc.figures import figures, of_data, statements
+from cmm_uq.jobs.dcc.administrative import Contact, Hash, IdentificationNumber, Somebody, Words
+from cmm_uq.jobs.dcc.certificate import Certificate, Measurement, StatementMetadata
+from cmm_uq.jobs.dcc.figures import QuantityFigures, ValueUncertainty, figures, of_data, statements
 
 _SYMBOLS = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
 
@@ -70,7 +66,7 @@ def data(certificate: Certificate) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _quantity(one: Figures) -> dict[str, Any]:
+def _quantity(one: QuantityFigures) -> dict[str, Any]:
     covariance = None if one.covariance is None else {
         "matrix": [[_text(value) for value in row] for row in one.covariance[0]], "unit": one.covariance[1],
     }  # fmt: skip
@@ -122,7 +118,7 @@ def _measured(measurement: Measurement) -> tuple[str, Rows, tuple[Grid, ...]]:
     return str(measurement.name), rows, grids
 
 
-def _grid(title: str, found: Sequence[Figures]) -> Grid:
+def _grid(title: str, found: Sequence[QuantityFigures]) -> Grid:
     """Lists side by side, one that has fewer values in the first rows only; quantities of one value each below each other."""
     if len(found) > 1 and all(len(one.values) <= 1 for one in found):
         return _below_each_other(title, found)
@@ -132,7 +128,7 @@ def _grid(title: str, found: Sequence[Figures]) -> Grid:
     return Grid(title, tuple(heading for heading, _ in columns), rows)
 
 
-def _below_each_other(title: str, found: Sequence[Figures]) -> Grid:
+def _below_each_other(title: str, found: Sequence[QuantityFigures]) -> Grid:
     rows = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")]
     for one in found:
         name = " / ".join(filter(None, (*one.place, one.name)))
@@ -151,7 +147,7 @@ def _below_each_other(title: str, found: Sequence[Figures]) -> Grid:
     return Grid(title, head, tuple(rest))
 
 
-def _columns(one: Figures) -> list[tuple[str, list[str]]]:
+def _columns(one: QuantityFigures) -> list[tuple[str, list[str]]]:
     """Of one quantity: labels, values, U with k, and u where it is given by itself."""
     name = " / ".join(filter(None, (*one.place, one.name)))
     if not one.values:
@@ -175,7 +171,7 @@ def _with_unit(value: Decimal, unit: str, common: str | None) -> str:
     return str(value) if common is not None else f"{value} {unit_shown(unit)}".rstrip()
 
 
-def _interval(stated: Stated) -> str:
+def _interval(stated: ValueUncertainty) -> str:
     return "" if stated.low is None else f"{stated.low} to {stated.high}"
 
 
@@ -183,7 +179,7 @@ def _conformity(measurement: Measurement) -> Rows:
     return _given(("Statement", _statement(one)) for one in statements(measurement))
 
 
-def _statement(one: Statement) -> str:
+def _statement(one: StatementMetadata) -> str:
     verdicts = filter(None, (one.conformity, *one.conformity_list))
     said = (
         _words(one.name), *one.norms, *one.references, one.convention, *(f"conformity: {word}" for word in verdicts),
@@ -194,11 +190,11 @@ def _statement(one: Statement) -> str:
     return "; ".join(filter(None, said))
 
 
-def _condition(name: str, found: Sequence[Figures]) -> str:
+def _condition(name: str, found: Sequence[QuantityFigures]) -> str:
     return f"{name}: {_figures_told(found)}"
 
 
-def _figures_told(found: Sequence[Figures]) -> str:
+def _figures_told(found: Sequence[QuantityFigures]) -> str:
     """Each quantity with its name, as a sentence."""
     return "; ".join(
         " ".join(filter(None, (one.name, ", ".join(_value(one, i) for i in range(len(one.values))), *one.words)))
@@ -206,26 +202,28 @@ def _figures_told(found: Sequence[Figures]) -> str:
     )
 
 
-def _value(one: Figures, i: int) -> str:
+def _value(one: QuantityFigures, i: int) -> str:
     stated, unit = one.uncertainties[i], unit_shown(one.units[i])
     U = "" if stated.expanded is None else f", U = {stated.expanded} (k = {stated.factor})"
     return f"{one.values[i]} {unit}".rstrip() + U
 
 
 def _item(
-    name: str, model: str | None, identifications: Iterable[Identification], maker: Contact | Somebody | None
+    name: str, model: str | None, identifications: Iterable[IdentificationNumber], maker: Contact | Somebody | None
 ) -> str:
     return ", ".join(
         filter(None, (name, "" if maker is None else str(maker.name), model, *_identified(identifications)))
     )
 
 
-def _equipment(name: str, model: str | None, identifications: Iterable[Identification], chain: Hash | None) -> str:
+def _equipment(
+    name: str, model: str | None, identifications: Iterable[IdentificationNumber], chain: Hash | None
+) -> str:
     certificate = "" if chain is None else f"certificate {_hashed(chain)}"
     return ", ".join(filter(None, (name, model, *_identified(identifications), certificate)))
 
 
-def _identified(identifications: Iterable[Identification]) -> list[str]:
+def _identified(identifications: Iterable[IdentificationNumber]) -> list[str]:
     return [f"{_words(one.name) or one.issuer} {one.value}" for one in identifications]
 
 

@@ -16,7 +16,7 @@ from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
 
 if TYPE_CHECKING:
-    from cmm_uq.jobs.dcc.figures import QuantityFigures as Figures
+    from cmm_uq.jobs.dcc.figures import QuantityFigures
 
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
 
@@ -49,14 +49,14 @@ class Dcc(Format):
         return sheets
 
 
-def heading(one: Figures) -> str:
+def heading(one: QuantityFigures) -> str:
     """Of the column of a quantity: its name, or what it is by its refType, with its unit."""
     name = one.name or " ".join(one.ref_types)
     symbol = _BY_DSI.get(one.units[0], one.units[0]) if one.units else ""
     return f"{name} [{symbol}]" if symbol not in ("", "1") else name
 
 
-def _column(one: Figures, where: str) -> tuple[str, list[str]]:
+def _column(one: QuantityFigures, where: str) -> tuple[str, list[str]]:
     units = sorted(set(one.units))
     if len(units) > 1:
         raise CmmUqError(f"{one.name!r} is in {' and '.join(units)}: the list mixes units", where=where,

@@ -21,8 +21,7 @@ from cmm_uq.jobs.importing.format import format_of
 from cmm_uq.jobs.importing.header import POINTS, REFERENCES, Header, header_of, no_header
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys, length_named
 from cmm_uq.jobs.importing.recording import REQUIRED, points_of, read_recording
-from cmm_uq.jobs.importing.sheet import Fact, Sheet
-from cmm_uq.jobs.importing.sheet import Recognition as Recognised
+from cmm_uq.jobs.importing.sheet import Fact, Recognition, Sheet
 
 _UNIT_LINE = re.compile(
     r"\b(?:units?|einheit(?:en)?|ma(?:ß|ss)einheit|unit[ée]s?|unit[àa]|unidad(?:es)?)\s*[:=;]+\s*([^\s;]+)",
@@ -41,7 +40,7 @@ class ImportedTable:
 
     columns: dict[str, Floats]
     lines: Ints
-    recognised: Recognised
+    recognised: Recognition
 
 
 def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
@@ -82,7 +81,7 @@ def _read(
     sheet = _with_unit(sheet, header)
     columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    told = Recognised(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
+    told = Recognition(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
                       columns.sources, len(columns.lines))  # fmt: skip
     return ImportedTable(columns.values, columns.lines, told)
 
@@ -127,7 +126,7 @@ _HEAD = 16_384
 
 def read_recording_file(
     content: bytes, where: str, machine: Machine, keys: ImportKeys, without: Collection[str] = ()
-) -> tuple[Points, Recognised | None]:
+) -> tuple[Points, Recognition | None]:
     """Points of a recording, and how it was read where it is in another format than the project's own."""
     if not keys.asked and is_own(content):
         return read_recording(content, where, machine, without), None

@@ -22,13 +22,11 @@ from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.dcc.figures import QuantityFigures as Figures
-from cmm_uq.jobs.dcc.figures import figures
+from cmm_uq.jobs.dcc.figures import QuantityFigures, figures
 from cmm_uq.jobs.importing.dcc import Dcc, heading
 from cmm_uq.jobs.importing.imported import imported_references
 from cmm_uq.jobs.importing.keys import FileKeys
-from cmm_uq.jobs.importing.sheet import Fact
-from cmm_uq.jobs.importing.sheet import Recognition as Recognised
+from cmm_uq.jobs.importing.sheet import Fact, Recognition
 from cmm_uq.jobs.tables.artefact import (
     ACCREDITED,
     CIPM,
@@ -87,7 +85,7 @@ class CertifiedValues:
     """
 
     table: Mapping[str, Any]
-    recognised: Recognised | None = None
+    recognised: Recognition | None = None
     places: PointUncertainties | None = None
 
     def beside(self, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -120,7 +118,7 @@ def certified(content: bytes, where: str, given: Mapping[str, Any], facts: type[
     facts_told = (Fact("certificate", say("Certificate"), Verbatim(certificate.administrative.core.identifier)),)
     name = where.replace("\\", "/").rpartition("/")[2]
     return CertifiedValues(
-        table, Recognised(name, Dcc.name, Dcc.title, facts_told, sources, sum(len(one.values) for _, one in found))
+        table, Recognition(name, Dcc.name, Dcc.title, facts_told, sources, sum(len(one.values) for _, one in found))
     )
 
 
@@ -156,7 +154,9 @@ def _identity(certificate: Certificate, given: Mapping[str, Any], where: str) ->
     return {key: value for key, value in says.items() if value and not given.get(key)}
 
 
-def _found(wanted: CertifiedValue, certificate: Certificate, given: Mapping[str, Any], where: str) -> Figures | None:
+def _found(
+    wanted: CertifiedValue, certificate: Certificate, given: Mapping[str, Any], where: str
+) -> QuantityFigures | None:
     """The quantity of a key: the one that job.toml names, else the only one that is called so."""
     outer = wanted.key.rpartition(".")[0]
     if outer and not isinstance(given.get(outer), Mapping):
@@ -179,14 +179,14 @@ def _found(wanted: CertifiedValue, certificate: Certificate, given: Mapping[str,
     )  # fmt: skip
 
 
-def _called(one: Figures, wanted: CertifiedValue) -> bool:
+def _called(one: QuantityFigures, wanted: CertifiedValue) -> bool:
     """Whether it goes by a name of what is wanted; a deviation is a certified value of a form only."""
     name = " ".join((*one.place[2:], one.name, *one.ref_types)).casefold()
     other = () if wanted.micrometres else _NO_RESULT
     return any(word in name for word in wanted.words) and not any(word in name for word in other)
 
 
-def _valued(wanted: CertifiedValue, one: Figures, given: Mapping[str, Any], where: str) -> dict[str, Any]:
+def _valued(wanted: CertifiedValue, one: QuantityFigures, given: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Key and uncertainty, where the job does not have them."""
     outer, _, key = wanted.key.rpartition(".")
     own = _table(given, outer) if outer else given
@@ -203,7 +203,7 @@ def _valued(wanted: CertifiedValue, one: Figures, given: Mapping[str, Any], wher
     return {outer: table} if outer else table
 
 
-def _u_um(one: Figures) -> float | None:
+def _u_um(one: QuantityFigures) -> float | None:
     """Largest standard uncertainty of a quantity, µm; none where one value has none."""
     found = [stated.u for stated in one.uncertainties]
     if any(u is None for u in found):
@@ -269,7 +269,7 @@ def _longest(
     return {"length_mm": length}, places
 
 
-def _places(point: Floats | None, wanted: Sequence[str], held: Sequence[Figures]) -> PointUncertainties | None:
+def _places(point: Floats | None, wanted: Sequence[str], held: Sequence[QuantityFigures]) -> PointUncertainties | None:
     """What the certificate says of its points, which the recording numbers in the same way."""
     if point is None or any(len(one.values) != len(point) for one in held):
         return None
@@ -289,7 +289,7 @@ def _places(point: Floats | None, wanted: Sequence[str], held: Sequence[Figures]
     return PointUncertainties(tuple(int(number) for number in point), u, covariances)
 
 
-def _farthest(columns: Sequence[Figures]) -> tuple[float, float]:
+def _farthest(columns: Sequence[QuantityFigures]) -> tuple[float, float]:
     """Distance of the point that is farthest from the first, mm, and its standard uncertainty, µm.
 
     Of coordinates without covariances each is taken as independent of the others, which is what the certificate says.
@@ -305,7 +305,7 @@ def _farthest(columns: Sequence[Figures]) -> tuple[float, float]:
     return length, math.sqrt(max(variance, 0.0))
 
 
-def _variance_of_difference(one: Figures, last: int) -> float:
+def _variance_of_difference(one: QuantityFigures, last: int) -> float:
     """Of the last value minus the first, µm²."""
     scale = [float(_METRES[unit]) * 1e6 for unit in one.units]
     first, other = (float(one.uncertainties[i].u or 0) * scale[i] for i in (0, last))

@@ -11,8 +11,7 @@ from pydantic import Field
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.jobs.reports import ResultsPart as Part
-from cmm_uq.jobs.reports import read_results, results_named
+from cmm_uq.jobs.reports import ResultsPart, read_results, results_named
 from cmm_uq.jobs.tables.machine import DigitizerFacts, Pose
 from cmm_uq.jobs.tables.origin import SIMULATED, Origin
 
@@ -21,17 +20,17 @@ KEY = "[machine] digitizer"
 _FIX = "Name the results.json that cmm-uq report wrote of a job of kind digitizer"
 
 
-class _Component(Part):
+class _Component(ResultsPart):
     value: float
 
 
-class _Offset(Part):
+class _Offset(ResultsPart):
     U1: _Component
     V1: _Component
     W1: _Component
 
 
-class _Pose(Part):
+class _Pose(ResultsPart):
     pose: int
     alpha_deg: float
     beta_deg: float
@@ -43,18 +42,18 @@ Three = tuple[float, float, float]
 _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class _Digitizer(Part):
+class _Digitizer(ResultsPart):
     offset_mm: _Offset
     covariance_mm2: Annotated[list[_Row], Field(min_length=3, max_length=3)]
     poses: Annotated[list[_Pose], Field(min_length=1, max_length=LISTED.most)]
 
 
-class _Job(Part):
+class _Job(ResultsPart):
     id: str
     origin: Origin
 
 
-class _Results(Part):
+class _Results(ResultsPart):
     schema_: Annotated[Literal["cmm-uq/results/1"], Field(alias="schema")]
     job: _Job
     digitizer: _Digitizer

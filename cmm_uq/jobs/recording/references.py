@@ -20,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.importing.recording import LARGEST_NUMBER, OPTIONAL, largest
-from cmm_uq.jobs.importing.sheet import Recognition as Recognised
+from cmm_uq.jobs.importing.sheet import Recognition
 from cmm_uq.jobs.importing.vocabulary import COVERAGE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.length_formula import factor_of
@@ -48,7 +48,7 @@ def reference_file(artefact: ArtefactFacts) -> list[str]:
 
 def with_references(
     points: Points, artefact: ArtefactFacts, inputs: Mapping[str, bytes], folder: Path, where: str
-) -> tuple[Points, Recognised]:
+) -> tuple[Points, Recognition]:
     """A recording with the certified values of its points, and how their file was read."""
     chain = artefact.certificate
     if chain is None or chain.file is None:

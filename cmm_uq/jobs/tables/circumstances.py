@@ -16,8 +16,7 @@ from pydantic import AfterValidator, Field, model_validator
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import Table, Temperature, Uncertainty
 from cmm_uq.jobs.recording.short_gauge import ShortGauge
-from cmm_uq.jobs.tables.identification import Capability
-from cmm_uq.jobs.tables.identification import RequiredText as Said
+from cmm_uq.jobs.tables.identification import Capability, RequiredText
 
 
 class HeldClause(Table):
@@ -35,11 +34,11 @@ class HeldClause(Table):
     """Whether the program asks for more than the copy where it differs, so that a pass stays one."""
     clause: str = ""
     """Number of the clause in the copy."""
-    checked_by: Said | None = None
+    checked_by: RequiredText | None = None
     """Who held this clause against the copy, where another than the form's."""
     on: dt.date | None = None
     """When, where another day than the form's."""
-    edition: Said | None = None
+    edition: RequiredText | None = None
     """Of which edition, where another than the form's."""
 
     @model_validator(mode="after")
@@ -56,11 +55,11 @@ class ClausesForm(Table):
 
     standard: str
     """The standard, by its name in `[[conformity]]`."""
-    checked_by: Said
+    checked_by: RequiredText
     """Who held the clauses against the laboratory's copy."""
     on: dt.date
     """When."""
-    edition: Said
+    edition: RequiredText
     """Edition of the copy, as its title page has it."""
     clauses: Annotated[dict[str, HeldClause], Field(max_length=LISTED.most)]
     """Each clause, by the name that the form has for it."""
