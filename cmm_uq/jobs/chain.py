@@ -85,59 +85,42 @@ class Link:
 
     def lacks(self) -> Iterator[Lack]:
         """What is not stated, or contradicts itself."""
-        chain = self.chain or Traceability()
-        for text, what, key in (
-            (chain.number, say("the number of the certificate is not stated"), "number"),
-            (chain.laboratory, say("who issued the certificate is not stated"), "laboratory"),
-        ):
-            if not text.strip():
-                yield what, f"{self.table} {key}"
-        yield from self._issuer(chain)
+        chain, at = self.chain or Traceability(), self.table
+        if not chain.number.strip():
+            yield say("the number of the certificate is not stated"), f"{at} number"
+        if not chain.laboratory.strip():
+            yield say("who issued the certificate is not stated"), f"{at} laboratory"
+        if chain.issuer is None:
+            what = say("whether its issuer is a national metrology institute or an accredited laboratory is not stated")
+            yield what, f"{at} issuer"
+        elif chain.issuer == CONSENSUS:
+            yield say("a value by consensus is no route to the SI for lengths and temperatures"), f"{at} issuer"
+        elif not _covered(chain) and not chain.evidence.strip():
+            yield _NO_EVIDENCE, f"{at} {'arrangement' if chain.issuer in (NATIONAL, ACCREDITED) else 'evidence'}"
+        if chain.issuer == ACCREDITED and not chain.accreditation.strip():
+            yield say("the number of the issuer's accreditation is not stated"), f"{at} accreditation"
+        if chain.issuer == ACCREDITED and not chain.accredited_by.strip():
+            yield say("who accredited the issuer is not stated"), f"{at} accredited_by"
         yield from self._dates(chain)
         if self.another:
-            what = say("the temperatures were read from {serial}", serial=Verbatim(self.another))
-            yield what, f"{self.table} serial"
-
-    def _issuer(self, chain: Traceability) -> Iterator[Lack]:
-        if chain.issuer is None:
-            yield (
-                say("whether its issuer is a national metrology institute or an accredited laboratory is not stated"),
-                f"{self.table} issuer",
-            )
-        elif chain.issuer == CONSENSUS:
-            told = say("a value by consensus is no route to the SI for lengths and temperatures")
-            yield told, f"{self.table} issuer"
-        elif not _covered(chain) and not chain.evidence.strip():
-            key = "arrangement" if chain.issuer in (NATIONAL, ACCREDITED) else "evidence"
-            yield _NO_EVIDENCE, f"{self.table} {key}"
-        if chain.issuer == ACCREDITED:
-            for text, what, key in (
-                (chain.accreditation, say("the number of the issuer's accreditation is not stated"), "accreditation"),
-                (chain.accredited_by, say("who accredited the issuer is not stated"), "accredited_by"),
-            ):
-                if not text.strip():
-                    yield what, f"{self.table} {key}"
+            yield say("the temperatures were read from {serial}", serial=Verbatim(self.another)), f"{at} serial"
 
     def _dates(self, chain: Traceability) -> Iterator[Lack]:
         """The first and the last day belong to the time for which a calibration holds."""
-        until = chain.until
-        if chain.date is None:
+        date, until, measured = chain.date, chain.until, day(self.day)
+        if date is None:
             yield say("the date of the certificate is not stated"), f"{self.table} date"
-        elif chain.date > self.day:
-            what = say(
-                "the certificate is dated {date}, after the measurement of {day}",
-                date=day(chain.date),
-                day=day(self.day),
-            )
+        elif date > self.day:
+            what = say("the certificate is dated {date}, after the measurement of {day}", date=day(date), day=measured)
             yield what, f"{self.table} date"
         if until is None:
             yield say("until when the calibration holds is not stated"), f"{self.table} due"
         elif until < self.day:
             what = say(
-                "the calibration was due on {due}, before the measurement of {day}", due=day(until), day=day(self.day)
+                "the calibration was due on {due}, before the measurement of {day}", due=day(until), day=measured
             )
             yield what, f"{self.table} due"
-        elif chain.date is not None and until < chain.date:
+        elif date is not None and until < date:
             yield say("the calibration was due before the certificate was issued"), f"{self.table} due"
 
     @property
@@ -248,8 +231,8 @@ def _lengths(facts: JobFile) -> Iterator[Link]:
 def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
     """Of the thermometers of the artefact and of what the effects go by; columns without one are named."""
     gauge = () if job.short_gauge is None else job.short_gauge.points.columns
-    recorded = [name for name in (*job.points.columns, *gauge) if _temperature(name)]
-    columns = {name for name in recorded if name == ARTEFACT or name in read}
+    recorded = {name for name in (*job.points.columns, *gauge) if name.startswith("temp_") and name.endswith("_c")}
+    columns = recorded & {ARTEFACT, *read}
     facts, date = job.facts, job.facts.job.date
     for number, one in enumerate(facts.thermometer, 1):
         if own := sorted(columns & {*one.columns}):
@@ -264,10 +247,6 @@ def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
 
 def _nameless(columns: Iterable[str]) -> Text:
     return say("thermometer of the {column}", column=commas(map(in_words, columns)))
-
-
-def _temperature(column: str) -> bool:
-    return column.startswith("temp_") and column.endswith("_c")
 
 
 def _another(job: Job, columns: Collection[str], serial: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -94,30 +94,26 @@ def _changed(
     document: Any, changes: Mapping[str, Any], without: tuple[str, ...], file: str | None, certified: Mapping[str, Any]
 ) -> Any:
     table = document["job"]
-    for key in (*OF_THE_CERTIFICATE, *changes):
-        if key in table:
-            del table[key]
+    _drop(table, (*OF_THE_CERTIFICATE, *changes))
     for key, value in changes.items():
         table[key] = _inline(value) if isinstance(document, tomlkit.TOMLDocument) else deepcopy(value)
-    for key in OF_THE_RECORDED_MACHINE:
-        if key in document:
-            del document[key]
-    for key in without:
-        if key in document["machine"]:
-            del document["machine"][key]
-    _without_reference_file(document["artefact"])
+    _drop(document, OF_THE_RECORDED_MACHINE)
+    _drop(document["machine"], without)
+    if "file" in document["artefact"].get(
+        "certificate", {}
+    ):  # certified values stand in every recording that is written
+        _drop(document["artefact"]["certificate"], ("file", *FileKeys.model_fields))
     _state(document["artefact"], certified)
-    if file is not None:
-        _name_recording(document["recording"], file)
+    if file is not None:  # the recording in the project's own format, without the keys by which it was imported
+        document["recording"]["file"] = file
+        _drop(document["recording"], ImportKeys.model_fields)
     return document
 
 
-def _without_reference_file(table: Any) -> None:
-    """Certified values stand in every recording that a command writes."""
-    if "file" in table.get("certificate", {}):
-        for key in ("file", *FileKeys.model_fields):
-            if key in table["certificate"]:
-                del table["certificate"][key]
+def _drop(table: Any, keys: Iterable[str]) -> None:
+    for key in keys:
+        if key in table:
+            del table[key]
 
 
 def _state(table: Any, certified: Mapping[str, Any]) -> None:
@@ -127,14 +123,6 @@ def _state(table: Any, certified: Mapping[str, Any]) -> None:
             _state(table[key], value)
         else:
             table[key] = deepcopy(value)
-
-
-def _name_recording(table: Any, file: str) -> None:
-    """The recording in the project's own format, without the keys by which it was imported."""
-    table["file"] = file
-    for key in ImportKeys.model_fields:
-        if key in table:
-            del table[key]
 
 
 def _inline(value: Any) -> Any:

@@ -57,9 +57,6 @@ NUMERAL = Limit(
     100, "characters", "number, date or bare key", "a double has 17 digits; longer integers take Python minutes"
 )
 
-XML_ELEMENTS = Limit(500_000, "elements", "XML file", "a certificate with 10 000 lengths has a tenth")
-XML_DEPTH = Limit(60, "levels of elements", "XML file", "a certificate has 15")
-XML_ATTRIBUTES = Limit(50, "attributes of an element", "XML file", "a certificate has 4")
 DEPTH = Limit(20, "levels", "brackets in TOML, parts of a dotted key", "the deepest key of a job is at 4")
 TOML_KEY = Limit(100, "characters", "key in TOML", "it stands in messages")
 TEXT = Limit(10_000, "characters", "text in TOML", "three pages of remarks; the longest expression")
@@ -89,12 +86,9 @@ HTML_DEPTH = Limit(100, "levels", "tags in HTML that is verified", "a cell of a 
 JSON_BYTES = Limit(64_000_000, "bytes", "results.json", "the figures of the largest recording take half of it")
 JSON_DEPTH = Limit(40, "levels", "brackets in results.json", "the deepest figure is at 8")
 GIVEN = Limit(1_000, "files", "files that are verified together", "a job names a few dozen")
+XML_ELEMENTS = Limit(500_000, "elements", "XML file", "a certificate with 10 000 lengths has a tenth")
+XML_DEPTH = Limit(60, "levels of elements", "XML file", "a certificate has 15")
+XML_ATTRIBUTES = Limit(50, "attributes of an element", "XML file", "a certificate has 4")
 
-LIMITS = (
-    JOB_BYTES, MODEL_BYTES, TABLE_BYTES, UNPACKED, MAP_BYTES, LOGO_BYTES, LOGO_PIXELS, LOGO_ELEMENTS, DCC_BYTES, SECRET_BYTES,
-    KEY_BYTES, SIGNED_BYTES, ROWS, MAP_ROWS, COLUMNS, CELLS, OBSERVATIONS, FREEDOMS, CELL, LINE, LINES, COLUMN_NAME, NUMERAL,
-    DEPTH, TOML_KEY, TEXT, WORD, FILE_NAME, EFFECTS, MAPS, CONFORMITY, LISTED, DRAWS, INPUTS, PDF_BYTES, PDF_OBJECTS,
-    PDF_PAGES, PDF_UNPACKED, PDF_DRAWN, HTML_BYTES, HTML_DEPTH, JSON_BYTES, JSON_DEPTH, GIVEN, XML_ELEMENTS, XML_DEPTH,
-    XML_ATTRIBUTES,
-)  # fmt: skip
+LIMITS = tuple(value for value in list(globals().values()) if isinstance(value, Limit))
 """All of them, in the order of docs/limits.md."""

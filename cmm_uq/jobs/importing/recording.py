@@ -7,11 +7,12 @@ look like is listed here once; any other numeric column is kept as a covariate.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import compress
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
 from cmm_uq.base.files.csv_table import cells_of, column_problem
@@ -75,20 +76,32 @@ def points_of(
     ``table``: columns by name, each (n,), those of :data:`REQUIRED` among them.
     """
     wrong = wrong or Gathered()
+
+    def refuse(bad: NDArray[np.bool_], problem: Callable[[float], str], fix: str, column: str, of: Floats) -> None:
+        if bad.any():
+            row = int(np.argmax(bad))
+            at = f"{name} line {lines[row]}" + (f", column {column}" if column else "")
+            wrong.add(CmmUqError(problem(of[row]), where=at, fix=fix))
+
     for column, values in table.items():
-        with wrong.going_on():
-            _check_size(values, column, lines, name)
-    with wrong.going_on():
-        _check_normals(table, lines, name)
+        if column not in WHOLE:
+            most = largest(column)
+            refuse(np.abs(values) > most, "{:g} is more than anything that is measured".format,
+                   f"{most:g} is the most: check its unit and its exponent", column, values)  # fmt: skip
+    if all(
+        f"n{axis}" in table for axis in "xyz"
+    ):  # brought to unit length where they are used: a direction must be meant
+        length = np.sqrt(sum(table[f"n{axis}"] ** 2 for axis in "xyz"))
+        refuse((length != 0) & ((length < SHORTEST_NORMAL) | (length > LONGEST_NORMAL)),
+               "the normal nx, ny, nz has the length {:.3g}".format, "Give outward unit normals", "", length)  # fmt: skip
     for column in WHOLE:
-        if column in table:
-            with wrong.going_on():
-                _check_whole(table[column], column, lines, name)
-    for axis in "xyz":
-        column = f"approach_{axis}"
-        if column in table:
-            with wrong.going_on():
-                _check_directions(table[column], column, lines, name)
+        values = table.get(column, np.zeros(0))
+        refuse((values != np.round(values)) | (np.abs(values) > LARGEST_NUMBER), "{:g} is not a whole number".format,
+               "Number measurements, points and repeats 1, 2, …", column, values)  # fmt: skip
+    for column in ("approach_x", "approach_y", "approach_z"):
+        values = table.get(column, np.zeros(0))
+        refuse(~np.isin(values, (-1, 0, 1)), "{:g} is no direction".format,
+               "The direction of travel into the point is −1, 0 or +1", column, values)  # fmt: skip
     wrong.refuse()
     number = {column: table.get(column, np.ones(len(lines))).astype(np.int64) for column in WHOLE}
     points = Points(
@@ -145,44 +158,7 @@ def largest(column: str) -> float:
     """Largest number, either way, that a column of this name may hold; that of every number where its name says nothing."""
     if column in WHOLE:
         return LARGEST_NUMBER
-    for ending, most in LARGEST_OF.items():
-        if column.endswith(ending):
-            return most
-    return LARGEST
-
-
-def _check_size(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
-    bad = np.flatnonzero(np.abs(values) > largest(column))
-    if bad.size and column not in WHOLE:
-        raise CmmUqError(f"{values[bad[0]]:g} is more than anything that is measured",
-                         where=f"{name} line {lines[bad[0]]}, column {column}",
-                         fix=f"{largest(column):g} is the most: check its unit and its exponent")  # fmt: skip
-
-
-def _check_normals(table: Mapping[str, Floats], lines: Sequence[int], name: str) -> None:
-    """Normals are brought to unit length where they are used; whoever gives other ones must mean a direction."""
-    if not all(f"n{axis}" in table for axis in "xyz"):
-        return
-    length = np.sqrt(sum(table[f"n{axis}"] ** 2 for axis in "xyz"))
-    bad = np.flatnonzero((length != 0) & ((length < SHORTEST_NORMAL) | (length > LONGEST_NORMAL)))
-    if bad.size:
-        raise CmmUqError(f"the normal nx, ny, nz has the length {length[bad[0]]:.3g}",
-                         where=f"{name} line {lines[bad[0]]}", fix="Give outward unit normals")  # fmt: skip
-
-
-def _check_whole(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
-    bad = np.flatnonzero((values != np.round(values)) | (np.abs(values) > LARGEST_NUMBER))
-    if bad.size:
-        raise CmmUqError(f"{values[bad[0]]:g} is not a whole number",
-                         where=f"{name} line {lines[bad[0]]}, column {column}",
-                         fix="Number measurements, points and repeats 1, 2, …")  # fmt: skip
-
-
-def _check_directions(values: Floats, column: str, lines: Sequence[int], name: str) -> None:
-    bad = np.flatnonzero(~np.isin(values, (-1, 0, 1)))
-    if bad.size:
-        raise CmmUqError(f"{values[bad[0]]:g} is no direction", where=f"{name} line {lines[bad[0]]}, column {column}",
-                         fix="The direction of travel into the point is −1, 0 or +1")  # fmt: skip
+    return next((most for ending, most in LARGEST_OF.items() if column.endswith(ending)), LARGEST)
 
 
 def _check_unique(points: Points, name: str) -> None:
