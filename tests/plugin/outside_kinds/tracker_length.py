@@ -6,9 +6,10 @@ A reflector on the ram is read at two places; a tracker in line with both says h
 import numpy as np
 
 from cmm_uq.kind import (
-    METRE, MICROMETRE, MIDDLE, Artefact, ArtefactShape, Column, Floats, Kind, Page, Pattern, Planning, Points, ReferencedFacts,
-    RelocatedCandidates, Result, Screening, Section, SetUp, Setting, Size, Table, Uncertainty, VolumeCandidates, along_lines,
-    attitude_along, check_allowed, columns_needed, direction_words, number, planned_length, rows_by, say, unit,
+    METRE, MICROMETRE, MIDDLE, Artefact, ArtefactShape, Beginning, Column, Floats, Kind, Page, Pattern, Planning,
+    Points, ReferencedFacts, RelocatedCandidates, Result, Screening, Section, SetUp, Setting, Size, Table, Uncertainty,
+    VolumeCandidates, along_lines, attitude_along, check_allowed, columns_needed, direction_words, number,
+    planned_length, rows_by, say, unit,
 )  # fmt: skip
 
 COLUMN = "tracker_mm"
@@ -124,4 +125,9 @@ KIND = Kind(
     screen=Screening(shape_of),
     plan=Planning({"tracker lines": tracker_lines}, places.candidates, places.elsewhere),
     page=Page(sections, lambda result: {"tracker": {"distances": len(result.residuals)}}),
-)
+    begin=Beginning(
+        "Distances by laser tracker", "One measurement is one distance; points 1 and 2 are its ends.",
+        artefact={"name": "Laser tracker", "u_um": 0.2, "u_um_per_m": 0.5}, plan={"length_mm": 400.0},
+        columns={COLUMN: "Distance between both points by the tracker, mm."},
+    ),
+)  # fmt: skip
