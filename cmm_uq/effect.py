@@ -4,6 +4,6 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.machine.physics.effect import Effect, Parameter
-from cmm_uq.machine.physics.rigid_body import turned
+from cmm_uq.machine.physics.effects.rigid_body import turned
 
 __all__ = ["ARCSECOND", "MICROMETRE", "PPM", "Effect", "Floats", "Parameter", "Points", "say", "turned", "unit"]

@@ -25,8 +25,7 @@ from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.maths.inference.least_squares import LeastSquares
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components
-from cmm_uq.maths.inference.posterior import NoisyPosterior
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
 from tests.part_machines import by_certificate, plate_of
 
 TRIALS = 1000

@@ -45,7 +45,7 @@ from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.certificate.sections import first_page
 from cmm_uq.certificate.sections.first_page import subject_of
-from cmm_uq.certificate.verify.consistent import check_verdicts
+from cmm_uq.certificate.verify.figures import check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.jobs.dcc import written
 from cmm_uq.jobs.reports import ReportResults as Reported

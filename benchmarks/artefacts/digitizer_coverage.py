@@ -25,7 +25,7 @@ from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.digitizer import euler_313
 from cmm_uq.maths.inference.marginal import Marginal
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 OFFSET = np.array([1.001, 264.505, 129.575])
 SPHERE = np.array([350.0, 350.0, -330.0])

@@ -20,9 +20,9 @@ import cmm_uq
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import parameters, with_doubt, with_noise
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model.doubt import causes_of
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 EFFECTS = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
 TRAVEL = {"x": [0.0, 700.0], "y": [0.0, 700.0], "z": [-700.0, 0.0]}

@@ -12,7 +12,7 @@ from benchmarks.ranks.drawn import CASES, design, drawn
 from benchmarks.ranks.ranking import ranks
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.marginal import Marginal
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.measurement import MeasurementModel
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 HALF, FEW = 0.5, 0.05
 """Probabilities of tails beforehand; that of diagnoses is the second."""

@@ -43,7 +43,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.logo import logo_of
 from cmm_uq.jobs.tables.identification import Identification, Laboratory
 from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
-from cmm_uq.maths.uncertainty.rounding import nominal
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 TEMPERATURES: Mapping[str, Text] = {
     "temp_artefact_c": say("artefact"), "temp_x_c": say("scale of X"), "temp_y_c": say("scale of Y"),

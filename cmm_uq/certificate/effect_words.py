@@ -9,8 +9,7 @@ from cmm_uq.base.units import unit
 from cmm_uq.certificate.wording import NO_FACTOR, expanded, with_uncertainty
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Amount, Effect
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import figure
+from cmm_uq.maths.uncertainty.quantity import Quantity, figure
 
 
 def effect_of(name: str, own: Iterable[Effect] = ()) -> Effect | None:

@@ -26,16 +26,16 @@ from cmm_uq.jobs.tables.identification import Capability
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.machine.model import Estimate, MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.doubt import growth
+from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.predicted_errors import PredictedErrors
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.doubt import Cause, Doubt
 from cmm_uq.maths.inference.draws import Draws
 from cmm_uq.maths.inference.least_squares import LeastSquares
 from cmm_uq.maths.inference.posterior import NoisyPosterior
-from cmm_uq.maths.uncertainty.covariance import Covariance
-from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
+from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 
 @dataclass(frozen=True, eq=False)

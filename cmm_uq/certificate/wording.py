@@ -11,8 +11,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Standing
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded
+from cmm_uq.maths.uncertainty.quantity import Quantity, limit_in_full, rounded
 
 if TYPE_CHECKING:
     from cmm_uq.analysis.conformity.statement import Statement

@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.machine.physics.rigid_body import ROTATION, SCALE
+from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE
 
 ORIGIN = np.array([10.0, -20.0, 30.0])
 XYZ = np.array([[1.0, 2.0, 3.0], [400.0, 250.0, -7.0]])

@@ -36,7 +36,7 @@ READ = {
     "cmm_uq/laboratory/schedule/run.py": {"now"}, "cmm_uq/laboratory/schedule/outbox.py": {"now", "time"},
     "cmm_uq/laboratory/schedule/jobs.py": {"monotonic"}, "cmm_uq/laboratory/schedule/locks.py": {"monotonic"},
     "cmm_uq/laboratory/schedule/cluster.py": {"monotonic"},
-    "cmm_uq/certificate/sign/clock.py": {"now"}, "cmm_uq/app/serve/view.py": {"now"},
+    "cmm_uq/certificate/sign/pdf.py": {"now"}, "cmm_uq/app/serve/view.py": {"now"},
     "cmm_uq/app/serve/server.py": {"monotonic"},
 }  # fmt: skip
 """How long a command waits for another one's lock, or for what it is writing when it is interrupted; the date that a new job

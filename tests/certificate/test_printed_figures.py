@@ -15,8 +15,7 @@ from cmm_uq.certificate.sections.conformity import conformity_section
 from cmm_uq.certificate.wording import expanded, figure_row, with_uncertainty
 from cmm_uq.jobs.tables.conformity import ConformityFacts, MaximumPermissibleError
 from cmm_uq.machine.model.kind import BARS, LENGTHS
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import nominal
+from cmm_uq.maths.uncertainty.quantity import Quantity, nominal
 from tests.analysis.conformity.recorded import gauge
 from tests.artefacts.simulated import blocks
 

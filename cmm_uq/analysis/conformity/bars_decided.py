@@ -22,7 +22,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
-from cmm_uq.maths.uncertainty.rounding import nominal
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 _OPPOSITE = -0.9
 """Cosine of the angle between two tips from which on they look away from each other."""

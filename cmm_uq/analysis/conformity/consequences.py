@@ -23,8 +23,7 @@ from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
-from cmm_uq.maths.uncertainty.mixture import averaged
-from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.quantity import Quantity, averaged
 
 _FEW = 400
 """Draws of each explanation that remains: enough for two digits of U."""

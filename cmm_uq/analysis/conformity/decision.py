@@ -30,7 +30,7 @@ from cmm_uq.jobs.tables.conformity import (
     UncertaintyRatio,
     UnconditionalRisk,
 )
-from cmm_uq.maths.inference.root import root
+from cmm_uq.maths.inference.slow import root
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _REACH = 9.0

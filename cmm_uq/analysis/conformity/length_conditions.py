@@ -21,7 +21,7 @@ from cmm_uq.analysis.conformity.plans import (
 from cmm_uq.base.messages import Text, Verbatim, at_key, commas, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.maths.uncertainty.rounding import nominal
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 SAME_LENGTH_MM = 1.0
 """Lengths no farther from each other than this are one nominal length."""

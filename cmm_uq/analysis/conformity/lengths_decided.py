@@ -24,7 +24,7 @@ from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.circumstances import LINE_KEYS, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact, Indications
-from cmm_uq.maths.uncertainty.rounding import nominal
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 NORMAL_EXPANSION = (8e-6, 13e-6)
 """1/K; a gauge outside is not of normal expansion (ISO 10360-2:2009, as commonly reported)."""

@@ -17,7 +17,7 @@ from cmm_uq.base.messages import NOTHING, Text, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.recording.short_gauge import ShortGauge
 from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
-from cmm_uq.maths.uncertainty.rounding import nominal, significant
+from cmm_uq.maths.uncertainty.quantity import nominal, significant
 
 NEAR_MM = 100.0
 """How far the middle of the short gauge may lie from the line of a length, anywhere along it; this project's figure."""

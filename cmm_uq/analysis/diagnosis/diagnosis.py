@@ -27,13 +27,14 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.machine.model.display import of_last_digit
 from cmm_uq.machine.model.kind import Observed
+from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components
-from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.maths.inference.posterior import NoisyPosterior
 from cmm_uq.maths.inference.studentised import studentised
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

@@ -13,7 +13,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.posterior import Density
 
 FOLDS = 10

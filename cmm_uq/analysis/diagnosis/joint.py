@@ -13,13 +13,13 @@ from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.machine.model.bending import with_curvature
+from cmm_uq.machine.model.measurement import with_curvature
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.maths.inference.curvature import Shaped, sample_shaped
+from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.noise import Components
-from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
-from cmm_uq.maths.inference.sampling import sample_with_noise
-from cmm_uq.maths.inference.shaped import Shaped, sample_shaped
+from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 _LIKELY = 1e-4  # part of the largest probability below which a trial parts one mode from the next

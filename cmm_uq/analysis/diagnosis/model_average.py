@@ -23,8 +23,7 @@ from cmm_uq.base.units import unit
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.posterior import Density
-from cmm_uq.maths.uncertainty.mixture import mixed
-from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.quantity import Quantity, mixed
 
 REMAINS = 0.01  # probability from which a combination of explanations remains
 SETTLED = 0.95  # probability of one combination from which no other remains

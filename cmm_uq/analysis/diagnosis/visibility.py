@@ -26,8 +26,8 @@ from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.power import CERTAIN, Naming
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.maths.inference.freedoms import reached
-from cmm_uq.maths.inference.root import root
+from cmm_uq.maths.inference.linear_model import reached
+from cmm_uq.maths.inference.slow import root
 
 PLACES = "placing"  # name among what takes an effect up: the free places of the artefact
 HIDDEN = 0.3  # part of an effect's length, what is fitted taken away, below which it is that which hides it

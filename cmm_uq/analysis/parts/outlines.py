@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.analysis.parts.plan import Feature
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.frame import frame_about
+from cmm_uq.maths.geometry.feature import frame_about
 
 _STEPS = 48  # of a circle
 _ALONG = 1e-6  # sine of the angle to the view below which an axis is seen end on

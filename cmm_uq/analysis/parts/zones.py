@@ -38,7 +38,7 @@ from scipy.special import ndtr, ndtri
 from cmm_uq.analysis.parts.evaluation import Movement
 from cmm_uq.analysis.parts.plan import Feature, Plan
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.inference.root import root
+from cmm_uq.maths.inference.slow import root
 
 # true widths at which measurements are drawn, closer together near the least one, where fewest draws are possible; squares of
 # their quantiles are nearly quadratic between them

@@ -23,9 +23,8 @@ from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.maths.inference.freedoms import reached
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, reached
 from cmm_uq.maths.inference.noise import Components, Sizes
 
 _ROUNDING = 1e-9

@@ -21,8 +21,8 @@ from cmm_uq.analysis.screening.shape import ArtefactShape
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, plural, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.kind import Observed
-from cmm_uq.machine.model.placings import Placings
 
 MOST = 0.2  # part of the rows that may be left out; with more damage the recording is refused
 _PART, _STRAYS = 0.2, 0.05

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints, Points
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Placings
 
 TOLERANCE_MM, TOLERANCE_RATIO = 0.5, 5e-3
 """Misfit that no machine's errors explain: so many mm, and so much of the artefact's size."""

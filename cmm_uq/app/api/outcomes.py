@@ -26,7 +26,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.maths.inference.draws import Draws
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 if TYPE_CHECKING:
     import pandas as pd

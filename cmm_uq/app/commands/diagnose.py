@@ -35,7 +35,8 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.laboratory.records.place import NONE
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.maths.inference.posterior import NoisyPosterior, Progress
+from cmm_uq.maths.inference.ensembles import Progress
+from cmm_uq.maths.inference.posterior import NoisyPosterior
 
 DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (TO_FILL_IN,), recorded=True)
 

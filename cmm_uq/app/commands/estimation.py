@@ -21,14 +21,13 @@ from cmm_uq.certificate.result import NoiseComponent as Component
 from cmm_uq.certificate.result import RecordingNoise as Noise
 from cmm_uq.machine.model import Estimate, MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.display import of_last_digit
-from cmm_uq.machine.model.doubt import growth
+from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.combinations import uncertainty_of_sum
+from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.maths.inference.doubt import Cause, Doubt, gain
-from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.draws import Draws, by_chain, by_ensemble, evenly, uncertainty_of_sum
+from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of

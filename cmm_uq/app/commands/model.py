@@ -21,13 +21,12 @@ from cmm_uq.certificate.outcome import OwnAnalysis, Recipe
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.display import NANOMETRE, display_step
+from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
 from cmm_uq.machine.model.kind import Kind
-from cmm_uq.machine.model.placings import LAST_DIGIT
+from cmm_uq.machine.model.recorded import NANOMETRE, display_step
 from cmm_uq.machine.physics.catalogue import effects
-from cmm_uq.maths.inference.freedoms import Freedoms
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 FEWEST_LEFT = 3
 """Observations that the noise is estimated from, beside those that sizes and set-ups could explain."""

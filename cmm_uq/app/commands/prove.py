@@ -37,7 +37,7 @@ from cmm_uq.laboratory.schedule.processes import check_workers
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import every, plugins
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 CASES, FEWEST, MOST = 200, 1, 20_000
 _PROGRAM = "cmm_uq.app.commands.prove_case"

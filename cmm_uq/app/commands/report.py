@@ -35,12 +35,12 @@ from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.records.place import NONE
-from cmm_uq.machine.model.bending import with_curvature
-from cmm_uq.machine.model.doubt import causes_of
+from cmm_uq.machine.model.artefact_doubt import causes_of
 from cmm_uq.machine.model.kind import Kind
+from cmm_uq.machine.model.measurement import with_curvature
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.posterior import Progress
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.ensembles import Progress
+from cmm_uq.maths.inference.posterior import sample_with_noise
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.signing import Signing

@@ -121,7 +121,7 @@ def verify_given(
     elif job is not None:
         alike = compute_again(inquiry, given, job, compute or (lambda given, job: again(given, job, stage)))
     if given.pdf is not None and given.html is not None and not alike:
-        from cmm_uq.certificate.verify.views_agree import compare_views
+        from cmm_uq.certificate.verify.views import compare_views
 
         compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
     if given.of_part and given.pdf is not None and given.html is None and not alike:
@@ -129,7 +129,7 @@ def verify_given(
             f"words of {given.pdf[0]} beside its figures and decisions", "no HTML is given to compare them with"
         )
     if given.html is not None and not alike and _version(given) == __version__:
-        from cmm_uq.certificate.verify.views_agree import check_style
+        from cmm_uq.certificate.verify.views import check_style
 
         check_style(inquiry, given.html[1], given.html[0])
     stage("Done", 1.0)
@@ -167,8 +167,8 @@ def _compare(inquiry: Inquiry, given: Given) -> Job | None:
     """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
     if given.results is None:
         return None
-    from cmm_uq.certificate.verify.consistent import check_figures, check_verdicts
-    from cmm_uq.certificate.verify.decided_again import check_decisions
+    from cmm_uq.certificate.verify.decisions import check_decisions
+    from cmm_uq.certificate.verify.figures import check_figures, check_verdicts
     from cmm_uq.certificate.verify.inputs import check_dates, check_job, check_results, inputs_of
     from cmm_uq.certificate.verify.stated import check_stated
 

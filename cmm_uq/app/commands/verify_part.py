@@ -28,10 +28,9 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
     """
     if given.results is None:
         return None
-    from cmm_uq.certificate.verify.consistent import check_verdicts
+    from cmm_uq.certificate.verify.decisions import check_part_decisions
+    from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
     from cmm_uq.certificate.verify.inputs import check_results, inputs_of
-    from cmm_uq.certificate.verify.part_decided import check_part_decisions
-    from cmm_uq.certificate.verify.part_figures import check_part_figures
 
     name, data, _ = given.results
     with inquiry.reading("figures", name):
@@ -60,7 +59,7 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
 
 def _check_stated(inquiry: Inquiry, given: Given) -> None:
     """What page and PDF state; their words are compared with each other besides, where both are there."""
-    from cmm_uq.certificate.verify.part_stated import check_part_stated
+    from cmm_uq.certificate.verify.stated import check_part_stated
 
     if given.results is None:
         return
@@ -72,7 +71,7 @@ def _check_stated(inquiry: Inquiry, given: Given) -> None:
 
 
 def _without_feet(given: Given) -> str:
-    from cmm_uq.certificate.verify.views_agree import squashed, without_foot
+    from cmm_uq.certificate.verify.views import squashed, without_foot
 
     if given.pdf is None:
         return ""
@@ -108,7 +107,7 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
 def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str) -> None:
     from cmm_uq.analysis.parts.result import evaluated
     from cmm_uq.analysis.parts.setup import plan_of
-    from cmm_uq.certificate.verify.part_job import check_part_job
+    from cmm_uq.certificate.verify.inputs import check_part_job
 
     inquiry.looked("inputs")
     if sorted(data["job"]["inputs_sha256"]) != sorted(job.inputs):
@@ -128,7 +127,7 @@ def _check_machine(
 ) -> None:
     """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
     from cmm_uq.app.commands.parts.machine import attached_calibration, standing_of, verified
-    from cmm_uq.certificate.verify.part_job import check_standing
+    from cmm_uq.certificate.verify.inputs import check_standing
     from cmm_uq.jobs.reading import sha256
 
     said = data["machine"]

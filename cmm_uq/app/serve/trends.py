@@ -21,7 +21,7 @@ from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records.facts import RecordedMachine, RecordedValue
 from cmm_uq.laboratory.records.listing import Course, CourseValue, courses
 from cmm_uq.laboratory.records.store import Records
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 WIDTH, HEIGHT = 340, 150
 RIGHT, TOP, BOTTOM = 8, 8, 20

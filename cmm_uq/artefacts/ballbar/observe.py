@@ -17,7 +17,7 @@ from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Size
-from cmm_uq.machine.model.own_faults import temperature_of
+from cmm_uq.machine.model.artefact_doubt import temperature_of
 from cmm_uq.machine.model.recorded import check_length, expansion, stated_sd
 from cmm_uq.machine.physics.effect import Effect
 

@@ -13,7 +13,7 @@ from cmm_uq.certificate.pages.budget import budget_blocks
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, numbered
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 _ROWS_SHOWN = 60
 

@@ -13,7 +13,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.radial import Radial
 from cmm_uq.machine.model.recorded import expansion, place
 

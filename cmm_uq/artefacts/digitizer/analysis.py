@@ -17,7 +17,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.machine.physics.alignment import three_alignment_offset
+from cmm_uq.machine.physics.digitizer import three_alignment_offset
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 _SAME_ATTITUDE = 0.01

@@ -10,9 +10,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.recorded import columns_needed, place
-from cmm_uq.machine.physics.alignment import Alignment, align_on_sphere
+from cmm_uq.machine.physics.digitizer import Alignment, align_on_sphere
 
 ANGLES = ("alpha_deg", "beta_deg", "gamma_deg")
 SCAN = ("u_mm", "v_mm")

@@ -20,11 +20,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
-from cmm_uq.machine.model.artefact import Artefact, Size
-from cmm_uq.machine.model.placings import Placings
-from cmm_uq.machine.physics.alignment import Alignment, MountOffset, mount_offset
-from cmm_uq.machine.physics.scanning import attitudes
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, mount_offset
+from cmm_uq.machine.physics.effects.scanning import attitudes
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 OFFSET = ("U1", "V1", "W1")
 

@@ -14,7 +14,7 @@ from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import expanded
-from cmm_uq.maths.uncertainty.rounding import alike, rounded
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, whose origin is that of the scan plane.")
 

@@ -16,7 +16,7 @@ from cmm_uq.analysis.screening.shape import (
 from cmm_uq.artefacts.digitizer.attitudes import ANGLES, scan_of
 from cmm_uq.artefacts.digitizer.facts import AlignmentFacts
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.physics.scanning import attitudes
+from cmm_uq.machine.physics.effects.scanning import attitudes
 
 _UNKNOWNS = 6
 _SOUND = 1e-2

@@ -12,11 +12,10 @@ import numpy as np
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Size
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Placings, Size
 from cmm_uq.machine.model.radial import Radial
 from cmm_uq.machine.model.recorded import expansion
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 
 class Target(Protocol):

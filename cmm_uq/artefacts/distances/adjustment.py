@@ -19,8 +19,8 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.plain import quantity_data
+from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
 from cmm_uq.machine.physics.kinematics import Chain, axis_directions
-from cmm_uq.machine.physics.rigid_body import SCALE, SQUARENESS
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 

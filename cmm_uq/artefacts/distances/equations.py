@@ -21,8 +21,8 @@ from cmm_uq.base.messages import Text, commas, plural, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import AtLeast, as_evaluated
-from cmm_uq.machine.physics.rigid_body import SCALE, SQUARENESS
-from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
+from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
+from cmm_uq.maths.uncertainty.type_a import coverage_factor
 
 UNKNOWNS = 6
 

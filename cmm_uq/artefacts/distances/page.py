@@ -9,7 +9,7 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import expanded
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 
 def section(

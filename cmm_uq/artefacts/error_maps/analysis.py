@@ -12,9 +12,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.machine_maps import WHERE, maps_of
 from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.effects.thermal import ThermalScale
 from cmm_uq.machine.physics.error_map import ErrorMap
-from cmm_uq.machine.physics.thermal import ThermalScale
-from cmm_uq.maths.inference.posterior import Progress
+from cmm_uq.maths.inference.ensembles import Progress
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from cmm_uq.analysis.diagnosis.noise import NoiseKind
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import PPM, unit
-from cmm_uq.machine.physics.thermal import EXPANSION
+from cmm_uq.machine.physics.effects.thermal import EXPANSION
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.posterior import Density
 

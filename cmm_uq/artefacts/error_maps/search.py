@@ -26,7 +26,7 @@ from cmm_uq.artefacts.error_maps.noise import kinds_along
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
-from cmm_uq.machine.physics.thermal import EXPANSION, SCALE_EXPANSION
+from cmm_uq.machine.physics.effects.thermal import EXPANSION, SCALE_EXPANSION
 
 _SIGMAS = 300
 _ASSERTED = 0.8

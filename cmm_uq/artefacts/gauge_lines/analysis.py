@@ -14,9 +14,8 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import AtLeast, Result
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.combinations import uncertainty_of_sum
 from cmm_uq.maths.inference.doubt import Doubt
-from cmm_uq.maths.inference.draws import evenly
+from cmm_uq.maths.inference.draws import evenly, uncertainty_of_sum
 
 _DRAWS = 2000
 """Of the sizes of the noise, over which a line's uncertainties are taken."""

@@ -22,16 +22,15 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
-from cmm_uq.machine.model.artefact import Artefact, Indications, Size
+from cmm_uq.machine.model.artefact import Artefact, Indications, Placings, Size
+from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
 from cmm_uq.machine.model.certified_places import CertifiedPlaces
-from cmm_uq.machine.model.own_faults import by_certificate, faults
-from cmm_uq.machine.model.placings import Placings
 from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.own_body import Body
-from cmm_uq.machine.physics.own_errors import ALONG_A_LINE
+from cmm_uq.machine.physics.effects.own_body import Body
+from cmm_uq.machine.physics.effects.own_errors import ALONG_A_LINE
 from cmm_uq.maths.inference.doubt import Cause
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 _LAPPED_UM = 5.0
 """Standard deviation of the faces of a gauge without a certificate from their nominal places, µm."""

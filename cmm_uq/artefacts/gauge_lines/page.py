@@ -17,7 +17,7 @@ from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 
 def sections(result: Result) -> list[Section]:

@@ -11,7 +11,7 @@ from cmm_uq.artefacts.plane.observe import PlaneSurface, ProbedPlane
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.result import Result
-from cmm_uq.machine.physics.probe_offset import OffsetPlane
+from cmm_uq.machine.physics.compensation import OffsetPlane
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,11 +16,10 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model.artefact import Artefact, Size
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import place
-from cmm_uq.machine.physics.probe_offset import DirectionPointError, OffsetPlane, offset_plane
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.machine.physics.compensation import DirectionPointError, OffsetPlane, offset_plane
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 DIRECTION_POINT = 0
 LEAST_POINTS = 3

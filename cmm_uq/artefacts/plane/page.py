@@ -12,7 +12,7 @@ from cmm_uq.certificate.document import Block, Column, Section, Table
 from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
-from cmm_uq.maths.uncertainty.rounding import alike, rounded
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 
 def sections(result: Result) -> list[Section]:

@@ -12,7 +12,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.plain import quantity_data
-from cmm_uq.machine.physics.rigid_body import SCALE
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 STEEL = 11.5e-6

@@ -18,14 +18,13 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.recording.references import NOISE_RATIO
-from cmm_uq.machine.model.artefact import Indications, Size
+from cmm_uq.machine.model.artefact import Indications, Placings, Size
+from cmm_uq.machine.model.artefact_doubt import by_certificate, faults, since_earlier
 from cmm_uq.machine.model.certified_places import CertifiedPlaces
-from cmm_uq.machine.model.own_faults import by_certificate, faults, since_earlier
-from cmm_uq.machine.model.placings import Placings
 from cmm_uq.machine.model.recorded import check_length, columns_needed, expansion, place
 from cmm_uq.machine.model.rigid import Rigid
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.own_body import Body
+from cmm_uq.machine.physics.effects.own_body import Body
 from cmm_uq.maths.inference.doubt import Cause
 
 DRILLED_UM = 30.0

@@ -15,7 +15,7 @@ from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.vectors import vector_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import expanded
-from cmm_uq.maths.uncertainty.rounding import alike, rounded
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 _PLATES_SHOWN = 6
 _CERTIFIED = (say("Positions on the plate"), say("Found minus certified"), say("After the fitted model"))

@@ -20,9 +20,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, unit
 from cmm_uq.jobs.job import Job
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.machine.physics.error_map import ErrorMap
-from cmm_uq.machine.physics.rigid_body import SCALE
-from cmm_uq.maths.inference.posterior import Progress
+from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 KNOWN = "job.toml [artefact] known"

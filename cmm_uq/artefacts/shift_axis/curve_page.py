@@ -12,8 +12,8 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Section, Table
 from cmm_uq.certificate.plots.residuals import curve_with_band, length_plot
 from cmm_uq.certificate.sections.results import SIGN
-from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
+from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 MOST_ROWS = 60
 """Of a table."""

@@ -15,8 +15,8 @@ from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.sections.results import Left
 from cmm_uq.certificate.sections.warnings import not_converged
 from cmm_uq.certificate.wording import Summary
-from cmm_uq.machine.physics.rigid_body import SCALE
-from cmm_uq.maths.uncertainty.rounding import figure, nominal, rounded, significant
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
+from cmm_uq.maths.uncertainty.quantity import figure, nominal, rounded, significant
 
 
 def sections(result: ShiftResult) -> list[Section]:

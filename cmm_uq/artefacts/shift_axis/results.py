@@ -11,7 +11,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.results.contents import covariance_data, head
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.jobs.verdicts import NO_VERDICTS
-from cmm_uq.machine.physics.rigid_body import SCALE
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.maths.inference.ensembles import Chains
 
 

@@ -19,9 +19,9 @@ from cmm_uq.artefacts.shifting.peak_to_valley import peak_to_valley
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 from cmm_uq.jobs.job import Job
+from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 from cmm_uq.machine.physics.error_map import ErrorMap
-from cmm_uq.machine.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
-from cmm_uq.maths.inference.posterior import Progress
+from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 PEAK_TO_VALLEY = "peak_to_valley_um"

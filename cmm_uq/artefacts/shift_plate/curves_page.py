@@ -13,7 +13,7 @@ from cmm_uq.certificate.document import Block, Column, Plot, Section, Table
 from cmm_uq.certificate.plots.residuals import curve_with_band
 from cmm_uq.certificate.plots.vectors import vector_plot
 from cmm_uq.certificate.sections.results import SIGN
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 EVERY = 4
 """Every so many of the positions stand in the table of a curve."""

@@ -23,8 +23,8 @@ from cmm_uq.artefacts.shifting.smooth_function import SmoothFunction
 from cmm_uq.artefacts.shifting.smooth_model import SmoothModel
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM
+from cmm_uq.machine.physics.effects.rigid_body import ROTATION, STRAIGHTNESS
 from cmm_uq.machine.physics.kinematics import carried_offset
-from cmm_uq.machine.physics.rigid_body import ROTATION, STRAIGHTNESS
 
 SCALE_SD, SQUARENESS_SD = 300 * PPM, 500 * ARCSECOND
 """What physics allows, as in the effects of the same names."""

@@ -15,7 +15,7 @@ from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.certificate.sections.results import Left
 from cmm_uq.certificate.sections.warnings import not_converged
 from cmm_uq.certificate.wording import Summary
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 
 def sections(result: PlaneShiftResult) -> list[Section]:

@@ -19,7 +19,7 @@ from cmm_uq.artefacts.shift_plate.undetermined import FreeInPlane, free_in_plane
 from cmm_uq.artefacts.shifting.smooth_model import Coefficients, sampled
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats
-from cmm_uq.machine.physics.rigid_body import SCALE
+from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.maths.inference.ensembles import Chains, Progress
 
 _FINE = 41

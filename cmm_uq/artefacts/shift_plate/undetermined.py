@@ -17,7 +17,7 @@ from cmm_uq.artefacts.shift_plate.model import PlaneModel
 from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
-from cmm_uq.machine.physics.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
+from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 
 _ALIKE = 0.02
 """What changes the readings by less than this part of its own size is not determined by them."""

@@ -20,7 +20,7 @@ from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.results.plain import posterior_file
 from cmm_uq.certificate.sections.results import as_found_data, as_found_section
 from cmm_uq.jobs.job import Job
-from cmm_uq.maths.inference.posterior import Progress
+from cmm_uq.maths.inference.ensembles import Progress
 
 
 def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:

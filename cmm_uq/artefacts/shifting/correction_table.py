@@ -11,9 +11,9 @@ from cmm_uq.artefacts.shift_axis.curve import Curve
 from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate
 from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
+from cmm_uq.machine.physics.effects.rigid_body import SQUARENESS
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, write_error_map
 from cmm_uq.machine.physics.kinematics import carried_offset
-from cmm_uq.machine.physics.rigid_body import SQUARENESS
 
 _DECIMALS = 3
 """Of the table's µm and ″."""

@@ -16,7 +16,7 @@ from cmm_uq.certificate.result import StatedUncertainty
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
-from cmm_uq.maths.uncertainty.covariance import Covariance
+from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 Reported = Mapping[str, tuple[Floats, str]]

@@ -13,7 +13,7 @@ from cmm_uq.certificate.sections.traceability import artefact_rows, certificate_
 from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.ensembles import Chains
-from cmm_uq.maths.uncertainty.rounding import nominal, significant
+from cmm_uq.maths.uncertainty.quantity import nominal, significant
 
 Named = Sequence[Left]
 """Quantities that are stated, each with its place in results.json and its name."""

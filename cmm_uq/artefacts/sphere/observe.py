@@ -15,9 +15,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model.artefact import Forms
-from cmm_uq.machine.model.own_faults import form_faults
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Forms, Placings
+from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.radial import Radial
 from cmm_uq.machine.model.recorded import expansion, place
 from cmm_uq.machine.physics.effect import Effect

@@ -13,7 +13,7 @@ from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, numbered
-from cmm_uq.maths.uncertainty.rounding import alike, rounded
+from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 
 def sections(result: Result) -> list[Section]:

@@ -19,7 +19,7 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.result import AtLeast, Result
 from cmm_uq.certificate.wording import refusal
 from cmm_uq.machine.physics.catalogue import every
-from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
+from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 SIDES = ("1–2", "2–3", "3–1")
 

@@ -23,8 +23,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, METRE, PPM
-from cmm_uq.machine.model.placings import Placings
-from cmm_uq.machine.physics.rigid_body import ROTATION, SCALE, SQUARENESS, tip_offsets
+from cmm_uq.machine.model.artefact import Placings
+from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, tip_offsets
 
 _ALIGNED = np.cos(np.radians(3.0))
 _ANOTHER_PLACE = 20.0

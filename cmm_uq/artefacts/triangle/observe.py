@@ -24,12 +24,12 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model.artefact import Size
-from cmm_uq.machine.model.own_faults import by_certificate, faults
+from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
 from cmm_uq.machine.model.recorded import check_length, expansion, place
 from cmm_uq.machine.model.rigid import Rigid
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.own_body import Body
-from cmm_uq.machine.physics.own_errors import AFFINE
+from cmm_uq.machine.physics.effects.own_body import Body
+from cmm_uq.machine.physics.effects.own_errors import AFFINE
 
 _TITLES = (
     say("Block 1–2"), say("Block 2–3"), say("Block 3–1"), say("Cylinder 1"), say("Cylinder 2"), say("Cylinder 3"),

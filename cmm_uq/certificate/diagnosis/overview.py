@@ -22,7 +22,7 @@ from cmm_uq.certificate.wording import Headline as Verdict
 from cmm_uq.certificate.wording import Summary, probability
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.uncertainty.rounding import alike
+from cmm_uq.maths.uncertainty.quantity import alike
 
 STANDING: Mapping[str, Standing] = {"consistent": "good", "explained": "open", "partial": "open", "unexplained": "bad"}
 """What a verdict means for who is to act."""

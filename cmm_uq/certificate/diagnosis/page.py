@@ -44,8 +44,8 @@ from cmm_uq.certificate.sections.where import where_section
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.measurement import ARTEFACT
-from cmm_uq.maths.uncertainty.degrees_of_freedom import factor_of_noise
-from cmm_uq.maths.uncertainty.rounding import alike, figure
+from cmm_uq.maths.uncertainty.quantity import alike, figure
+from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 
 def diagnosis_results(result: JobDiagnosis) -> dict[str, Any]:

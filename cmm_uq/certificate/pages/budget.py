@@ -14,7 +14,7 @@ from cmm_uq.maths.uncertainty.budget_results import COMPARISON, SUMMARY, compari
 if TYPE_CHECKING:
     from cmm_uq.maths.uncertainty.evaluation import Evaluation, Stated
     from cmm_uq.maths.uncertainty.model_file import ModelFile
-    from cmm_uq.maths.uncertainty.ready_budget import ReadyBudget
+    from cmm_uq.maths.uncertainty.ready import ReadyBudget
 
 _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 

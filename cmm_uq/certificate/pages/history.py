@@ -42,7 +42,7 @@ from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.drift import HORIZON, PARTS
 from cmm_uq.laboratory.due.history import MachineHistory, ValueHistory, epochs
-from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded
+from cmm_uq.maths.uncertainty.quantity import limit_in_full, rounded
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,7 +22,7 @@ from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
 from cmm_uq.certificate.wording import Figure, Summary, probability
 from cmm_uq.certificate.wording import Headline as Verdict
 from cmm_uq.jobs.verdicts import standing_of
-from cmm_uq.maths.uncertainty.rounding import rounded, significant
+from cmm_uq.maths.uncertainty.quantity import rounded, significant
 
 
 @dataclass(frozen=True)

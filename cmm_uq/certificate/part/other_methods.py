@@ -23,7 +23,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, number, 
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
 from cmm_uq.maths.uncertainty.budget import Line
-from cmm_uq.maths.uncertainty.rounding import figure, rounded, significant
+from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 _NOTHING = 5e-4  # share of a variance that is printed as none
 # characteristics for which is told why methods differ, and whose budgets are listed: those that differ most

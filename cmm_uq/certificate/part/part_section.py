@@ -15,7 +15,7 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section, Table
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.pictures import errors_picture, form_picture, part_picture
-from cmm_uq.maths.uncertainty.rounding import nominal
+from cmm_uq.maths.uncertainty.quantity import nominal
 
 _SHORT = 8  # letters up to which features are lettered in pictures by their names, else by their numbers
 

@@ -21,7 +21,7 @@ from cmm_uq.certificate.part.views import draw_outlines, label, panels, segments
 from cmm_uq.certificate.plots.labels import shown, told
 from cmm_uq.certificate.plots.style import ACCENT, DIVERGING, INK, MUTED, TINY, WIDTH_MM, dots, drawn, house_style
 from cmm_uq.certificate.plots.vectors import round_length
-from cmm_uq.maths.uncertainty.rounding import significant
+from cmm_uq.maths.uncertainty.quantity import significant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

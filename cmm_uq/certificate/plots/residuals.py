@@ -42,7 +42,7 @@ from cmm_uq.certificate.plots.style import (
     strokes,
 )
 from cmm_uq.certificate.result import Result
-from cmm_uq.maths.uncertainty.rounding import alike
+from cmm_uq.maths.uncertainty.quantity import alike
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

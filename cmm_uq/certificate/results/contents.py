@@ -25,7 +25,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.maths.uncertainty.budget_results import budget_data
-from cmm_uq.maths.uncertainty.covariance import Covariance
+from cmm_uq.maths.uncertainty.correlation import Covariance
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 SCHEMA = "cmm-uq/results/1"

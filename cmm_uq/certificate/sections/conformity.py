@@ -13,7 +13,7 @@ from cmm_uq.certificate.plots.conformity import trumpet
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.maths.uncertainty.budget import Budget, Line
-from cmm_uq.maths.uncertainty.rounding import figure, limit_in_full, nominal, significant
+from cmm_uq.maths.uncertainty.quantity import figure, limit_in_full, nominal, significant
 
 
 def budget_table(measurand: Text, budget: Budget) -> Table:

@@ -17,8 +17,7 @@ from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import expanded, probability, with_uncertainty
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.posterior import Posterior
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import alike, rounded
+from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
 
 _TOLD = 8
 """Periods that a sentence tells; results.json has all."""

@@ -25,7 +25,7 @@ from cmm_uq.certificate.wording import (
     title_of,
 )
 from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
-from cmm_uq.maths.uncertainty.rounding import limit_in_full, rounded, significant
+from cmm_uq.maths.uncertainty.quantity import limit_in_full, rounded, significant
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> Summary:

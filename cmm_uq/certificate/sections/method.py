@@ -10,7 +10,7 @@ from cmm_uq.certificate.wording import title_of
 from cmm_uq.machine.model.certified_places import CALIBRATION
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.posterior import Posterior
-from cmm_uq.maths.uncertainty.rounding import alike
+from cmm_uq.maths.uncertainty.quantity import alike
 
 _SHOWN = 0.8
 """Probability from which a component is said to be there; beforehand it is at most one half."""

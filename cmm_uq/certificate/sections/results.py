@@ -16,8 +16,7 @@ from cmm_uq.certificate.wording import OUTCOME_WORDS, expanded, title_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import EstimateWithInterval as Figure
 from cmm_uq.jobs.verdicts import Verdict
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
 SIGN = say("Sign rule: true coordinate = indicated coordinate + error.")
 

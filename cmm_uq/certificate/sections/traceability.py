@@ -18,8 +18,7 @@ from cmm_uq.jobs.tables.length_formula import Growing, factor_of
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.physics.catalogue import every
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import figure, nominal, significant
+from cmm_uq.maths.uncertainty.quantity import Quantity, figure, nominal, significant
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.result import Result

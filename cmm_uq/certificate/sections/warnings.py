@@ -9,7 +9,7 @@ from cmm_uq.base.messages import Text, listed, say, sentences
 from cmm_uq.certificate.diagnosis.overview import VERDICTS
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import title_of, with_uncertainty
-from cmm_uq.maths.uncertainty.rounding import figure, nominal, significant
+from cmm_uq.maths.uncertainty.quantity import figure, nominal, significant
 
 ASSUMED = 0.25
 """Share of the prior in a parameter's variance from which on the reader is told."""

@@ -13,7 +13,7 @@ from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section,
 from cmm_uq.certificate.effect_words import effect_of
 from cmm_uq.certificate.plots.vectors import Shade, profile_plot, residual_field_plot
 from cmm_uq.jobs.columns import in_words, labelled, unit_of
-from cmm_uq.maths.uncertainty.rounding import significant
+from cmm_uq.maths.uncertainty.quantity import significant
 
 _READINGS = frozenset(f"{a}_mm" for a in AXES)
 

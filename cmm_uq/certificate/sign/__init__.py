@@ -5,14 +5,11 @@ What it is made with comes with the extra ``cmm-uq[sign]`` and is imported when 
 
 from __future__ import annotations
 
-from cmm_uq.certificate.sign.clock import signing_time
 from cmm_uq.certificate.sign.found import Signature, Trust, trust_of
-from cmm_uq.certificate.sign.pdf import LEVELS, Level, Seal, Stamping, sign_pdf
+from cmm_uq.certificate.sign.pdf import LEVELS, Level, Seal, Stamping, sign_pdf, signing_time
 from cmm_uq.certificate.sign.pdf_found import signatures_of_pdf
-from cmm_uq.certificate.sign.pkcs12 import signer_of_file, trial_key
-from cmm_uq.certificate.sign.signer import TEST_NOTE, Signer
-from cmm_uq.certificate.sign.xml import sign_xml
-from cmm_uq.certificate.sign.xml_found import signatures_of_xml
+from cmm_uq.certificate.sign.signer import TEST_NOTE, Signer, signer_of_file, trial_key
+from cmm_uq.certificate.sign.xml import sign_xml, signatures_of_xml
 
 __all__ = [
     "LEVELS", "TEST_NOTE", "Level", "Seal", "Signature", "Signer", "Stamping", "Trust", "sign_pdf", "sign_xml",

@@ -1,4 +1,6 @@
-"""PDF signed by PAdES: a revision appended, that leaves every byte before it as it is, tagged and fit for the archive.
+"""PDF signed by PAdES: a revision appended that leaves every byte before it as it is.
+
+PDF signed by PAdES: a revision appended, that leaves every byte before it as it is, tagged and fit for the archive.
 
 The date of the metadata stays that of the document. The same document, key and time give the same bytes at level B-B.
 """
@@ -7,13 +9,14 @@ from __future__ import annotations
 
 import datetime as dt
 import io
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign.appending import appending
 from cmm_uq.certificate.sign.extra import installed, ran
 from cmm_uq.certificate.sign.found import NOBODY, Trust
+from cmm_uq.certificate.sign.pdf_library import appending
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
 if TYPE_CHECKING:
@@ -95,8 +98,7 @@ def sign_pdf(
         from pyhanko.sign import fields, signers
         from pyhanko.stamp.noop import NoOpStampStyle
 
-        from cmm_uq.certificate.sign.adapter import Adapted
-        from cmm_uq.certificate.sign.tagging import show, tag
+        from cmm_uq.certificate.sign.pdf_library import Adapted, show, tag
     writer = appending(pdf)
     name, count = _field(writer)
     if seal is not None and count >= len(seal.places):
@@ -117,7 +119,7 @@ def sign_pdf(
     adapted, style = Adapted(signer), NoOpStampStyle()
     if stamping is None or stamping.level == "B-B":
         return ran(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
-    from cmm_uq.certificate.sign.time_server import Server
+    from cmm_uq.certificate.sign.pdf_library import Server
 
     server = Server(stamping.server)
     pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=server, stamp_style=style)
@@ -153,7 +155,7 @@ async def _stamped(
     server = pdf_signer.default_timestamper
     if stamping.level == "B-T":
         return await _signed(pdf_signer, writer, at)
-    from cmm_uq.certificate.sign.long_term import Proof, stamped
+    from cmm_uq.certificate.sign.pdf_library import Proof, stamped
 
     proof = Proof(signer, server, stamping.trust, at)
     await proof.gather()
@@ -163,3 +165,22 @@ async def _stamped(
     output = io.BytesIO()
     kept.write(output)
     return output.getvalue()
+
+
+EPOCH = "SOURCE_DATE_EPOCH"
+
+
+def signing_time() -> dt.datetime:
+    """Whole seconds, in UTC.
+
+    Raises
+    ------
+    CmmUqError : the variable is no number of seconds since 1970.
+    """
+    given = os.environ.get(EPOCH, "")
+    if not given:
+        return dt.datetime.now(dt.UTC).replace(microsecond=0)
+    try:
+        return dt.datetime.fromtimestamp(int(given), dt.UTC)
+    except (ValueError, OverflowError, OSError):
+        raise CmmUqError(f"{given!r} is no number of seconds since 1970", where=EPOCH, fix="Mend or unset it") from None

@@ -172,7 +172,7 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
     """Whether only time stamps, evidence and further signatures were appended, and else what."""
     from pyhanko.sign.diff_analysis import DiffResult, ModificationLevel
 
-    from cmm_uq.certificate.sign.appended import POLICY
+    from cmm_uq.certificate.sign.pdf_library import POLICY
 
     embedded.compute_integrity_info(diff_policy=POLICY)
     result = embedded.diff_result

@@ -1,22 +1,66 @@
-"""XML signed by XAdES B-B: one signature over the whole root, enveloped, in the place where a DCC has it, its last element.
+"""XML signed by XAdES B-B, and the signatures that are found in an XML file.
+
+XML signed by XAdES B-B: one signature over the whole root, enveloped, in the place where a DCC has it, its last element.
 
 The same file, key and time give the same bytes.
 """
 
 from __future__ import annotations
 
+import base64
+import binascii
 import datetime as dt
 import hashlib
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, say
 from cmm_uq.certificate.sign.extra import installed
+from cmm_uq.certificate.sign.found import Signature, Trust
 from cmm_uq.certificate.sign.signer import Signer
-from cmm_uq.certificate.sign.xml_read import SIGNATURE, root_of
 
 if TYPE_CHECKING:
+    from asn1crypto import x509
     from lxml.etree import _Element
+
+DS, XADES = "{http://www.w3.org/2000/09/xmldsig#}", "{http://uri.etsi.org/01903/v1.3.2#}"
+SIGNATURE = f"{DS}Signature"
+
+
+def root_of(data: bytes, where: str) -> _Element:
+    """The root of an XML file.
+
+    Parameters
+    ----------
+    data : the file.
+    where : its name, for messages.
+
+    Raises
+    ------
+    CmmUqError : it is no XML, declares a document type, or is too large.
+    """
+    with installed():
+        from lxml import etree
+    if len(data) > SIGNED_BYTES.most:
+        raise CmmUqError(f"is larger than the {SIGNED_BYTES.most} bytes that are read of such a file", where=where,
+                         fix="Check that it is the right file")  # fmt: skip
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise _typed(where)
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
+    try:
+        root = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        raise CmmUqError(f"is no XML: {error}", where=where, fix="Name an XML file that is whole") from None
+    if root.getroottree().docinfo.internalDTD is not None:  # in an encoding that hides it from the search
+        raise _typed(where)
+    return root
+
+
+def _typed(where: str) -> CmmUqError:
+    return CmmUqError("declares a document type, which a certificate has no need of", where=where,
+                      fix="Take it out: entities could change what is read")  # fmt: skip
+
 
 COMMENT = say("the file has a comment, which no signature covers")
 INSTRUCTION = say("the file has a processing instruction, which no signature covers")
@@ -96,3 +140,173 @@ class _Key:
     def sign(self, data: bytes, **_: Any) -> bytes:
         """Signature of data; digest and padding are those of every signer."""
         return self._signer.signed(data)
+
+
+ENVELOPED = "http://www.w3.org/2000/09/xmldsig#enveloped-signature"
+CANONICAL = (
+    "http://www.w3.org/TR/2001/REC-xml-c14n-20010315", "http://www.w3.org/2006/12/xml-c14n11",
+    "http://www.w3.org/2001/10/xml-exc-c14n#",
+)  # fmt: skip
+"""Without comments: these are refused."""
+
+DIGESTS = frozenset({"http://www.w3.org/2001/04/xmlenc#sha256", "http://www.w3.org/2001/04/xmldsig-more#sha384",
+                     "http://www.w3.org/2001/04/xmlenc#sha512"})  # fmt: skip
+METHODS = frozenset(f"http://www.w3.org/2001/04/xmldsig-more#{key}-sha{bits}" for key in ("rsa", "ecdsa")
+                    for bits in (256, 384, 512))  # fmt: skip
+
+LEVEL = "XAdES B-B"
+QUALIFYING = f"{DS}Object/{XADES}QualifyingProperties"
+PROPERTIES = f"{QUALIFYING}/{XADES}SignedProperties"
+
+OF_ANOTHER = say("the signed properties are not those of this signature")
+NO_XADES = say("the signature has no signed properties, as XAdES asks for")
+ELSEWHERE = say("the signature does not stand as the last element of the root")
+PARTIAL = say("the signature covers a part of the file, or more than the file: only one over the whole root counts")
+WEAK = say("the signature is made with an algorithm that is weak or unknown")
+BROKEN = say("the signature does not fit the file: one of them was changed")
+NO_CERTIFICATE = say("the signature has no certificate that can be read")
+SEVERAL = say("the file has several signatures, and one covers the other")
+
+
+def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file") -> tuple[Signature, ...]:
+    """Every signature in an XML file.
+
+    Parameters
+    ----------
+    data : the file.
+    trust : whom one trusts.
+    where : its name, for messages.
+
+    Raises
+    ------
+    CmmUqError : it cannot be read as XML.
+    """
+    root = root_of(data, where)
+    elements = list(root.iter(SIGNATURE))
+    return tuple(_found(data, element, several=len(elements) > 1, trust=trust) for element in elements)
+
+
+def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Signature:
+    with installed():
+        from cmm_uq.certificate.sign.chain import Evidence, standing
+    problems = _shape(element)
+    certificates = _certificates(element)
+    if several:
+        problems.append(SEVERAL)
+    if not certificates:
+        problems.append(NO_CERTIFICATE)
+    if problems:  # nothing is computed of what could not count
+        return Signature("", "", "", "XML", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
+                         revocation="not known", test_key=False, problems=tuple(problems))  # fmt: skip
+    signer = certificates[0]
+    content = _verified(
+        data, signer, [str(one.get("URI")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference")]
+    )
+    at = _time(element)
+    judged = standing(signer, Evidence(tuple(certificates[1:])), trust, at, proven=False)
+    return Signature(
+        signer.subject.human_friendly, str(signer.subject.native.get("common_name", signer.subject.human_friendly)),
+        signer.issuer.human_friendly, LEVEL, at, time_proven=False, intact=bool(content), covers_whole_file=bool(content),
+        trusted=judged.trusted, revocation=judged.revocation, test_key=judged.test_key,
+        problems=(*(() if content else (BROKEN,)), *judged.problems), content=content,
+    )  # fmt: skip
+
+
+def _shape(element: _Element) -> list[Text]:
+    """Why a signature cannot count, whatever it was computed of."""
+    found: list[Text] = []
+    root = element.getroottree().getroot()
+    if element.getparent() is not root or element.getnext() is not None:
+        found.append(ELSEWHERE)
+    found += outside(root)
+    references = element.findall(f"{DS}SignedInfo/{DS}Reference")
+    whole = [reference for reference in references if reference.get("URI") == ""]
+    if len(whole) != 1 or not _plain(whole[0], ENVELOPED) or not _own(element, references):
+        found.append(PARTIAL)
+    if element.find(PROPERTIES) is None:
+        found.append(NO_XADES)
+    elif element.find(QUALIFYING).get("Target") != f"#{element.get('Id')}":
+        found.append(OF_ANOTHER)
+    digests = {str(one.get("Algorithm")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference/{DS}DigestMethod")}
+    methods = [str(one.get("Algorithm")) for one in element.iterfind(f"{DS}SignedInfo/{DS}SignatureMethod")]
+    if not digests <= DIGESTS or len(methods) != 1 or methods[0] not in METHODS:
+        found.append(WEAK)
+    return found
+
+
+def _plain(reference: _Element, *further: str) -> bool:
+    """Whether nothing is left out of what a reference covers but the signature itself."""
+    transforms = [str(one.get("Algorithm")) for one in reference.iterfind(f"{DS}Transforms/{DS}Transform")]
+    canonical = [one for one in transforms if one in CANONICAL]
+    nested = any(len(one) for one in reference.iterfind(f"{DS}Transforms/{DS}Transform"))  # as an XPath has it
+    return sorted(transforms) == sorted([*further, *canonical]) and len(canonical) <= 1 and not nested
+
+
+def _own(element: _Element, references: list[_Element]) -> bool:
+    """Whether all but the root that is referred to are parts of the signature, each by a name that nothing else has."""
+    parts = {
+        part.get("Id"): part for part in (element.find(f"{DS}KeyInfo"), element.find(PROPERTIES)) if part is not None
+    }
+    root = element.getroottree().getroot()
+    names = [str(value) for one in root.iter() for key, value in one.attrib.items() if _local(key) == "id"]
+    named = [str(one.get("URI"))[1:] for one in references if one.get("URI") != ""]
+    by_name = all(one.get("URI") is not None for one in references) and len(set(named)) == len(named)
+    covered = element.find(PROPERTIES)
+    plain = all(_plain(one) for one in references if one.get("URI") != "")
+    return (
+        by_name and plain and all(name in parts and names.count(name) == 1 for name in named)
+        and (covered is None or covered.get("Id") in named)
+    )  # fmt: skip
+
+
+def _local(key: Any) -> str:
+    """An attribute's name without its namespace, in small letters."""
+    return str(key).rpartition("}")[2].lower()
+
+
+def _certificates(element: _Element) -> list[x509.Certificate]:
+    """That the signature carries, the signer's first; none where one cannot be read."""
+    from asn1crypto import x509
+
+    found = []
+    try:
+        for one in element.iterfind(f"{DS}KeyInfo/{DS}X509Data/{DS}X509Certificate"):
+            certificate = x509.Certificate.load(base64.b64decode(one.text or ""), strict=True)
+            certificate.native  # noqa: B018 - parsed when it is first asked for
+            found.append(certificate)
+    except (ValueError, TypeError, KeyError, binascii.Error):
+        return []
+    return found
+
+
+def _verified(data: bytes, signer: x509.Certificate, references: list[str]) -> bytes:
+    """Canonical form of the root that the signature was made over; nothing where it does not fit."""
+    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+    from cryptography.x509 import load_der_x509_certificate
+    from lxml.etree import LxmlError
+    from signxml import DigestAlgorithm, SignatureMethod
+    from signxml.exceptions import SignXMLException
+    from signxml.xades import XAdESSignatureConfiguration, XAdESVerifier
+
+    try:
+        certificate = load_der_x509_certificate(signer.dump())
+        config = XAdESSignatureConfiguration(
+            location="./", expect_references=len(references),
+            signature_methods=frozenset(one for one in SignatureMethod if one.value in METHODS),
+            digest_algorithms=frozenset(one for one in DigestAlgorithm if one.value in DIGESTS),
+            verification_time=certificate.not_valid_before_utc,  # whether it was in date is judged with its chain
+        )  # fmt: skip
+        results = XAdESVerifier().verify(data, x509_cert=certificate, expect_config=config)
+    except (SignXMLException, InvalidSignature, UnsupportedAlgorithm, LxmlError, ValueError, TypeError, KeyError):
+        return b""
+    return bytes(results[references.index("")].signed_data)
+
+
+def _time(element: _Element) -> dt.datetime | None:
+    """When the signer says that it was signed; a time without its zone is none."""
+    said = element.findtext(f"{PROPERTIES}/{XADES}SignedSignatureProperties/{XADES}SigningTime", "")
+    try:
+        time = dt.datetime.fromisoformat(said.strip())
+    except ValueError:
+        return None
+    return time.astimezone(dt.UTC) if time.tzinfo else None

@@ -13,12 +13,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cmm_uq.certificate.verify.consistent import QUANTITY
+from cmm_uq.certificate.verify.figures import QUANTITY
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import RESULTS, Given
-from cmm_uq.certificate.verify.strict_json import strict_json
-from cmm_uq.certificate.verify.views_agree import squashed
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.certificate.verify.given import RESULTS, Given, strict_json
+from cmm_uq.certificate.verify.views import squashed
+from cmm_uq.maths.uncertainty.quantity import rounded
 
 _NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
 _OTHER_KERNELS = 0.5
@@ -258,7 +257,7 @@ def _compare_pdf(inquiry: Inquiry, given: Given, again: Again) -> bool:
     inquiry.looked("again")
     if pdf.content[: pdf.ends[0]] == again.pdf:
         return True
-    from cmm_uq.certificate.verify.pdf_parts import differing_parts
+    from cmm_uq.certificate.verify.views import differing_parts
 
     stands, should = pdf.content[: pdf.ends[0]], again.pdf
     parts = differing_parts(stands, should)

@@ -1,7 +1,9 @@
-"""What is given to be verified: the forms of one certificate, told apart by their content, and the files that belong to it."""
+"""What is given to be verified: the forms of one certificate, and ``results.json`` read strictly."""
 
 from __future__ import annotations
 
+import json
+import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,20 +11,90 @@ from pathlib import Path
 from typing import Any, get_args
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.content import content_of
-from cmm_uq.base.files.limits import GIVEN, PDF_BYTES
+from cmm_uq.base.files.content import content_of, text_of
+from cmm_uq.base.files.limits import GIVEN, JSON_BYTES, JSON_DEPTH, NUMERAL, PDF_BYTES
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.base.output.manifest import Manifest, parsed, plain_name
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import HtmlPage, read_html
 from cmm_uq.certificate.verify.pdf_file import PdfFile, read_pdf
-from cmm_uq.certificate.verify.strict_json import strict_json
+
+_FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
+
+
+def strict_json(content: bytes, where: str) -> dict[str, Any]:
+    """The object of a JSON file.
+
+    Parameters
+    ----------
+    content : the file's bytes.
+    where : of the file.
+
+    Raises
+    ------
+    CmmUqError : it is no JSON object, too large or too deep, has a key twice, or a number that is none.
+    """
+    if len(content) > JSON_BYTES.most:
+        raise CmmUqError(f"is larger than {JSON_BYTES.most} bytes", where=where, fix=_FIX)
+    text = text_of(content, where, _FIX)
+    _refuse_depth(text, where)
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            twice = next(key for i, (key, _) in enumerate(pairs) if key in {name for name, _ in pairs[:i]})
+            raise CmmUqError(f"has the key {twice!r} twice", where=where, fix=_FIX)
+        return found
+
+    def numeral(of: type[int | float], text: str) -> Any:
+        number = None if len(text) > NUMERAL.most else of(text)
+        if number is None or not math.isfinite(number):
+            raise CmmUqError(f"has a number that is none: {text}", where=where, fix=_FIX)
+        return number
+
+    try:
+        data = json.loads(
+            text, object_pairs_hook=once, parse_int=lambda text: numeral(int, text),
+            parse_float=lambda text: numeral(float, text), parse_constant=lambda text: numeral(float, text),
+        )  # fmt: skip
+    except json.JSONDecodeError as error:
+        raise CmmUqError(f"is no JSON: {error.msg}", where=f"{where} line {error.lineno}", fix=_FIX) from None
+    if not isinstance(data, dict):
+        raise CmmUqError("holds no JSON object", where=where, fix=_FIX)
+    return data
+
+
+def canonical(data: Any) -> bytes:
+    """The bytes that this program writes of plain data whose numbers are rounded."""
+    return (json.dumps(data, indent=2, ensure_ascii=False) + "\n").encode()
+
+
+def _refuse_depth(text: str, where: str) -> None:
+    """Count brackets outside strings, before anything recurses."""
+    depth, quoted, escaped = 0, False, False
+    for c in text:
+        if quoted:
+            if escaped:
+                escaped = False
+            elif c == "\\":
+                escaped = True
+            elif c == '"':
+                quoted = False
+        elif c == '"':
+            quoted = True
+        elif c in "[{":
+            depth += 1
+            if depth > JSON_DEPTH.most:
+                raise CmmUqError(f"is nested deeper than {JSON_DEPTH.most} levels", where=where, fix=_FIX)
+        elif c in "]}":
+            depth -= 1
+
 
 RESULTS, JOB = "results.json", "job.toml"
 RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"
 
-_FIX = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
+_FIX_of_given = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
 
 
 @dataclass
@@ -75,8 +147,8 @@ def read_given(paths: Iterable[Path]) -> Given:
     for name, path in _files(paths):
         if name in read:
             raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path),
-                             fix=_FIX)  # fmt: skip
-        read[name] = content_of(path, PDF_BYTES, _FIX), str(path)
+                             fix=_FIX_of_given)  # fmt: skip
+        read[name] = content_of(path, PDF_BYTES, _FIX_of_given), str(path)
     return _given(read)
 
 
@@ -102,7 +174,7 @@ def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
         given.results = where, strict_json(content, where), content
     if given.results is None and not (given.pdf or given.html or given.xml):
         told = ", ".join(where for _, where in read.values())
-        raise CmmUqError("nothing given is a certificate", where=told, fix=_FIX)
+        raise CmmUqError("nothing given is a certificate", where=told, fix=_FIX_of_given)
     return given
 
 
@@ -122,7 +194,7 @@ def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
             Path(one.path) for one in os.scandir(path) if not one.name.startswith(".") and not _is_folder(one)
         )
         if not inside:
-            raise CmmUqError("holds no files", where=str(path), fix=_FIX)
+            raise CmmUqError("holds no files", where=str(path), fix=_FIX_of_given)
         named = [(one.name, one) for one in inside] + _deeper(path)
         if linked := next((one for name, one in named if _is_linked(path, name)), None):
             raise CmmUqError(
@@ -131,7 +203,7 @@ def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
         found += named
     if len(found) > GIVEN.most:
         raise CmmUqError(f"{len(found)} files are given, and {GIVEN.most} are read at once", where=str(found[0][1].parent),
-                         fix=_FIX)  # fmt: skip
+                         fix=_FIX_of_given)  # fmt: skip
     return found
 
 
@@ -139,7 +211,7 @@ def _deeper(folder: Path) -> list[tuple[str, Path]]:
     """Files in folders inside a folder that its manifest names and that are there."""
     if (folder / MANIFEST).is_symlink() or not (folder / MANIFEST).is_file():
         return []
-    content = content_of(folder / MANIFEST, PDF_BYTES, _FIX)
+    content = content_of(folder / MANIFEST, PDF_BYTES, _FIX_of_given)
     manifest = parsed(strict_json(content, str(folder / MANIFEST)))
     names = [] if manifest is None else [name for name in manifest.files if "/" in name and plain_name(name)]
     return [(name, folder / name) for name in sorted(names) if (folder / name).is_file()]
@@ -172,7 +244,7 @@ def _sort(given: Given, name: str, content: bytes, where: str) -> None:
     elif name == MANIFEST:
         given.manifest = parsed(strict_json(content, where))
         if given.manifest is None:
-            raise CmmUqError("is no manifest of cmm-uq", where=where, fix=_FIX)
+            raise CmmUqError("is no manifest of cmm-uq", where=where, fix=_FIX_of_given)
     elif name == RESULTS or (
         head.startswith(b"{") and any(one in head for one in (b'"cmm-uq/results/', b'"cmm-uq/part/'))
     ):
@@ -184,7 +256,9 @@ def _sort(given: Given, name: str, content: bytes, where: str) -> None:
 
 def _once(before: object, what: str, where: str) -> None:
     if before is not None:
-        raise CmmUqError(f"is a second {what}, and one certificate is verified at a time", where=where, fix=_FIX)
+        raise CmmUqError(
+            f"is a second {what}, and one certificate is verified at a time", where=where, fix=_FIX_of_given
+        )
 
 
 def check_files(inquiry: Inquiry, given: Given) -> None:

@@ -29,8 +29,8 @@ from cmm_uq.laboratory.proving.unknown_causes import (
     possible_faults,
 )
 from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model.artefact import LAST_DIGIT
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.machine.model.placings import LAST_DIGIT
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.noise import AXES as AXIS_NOISE
 from cmm_uq.maths.inference.noise import GROWTH, PLACING, SLOW

@@ -18,7 +18,7 @@ from cmm_uq.jobs.tables.artefact import ReferencedFacts
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.model.recorded import stated_sd
 from cmm_uq.maths.inference.doubt import Cause
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 CALIBRATION = say("calibration of the artefact")
 """Name of this cause."""

@@ -8,8 +8,7 @@ from dataclasses import replace
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.machine import ErrorMapFile, SquarenessFacts
-from cmm_uq.machine.physics.error_map import ErrorMap
-from cmm_uq.machine.physics.error_map_file import parse_map_file
+from cmm_uq.machine.physics.error_map import ErrorMap, parse_map_file
 
 WHERE = "job.toml [machine] error_map"
 

@@ -1,5 +1,7 @@
 """Effects, an artefact and a recording, joined into one model.
 
+Effects, an artefact and a recording, joined into one model.
+
 Forward: an artefact of given sizes stands where the recording says, and the machine's errors turn its true points into
 indicated ones. Inverse: the difference between the indicated points of the recording and of that forward model, seen along
 the directions in which the artefact speaks, is linear in the parameters, and least squares iterates on it (Gauss–Newton).
@@ -25,9 +27,11 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.drawn_noise import Noise
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.superposition import About, Superposition
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.curvature import bend, bent
 from cmm_uq.maths.inference.least_squares import LeastSquares, likeliest, solve
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown
+from cmm_uq.maths.inference.noise import Components
+from cmm_uq.maths.inference.posterior import NoisyPosterior
 
 ARTEFACT = "artefact"
 """First part of the key of a size of the artefact."""
@@ -346,3 +350,26 @@ class MeasurementModel:
     def _split(self, values: Floats) -> tuple[Floats, Floats]:
         k = len(values) - len(self.artefact.sizes)
         return values[:k], values[k:]
+
+
+def with_curvature(model: MeasurementModel, components: Components, posterior: NoisyPosterior) -> NoisyPosterior:
+    """The posterior of the model itself, from that of the linear model about its estimate; the same where it bends too little.
+
+    Parameters
+    ----------
+    model : with the estimate that the linear model is about.
+    components : of its noise.
+    posterior : drawn from the linear model.
+    """
+    estimate = model.estimate()
+    if not model.leans_beyond(estimate.about, posterior.draws.std(axis=0), SMALL_LEAN):
+        return posterior
+    typical = posterior.sizes.typical
+    white = components.white(typical)
+
+    def remainder(values: Floats) -> Floats:
+        return white(model.remainder(estimate, values)[:, None])[:, 0]
+
+    return bent(
+        posterior, bend(estimate.linear.uncorrelated(white), estimate.about, float(typical.coordinate[0]), remainder)
+    )

@@ -19,8 +19,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.recording.prediction import KEY, Prediction
-from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Artefact, Placings
 
 NEAR = 30.0
 """mm from where a point was recorded, within which it is taken to be predicted: no hand sets up much worse, and errors change

@@ -14,10 +14,9 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Artefact, Size
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import check_length, place, stated_sd
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 LEAST_POINTS = 4
 """Points that a centre and a distance need, not all in one plane."""

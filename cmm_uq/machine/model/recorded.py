@@ -1,12 +1,16 @@
-"""What every kind of artefact asks of its recording: columns, temperatures, plausible lengths, and lines for messages."""
+"""What every kind of artefact asks of its recording, and how fine its coordinates are."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import METRE, MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 
@@ -76,3 +80,95 @@ def check_length(measured: float, certified: float, what: str, where: str | None
             f"{said}: they differ by {abs(ratio - 1) * METRE:.3g} mm/m", where=where,
             fix="Check job.toml [artefact], and that the recording belongs to this artefact",
         )  # fmt: skip
+
+
+INCH = 25.4
+NANOMETRE = 1e-6
+"""mm."""
+
+_EXACT = 1e-5
+"""Part of a step by which a coordinate on the grid may be off, as from a unit's conversion."""
+
+_LEAST_VALUES = 12
+"""Different coordinates from which on a grid is no coincidence."""
+
+_LEAST_SHARE = 0.01
+"""Part of the variance of a coordinate from which on the steps matter."""
+
+
+def display_step(xyz: Floats, scatter: float) -> float:
+    """Largest step, mm, of which all coordinates are multiples; 0 where it is too fine to matter, or there is none.
+
+    Parameters
+    ----------
+    xyz : (n, 3) mm as recorded.
+    scatter : of a coordinate, mm, as the residuals show it: a step s has the variance s²/12.
+    """
+    values = np.unique(xyz[np.isfinite(xyz)])
+    steps = [f * unit * 10.0**-k for unit in (1.0, INCH) for k in range(1, 6) for f in (5.0, 2.0, 1.0)]
+    if len(values) < _LEAST_VALUES:
+        return 0.0
+    for step in sorted(steps, reverse=True):
+        if step**2 / 12 < _LEAST_SHARE * scatter**2:
+            return 0.0
+        if np.abs(values / step - np.round(values / step)).max() < _EXACT:
+            return step
+    return 0.0
+
+
+def of_last_digit(xyz: Floats, scatter: float) -> float:
+    """Standard deviation, mm, that the last digit of figures leaves open, or a nanometre; 0 where residuals show more.
+
+    Parameters
+    ----------
+    xyz : (n, 3) mm as recorded.
+    scatter : of a coordinate, mm, as the residuals show it: of figures without noise, of copies and of their differences, less
+        than the digits can tell.
+    """
+    least = max(display_step(xyz, scatter) / float(np.sqrt(12)), NANOMETRE)
+    return least if scatter < least else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Display:
+    """Rounding to steps that are not small beside the noise: it follows the coordinates, and so looks like physics.
+
+    Parameters
+    ----------
+    step : mm.
+    xyz : (n, 3) coordinates as a model has them, mm, without noise and not rounded.
+    rows : (m, j) points of each observation.
+    sensitivity : (m, j, 3) of the observations to their points.
+    """
+
+    step: float
+    xyz: Floats
+    rows: Ints
+    sensitivity: Floats
+
+    @classmethod
+    def of(cls, step: float, recorded: Floats, rows: Ints, sensitivity: Floats, residual: Floats) -> Display:
+        """Coordinates that differ from recorded ones (n, 3) as the residuals (m,) say, and no more."""
+        found = cls(step, recorded, rows, sensitivity)
+        return cls(step, recorded - found.moved(residual[:, None])[:, :, 0], rows, sensitivity)
+
+    @cached_property
+    def _all(self) -> sparse.csr_array:
+        """(m, 3·n)."""
+        m, slots = self.rows.shape
+        row = np.repeat(np.arange(m), 3 * slots)
+        column = (3 * self.rows[:, :, None] + np.arange(3)).ravel()
+        return sparse.csr_array((self.sensitivity.ravel(), (row, column)), shape=(m, self.xyz.size))
+
+    def moved(self, changed: Floats) -> Floats:
+        """Least displacement of the points (n, 3, b) that changes the observations by (m, b), mm."""
+        J = self._all
+        least = sparse.eye_array(J.shape[0]) * 1e-12
+        solved = sparse.linalg.splu(sparse.csc_array(J @ J.T + least)).solve(changed)
+        return np.asarray((J.T @ solved).reshape(len(self.xyz), 3, -1), dtype=np.float64)
+
+    def rounded(self, noise: Floats) -> Floats:
+        """What rounding adds to observations (m, b) with such noise, mm."""
+        shown = self.xyz[:, :, None] + self.moved(noise)
+        error = np.round(shown / self.step) * self.step - shown
+        return np.asarray(self._all @ error.reshape(self.xyz.size, -1), dtype=np.float64)

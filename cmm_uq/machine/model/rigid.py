@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.machine.model.placings import Placings
+from cmm_uq.machine.model.artefact import Artefact, Placings
 from cmm_uq.machine.model.recorded import place
-from cmm_uq.maths.geometry.rotation import nearest_rotations
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.geometry.feature import nearest_rotations
+from cmm_uq.maths.inference.linear_model import Freedoms
 
 _ANOTHER_SHAPE = 0.05
 """rms misfit over the extent from which on a recording cannot be of this artefact."""

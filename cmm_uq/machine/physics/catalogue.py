@@ -14,7 +14,8 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.machine.physics import (
+from cmm_uq.machine.physics.effect import Effect
+from cmm_uq.machine.physics.effects import (
     drives,
     own_errors,
     own_states,
@@ -27,7 +28,6 @@ from cmm_uq.machine.physics import (
     thermal,
     warming,
 )
-from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.plugins import EffectPlugin, outside_effects
 
 CATALOGUE = MappingProxyType(

@@ -13,17 +13,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from cmm_uq.maths.geometry.association import Associated, Association, associate
-    from cmm_uq.maths.geometry.ball_form import BallForm
-    from cmm_uq.maths.geometry.circle import Circle, fit_circle
-    from cmm_uq.maths.geometry.cone import Cone, fit_cone
-    from cmm_uq.maths.geometry.cylinder import Cylinder, fit_cylinder
-    from cmm_uq.maths.geometry.directions import cap_directions
-    from cmm_uq.maths.geometry.feature import Feature
-    from cmm_uq.maths.geometry.line import Line, fit_line
+    from cmm_uq.maths.geometry.axial import Cone, Cylinder, fit_cone, fit_cylinder
+    from cmm_uq.maths.geometry.feature import BallForm, Feature
+    from cmm_uq.maths.geometry.orthogonal_distance import cap_directions
     from cmm_uq.maths.geometry.placed import FeatureKind
-    from cmm_uq.maths.geometry.plane import Plane, fit_plane
     from cmm_uq.maths.geometry.repeated import Drawn, Repeated
-    from cmm_uq.maths.geometry.sphere import Sphere, fit_sphere
+    from cmm_uq.maths.geometry.round import Circle, Sphere, fit_circle, fit_sphere
+    from cmm_uq.maths.geometry.straight import Line, Plane, fit_line, fit_plane
 
 __all__ = [
     "Associated",
@@ -50,43 +46,14 @@ __all__ = [
 ]
 
 _PLACES = {
-    "association": (
-        "Associated",
-        "Association",
-        "associate",
-    ),
-    "ball_form": ("BallForm",),
-    "circle": (
-        "Circle",
-        "fit_circle",
-    ),
-    "cone": (
-        "Cone",
-        "fit_cone",
-    ),
-    "cylinder": (
-        "Cylinder",
-        "fit_cylinder",
-    ),
-    "directions": ("cap_directions",),
-    "feature": ("Feature",),
-    "line": (
-        "Line",
-        "fit_line",
-    ),
+    "association": ("Associated", "Association", "associate"),
+    "axial": ("Cone", "Cylinder", "fit_cone", "fit_cylinder"),
+    "feature": ("BallForm", "Feature"),
+    "orthogonal_distance": ("cap_directions",),
     "placed": ("FeatureKind",),
-    "plane": (
-        "Plane",
-        "fit_plane",
-    ),
-    "repeated": (
-        "Drawn",
-        "Repeated",
-    ),
-    "sphere": (
-        "Sphere",
-        "fit_sphere",
-    ),
+    "repeated": ("Drawn", "Repeated"),
+    "round": ("Circle", "Sphere", "fit_circle", "fit_sphere"),
+    "straight": ("Line", "Plane", "fit_line", "fit_plane"),
 }
 
 

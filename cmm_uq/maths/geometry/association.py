@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.extremes import Extreme, circumscribed, inscribed, least_zone
+from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE
 from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
-from cmm_uq.maths.geometry.shapes import CIRCLE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE
 
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
 ASSOCIATIONS: tuple[Association, ...] = get_args(Association)

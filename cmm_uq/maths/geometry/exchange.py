@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.geometry.shapes import Shape
+from cmm_uq.maths.geometry.minimax import Shape
 
 SETTLED = 1e-11
 """Steps, mm, below which a zone is where its contact points hold it; Newton's steps before it were their square root."""

@@ -15,11 +15,10 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.geometry.centre_search import largest_empty, narrower, safe_radius
-from cmm_uq.maths.geometry.minimax import Extremum, least_largest
+from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, Extremum, least_largest
 from cmm_uq.maths.geometry.placed import Placed
-from cmm_uq.maths.geometry.shapes import CIRCLE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE
-from cmm_uq.maths.geometry.width import narrowest
+from cmm_uq.maths.geometry.round import largest_empty, narrower, safe_radius
+from cmm_uq.maths.geometry.straight import narrowest
 
 ROUNDING = 4 * float(np.finfo(np.float64).eps)
 """Of distances, as a share of the coordinates."""

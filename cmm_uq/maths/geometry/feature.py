@@ -1,4 +1,11 @@
-"""What every fitted feature tells: its covariance, its residuals, its form deviation; and what points must bring."""
+"""What every fitted feature tells: its covariance, residuals and form; frames, rotations, and the form of a ball.
+
+What the form error of a ball does to its fitted centre: a systematic line of the budget.
+
+A ball that is slightly oblate or prolate does not show its centre to a sensor that sees only one side of it (Harris
+2004 appendix A), and more points do not help. The deviation of the surface is radial, so to first order the centre
+and the radius move by its least-squares projection on n·δc + δr.
+"""
 
 from __future__ import annotations
 
@@ -187,3 +194,97 @@ def point_uncertainty(residuals: Floats, degrees_of_freedom: int, u_point: float
             fix="Measure more points, or give the standard uncertainty of a point (u_point)",
         )
     return float(np.sqrt(np.sum(residuals**2) / degrees_of_freedom))
+
+
+def frame_about(axis: Floats) -> Floats:
+    """(3, 3) right-handed orthonormal rows u, v, w with w along ``axis`` (3,)."""
+    w = axis / np.linalg.norm(axis)
+    u = np.zeros(3)
+    u[np.argmin(np.abs(w))] = 1.0
+    u -= (u @ w) * w
+    u /= np.linalg.norm(u)
+    return np.array([u, np.cross(w, u), w])
+
+
+def tilted(frame: Floats, a: float, b: float) -> Floats:
+    """The frame after its axis w has become the direction w + a·u + b·v."""
+    w = frame[2] + a * frame[0] + b * frame[1]
+    w /= np.linalg.norm(w)
+    u = frame[0] - (frame[0] @ w) * w
+    u /= np.linalg.norm(u)
+    return np.array([u, np.cross(w, u), w])
+
+
+def upward(direction: Floats) -> Floats:
+    """The direction or its opposite, whichever has its largest component positive: for axes without a sense."""
+    return np.asarray(direction * np.sign(direction[np.argmax(np.abs(direction))]))
+
+
+def nearest_rotations(moments: Floats) -> Floats:
+    """Rotations (q, 3, 3) R with the largest tr(Rᵀ·moment), proper ones.
+
+    Parameters
+    ----------
+    moments : (q, 3, 3) sums of found · ownᵀ, both about their means. Where these lie on a line, the turn about it is any.
+    """
+    U, _, Vt = np.linalg.svd(moments)
+    U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
+    return np.asarray(U @ Vt, dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class BallForm:
+    """A ball whose largest and smallest diameters differ, as an ellipsoid of revolution does.
+
+    Parameters
+    ----------
+    sphericity : largest less smallest diameter, mm (200 µin, that is 5.08e-3 mm, for a ball of grade 200).
+    """
+
+    sphericity: float
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.sphericity) and self.sphericity >= 0):
+            raise CmmUqError(
+                f"a sphericity of {self.sphericity} mm", fix="Give the difference of two diameters, mm, ≥ 0"
+            )
+
+    def shift(self, directions: Floats, axis: Floats) -> Floats:
+        """(4,) shift of the fitted x, y, z and r, mm, for a ball prolate by the sphericity along ``axis`` (3,).
+
+        The oblate ball gives the opposite.
+
+        Parameters
+        ----------
+        directions : (n, 3) unit vectors from the centre to the points measured.
+        """
+        k = axis / np.linalg.norm(axis)
+        return np.asarray(_projection(directions) @ (0.5 * self.sphericity * (directions @ k) ** 2))
+
+    def covariance(self, directions: Floats) -> Floats:
+        """(4, 4) covariance of the fitted x, y, z and r, mm², when the ball's axis may point anywhere.
+
+        Over all axes k the deviations s/2·((n·k)² − 1/3) at two points are correlated as (s/2)²·(4/45)·P₂(n₁·n₂), P₂
+        the Legendre polynomial. What the same form does to the mean radius is left to the calibration of the
+        diameter.
+        """
+        # P₂(n·m) = 3/2 (n·m)² − 1/2, and (n·m)² is a product of the second-order components of n and m
+        x, y, z = directions.T
+        root2 = np.sqrt(2.0)
+        components = np.array([x * x, y * y, z * z, root2 * x * y, root2 * x * z, root2 * y * z])
+        P = _projection(directions)
+        seconds, mean = P @ components.T, P @ np.ones(len(directions))
+        spread = 1.5 * seconds @ seconds.T - 0.5 * np.outer(mean, mean)
+        return np.asarray((0.5 * self.sphericity) ** 2 * 4 / 45 * spread)
+
+
+def _projection(directions: Floats) -> Floats:
+    """(4, n) of the least-squares fit of n·δc + δr to radial deviations.
+
+    Raises
+    ------
+    CmmUqError : the directions do not determine centre and radius.
+    """
+    if len(directions) < 4 or np.linalg.matrix_rank(np.column_stack([directions, np.ones(len(directions))])) < 4:
+        raise CmmUqError("the directions do not determine a sphere", fix="Give at least four, not all in one plane")
+    return np.asarray(np.linalg.pinv(np.column_stack([directions, np.ones(len(directions))])))

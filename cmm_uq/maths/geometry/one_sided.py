@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.exchange import MOST_EXCHANGES, ROUNDING
-from cmm_uq.maths.geometry.shapes import Shape
+from cmm_uq.maths.geometry.minimax import Shape
 
 SETTLED, ENOUGH = 1e-10, 1e-7
 """mm: what may be left to be gained in a step; and after the most of them, where they wind along a curved valley."""

@@ -10,15 +10,11 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.circle import fit_circle
-from cmm_uq.maths.geometry.cone import fit_cone
-from cmm_uq.maths.geometry.cylinder import fit_cylinder
-from cmm_uq.maths.geometry.feature import centred
-from cmm_uq.maths.geometry.frame import frame_about
-from cmm_uq.maths.geometry.line import fit_line
-from cmm_uq.maths.geometry.plane import fit_plane
-from cmm_uq.maths.geometry.shapes import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, Shape
-from cmm_uq.maths.geometry.sphere import fit_sphere
+from cmm_uq.maths.geometry.axial import fit_cone, fit_cylinder
+from cmm_uq.maths.geometry.feature import centred, frame_about
+from cmm_uq.maths.geometry.minimax import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, Shape
+from cmm_uq.maths.geometry.round import fit_circle, fit_sphere
+from cmm_uq.maths.geometry.straight import fit_line, fit_plane
 
 FeatureKind = Literal["line", "plane", "circle", "sphere", "cylinder", "cone"]
 KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)

@@ -20,9 +20,9 @@ from cmm_uq.maths.geometry.exchange import SCREENED, least_zones
 from cmm_uq.maths.geometry.extremes import circumscribed as alone_circumscribed
 from cmm_uq.maths.geometry.extremes import inscribed as alone_inscribed
 from cmm_uq.maths.geometry.extremes import least_zone
+from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, SPHERE
 from cmm_uq.maths.geometry.one_sided import held
 from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
-from cmm_uq.maths.geometry.shapes import CIRCLE, CYLINDER, LINE, SPHERE
 
 SETTLED = 1e-9
 """Steps, mm, below which a draw is at its minimum: what is left is smaller by the ratio of error to feature."""

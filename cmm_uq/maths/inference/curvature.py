@@ -1,4 +1,6 @@
-"""Draws of a posterior where the model bends within its width: from those of the linear model about the estimate.
+"""Posteriors where the model bends within its width, or where a nonlinear parameter shapes its columns.
+
+Draws of a posterior where the model bends within its width: from those of the linear model about the estimate.
 
     observed = explained(parameters) + noise,   explained = linear part + r,   r ≈ ½ H(δ, δ)
 
@@ -8,19 +10,28 @@ posterior standard deviations. Where it moves no parameter by more than :data:`N
 explains as much, δ + K·r(δ) = φ with K the linear gain, and the bent draws are proposals of a Metropolis–Hastings chain
 (Tierney 1994, Annals of Statistics 22(4), independence chains) whose stationary distribution is the posterior of the
 second-order model.
+
+The posterior of a linear model some of whose columns are shaped by a nonlinear parameter, such as a period.
+
+The parameters that enter linearly are integrated exactly, and drawn exactly in the end. What emcee samples is the noise and
+the shapes. A shape may have several modes: it is sampled through its own marginal distribution, which a fine grid gives, so
+that the walkers step from mode to mode as easily as within one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
+from scipy import linalg, special
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.inference.ensembles import ENSEMBLES
+from cmm_uq.maths.inference.ensembles import ENSEMBLES, Progress, run_ensembles
 from cmm_uq.maths.inference.linear_model import LinearModel
-from cmm_uq.maths.inference.posterior import NoisyPosterior
+from cmm_uq.maths.inference.posterior import SIGMA_BOUNDS, NoisyPosterior, Posterior
+from cmm_uq.maths.inference.proposals import Proposal
 
 NEGLIGIBLE = 0.02
 """Of a standard uncertainty."""
@@ -173,3 +184,189 @@ def _metropolis(log_weight: Floats, steps: int, seed: int) -> Ints:
         )
         held[:, step] = np.where(chance[:, step] < better, now, before)
     return np.asarray(held.ravel(), dtype=np.int64)
+
+
+_ANYWHERE = 0.02
+"""Part of a shape's proposal that is spread over the whole grid."""
+
+_NEGLIGIBLE = 1e-9
+_BATCH = 512
+_COLUMNS = 256
+"""Columns that are reduced at once: few enough for a processor's cache."""
+
+_MANY = 4
+"""Columns, over rows, from which on they are made a triangle before their span is sought."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped:
+    """Columns that a nonlinear parameter shapes.
+
+    Parameters
+    ----------
+    where : (r,) their place in the design.
+    nodes : (N,) values of the parameter, sorted; uniform probability over them in their logarithm.
+    table : (N, m, r) the columns at the nodes, mm.
+    """
+
+    where: Sequence[int]
+    nodes: Floats
+    table: Floats
+
+
+def sample_shaped(
+    model: LinearModel, shaped: Sequence[Shaped], seed: int, progress: Progress | None = None
+) -> Posterior:
+    """Sample the posterior; its ``shapes`` (N, q) belong to ``shaped`` in order.
+
+    Parameters
+    ----------
+    model : linear, at any value of the shapes.
+    shaped : what shapes its columns.
+    seed : the same seed gives the same draws.
+    progress : told the part done, from 0 to 1.
+    """
+    density = _Density(model, shaped)
+    centre, factor = density.start
+    chains = run_ensembles(density, Proposal.single(centre, factor), seed, progress)
+    shapes, sigma = density.unpacked(chains.draws)
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(5,)))
+    parts = [slice(i, i + _BATCH) for i in range(0, len(sigma), _BATCH)]
+    draws = np.vstack([density.draw(shapes[part], sigma[part], random) for part in parts])
+    return Posterior(
+        model.unknowns, draws, sigma, seed, chains.sampler, chains.ess_min, chains.rhat_max, chains.steps,
+        chains.autocorrelation_time, shapes,
+    )  # fmt: skip
+
+
+def _reduced(model: LinearModel, columns: Floats) -> Floats:
+    """Columns (m, r) as :meth:`LinearModel.reduce` gives them, which is each by itself."""
+    parts = np.array_split(columns, columns.shape[1] // _COLUMNS + 1, axis=1)
+    return np.hstack([model.reduce(part) for part in parts])
+
+
+class _Density:
+    """Log density of (u₁ … u_q, ln σ): each u is normal where its shape follows the marginal of the grid."""
+
+    def __init__(self, model: LinearModel, shaped: Sequence[Shaped]) -> None:
+        self.model = model
+        self.shaped = shaped
+        reduced = model.reduced
+        # deviations from the prior means: lengths of half a metre would leave no digits for nanometres
+        observed = reduced.observed - reduced.design @ model.prior_mean
+        flat = [_reduced(model, np.hstack(list(some.table))) for some in shaped]
+        # the walkers need no more rows than the columns have dimensions
+        every = np.hstack([reduced.design, *flat])
+        every = every / np.maximum(np.linalg.norm(every, axis=0), 1e-300)
+        if every.shape[1] > _MANY * len(every):  # of the same singular values, and vectors on the left
+            every = linalg.qr(every.T, mode="r", overwrite_a=True)[0][: len(every)].T
+        U, s, _ = linalg.svd(every, full_matrices=False)
+        Q = U[:, s > _NEGLIGIBLE * s[0]]
+        self.design, self.observed, self.count = Q.T @ reduced.design, Q.T @ observed, reduced.count
+        self.squares = float(observed @ observed)
+        self.tables = [
+            (Q.T @ columns).reshape(Q.shape[1], len(some.nodes), -1).transpose(1, 0, 2)
+            for some, columns in zip(shaped, flat, strict=True)
+        ]
+
+    @cached_property
+    def _weight(self) -> Floats:
+        scale = np.array([u.scale for u in self.model.unknowns])
+        return np.asarray(1 / np.maximum(self.model.prior_sd, 1e-6 * scale) ** 2, dtype=np.float64)
+
+    def designs(self, shapes: Floats) -> Floats:
+        """Reduced designs (w, m', k) for shapes (w, q), linear between the nodes."""
+        design = np.repeat(self.design[None], len(shapes), axis=0)
+        for j, (some, table) in enumerate(zip(self.shaped, self.tables, strict=True)):
+            at = np.clip(np.searchsorted(some.nodes, shapes[:, j]), 1, len(some.nodes) - 1)
+            low, high = some.nodes[at - 1], some.nodes[at]
+            part = ((shapes[:, j] - low) / (high - low))[:, None, None]
+            design[:, :, list(some.where)] = (1 - part) * table[at - 1] + part * table[at]
+        return design
+
+    def _gaussian(self, shapes: Floats, sigma: Floats) -> tuple[Floats, Floats, Floats]:
+        """Means (w, k) less the prior ones, lower factors of the precisions, and ln p(observations | shapes, σ)."""
+        design = self.designs(shapes)
+        right = (design.transpose(0, 2, 1) @ self.observed) / sigma[:, None] ** 2
+        precision = design.transpose(0, 2, 1) @ design / sigma[:, None, None] ** 2 + np.diag(self._weight)
+        scale = 1 / np.sqrt(np.einsum("wii->wi", precision))
+        factor = np.linalg.cholesky(precision * scale[:, :, None] * scale[:, None, :])
+        half = np.linalg.solve(factor, (right * scale)[:, :, None])[:, :, 0]
+        mean = scale * np.linalg.solve(factor.transpose(0, 2, 1), half[:, :, None])[:, :, 0]
+        squares = self.squares / sigma**2 - np.sum(half**2, axis=1)
+        log = -0.5 * squares - self.count * np.log(sigma)
+        log += np.log(scale).sum(axis=1) - np.log(np.einsum("wii->wi", factor)).sum(axis=1)
+        return mean, factor / scale[:, :, None], log
+
+    def log_marginal(self, shapes: Floats, sigma: Floats) -> Floats:
+        """Log density (w,) of the observations for shapes (w, q) and noise (w,), up to a constant."""
+        parts = [slice(i, i + _BATCH) for i in range(0, len(sigma), _BATCH)]
+        return np.concatenate([self._gaussian(shapes[part], sigma[part])[2] for part in parts])
+
+    def draw(self, shapes: Floats, sigma: Floats, random: np.random.Generator) -> Floats:
+        """One exact draw (w, k) of the linear parameters for each."""
+        mean, factor, _ = self._gaussian(shapes, sigma)
+        z = random.standard_normal(mean.shape)
+        return self.model.prior_mean + mean + np.linalg.solve(factor.transpose(0, 2, 1), z[:, :, None])[:, :, 0]
+
+    @cached_property
+    def _best(self) -> tuple[Floats, float]:
+        """Shapes (q,) and σ near the mode: one shape after the other over its grid, twice."""
+        typical = float(np.sqrt(self.squares / self.count))
+        shapes = np.array([some.nodes[len(some.nodes) // 2] for some in self.shaped])
+        sigma = self.model.sigma or 0.0
+        for _ in range(2):
+            for j, some in enumerate(self.shaped):
+                trial = np.repeat(shapes[None], len(some.nodes), axis=0)
+                trial[:, j] = some.nodes
+                size = sigma or typical
+                shapes[j] = some.nodes[int(np.argmax(self.log_marginal(trial, np.full(len(trial), size))))]
+            if self.model.sigma is None:
+                grid = np.geomspace(1e-3, 2, 120) * typical
+                log = self.log_marginal(np.repeat(shapes[None], len(grid), axis=0), grid)
+                sigma = float(grid[int(np.argmax(log))])
+        return shapes, sigma
+
+    @cached_property
+    def _quantiles(self) -> list[tuple[Floats, Floats, Floats]]:
+        """For each shape: logarithms of the nodes, distribution function there, density between them."""
+        best, sigma = self._best
+        found = []
+        for j, some in enumerate(self.shaped):
+            trial = np.repeat(best[None], len(some.nodes), axis=0)
+            trial[:, j] = some.nodes
+            log = self.log_marginal(trial, np.full(len(trial), sigma))
+            t, p = np.log(some.nodes), np.exp(log - log.max())
+            width = np.diff(t)
+            mass = 0.5 * (p[1:] + p[:-1]) * width
+            mass = (1 - _ANYWHERE) * mass / mass.sum() + _ANYWHERE * width / width.sum()
+            found.append((t, np.concatenate([[0.0], np.cumsum(mass)]), mass / width))
+        return found
+
+    def unpacked(self, theta: Floats) -> tuple[Floats, Floats]:
+        """Shapes (w, q) and σ (w,)."""
+        shapes = np.empty((len(theta), len(self.shaped)))
+        for j, (t, distribution, _) in enumerate(self._quantiles):
+            shapes[:, j] = np.exp(np.interp(special.ndtr(theta[:, j]), distribution, t))
+        sigma = np.full(len(theta), self.model.sigma) if self.model.sigma is not None else np.exp(theta[:, -1])
+        return shapes, sigma
+
+    def __call__(self, theta: Floats) -> Floats:
+        """Log density (w,), up to a constant."""
+        shapes, sigma = self.unpacked(theta)
+        inside = (sigma > SIGMA_BOUNDS[0]) & (sigma < SIGMA_BOUNDS[1])
+        value = self.log_marginal(shapes, np.where(inside, sigma, 1.0))
+        for j, (t, _, density) in enumerate(self._quantiles):
+            at = np.clip(np.searchsorted(t, np.log(shapes[:, j])), 1, len(density)) - 1
+            value -= np.log(density[at]) + 0.5 * theta[:, j] ** 2
+        return np.where(inside, value, -np.inf)
+
+    @property
+    def start(self) -> tuple[Floats, Floats]:
+        """Centre and factor for the ensembles."""
+        q = len(self.shaped)
+        if self.model.sigma is not None:
+            return np.zeros(q), np.eye(q)
+        _, sigma = self._best
+        dof = max(self.count - len(self.model.unknowns), 1)
+        return np.append(np.zeros(q), np.log(sigma)), np.diag(np.append(np.ones(q), 1 / np.sqrt(2 * dof)))

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.inference.freedoms import Freedoms
-from cmm_uq.maths.inference.linear_model import LinearModel
+from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel
 from cmm_uq.maths.inference.posterior import Density
 from cmm_uq.maths.uncertainty.quantity import Quantity
 

@@ -1,4 +1,6 @@
-"""The draws of a posterior by name and by chain, as other programs read them.
+"""The draws of a posterior by name and by chain, and what noise leaves uncertain of a weighted sum.
+
+The draws of a posterior by name and by chain, as other programs read them.
 
 A chain is the path of one walker of one ensemble, as the sampler ran it. Draws of several walkers strung together would look
 independent to a program that estimates autocorrelation along a chain, and be counted several times over. Where only some draws
@@ -15,11 +17,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import special
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.inference.effective import bulk_ess
-from cmm_uq.maths.inference.ensembles import ENSEMBLES, normal_scores, rhat, split
+from cmm_uq.maths.inference.ensembles import ENSEMBLES, bulk_ess, normal_scores, rhat, split
+from cmm_uq.maths.inference.noise import Components, Sizes
+from cmm_uq.maths.inference.slow import root
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -191,3 +195,31 @@ def by_ensemble(values: Floats, steps: int, count: int) -> Floats:
 def _texts(words: Any) -> Any:
     listed = list(words)
     return np.array(listed, dtype=f"<U{max([1, *map(len, listed)])}")
+
+
+_COVERAGE = 0.975
+
+
+def uncertainty_of_sum(
+    components: Components, sizes: Sizes, weights: Floats, beside: float = 0.0
+) -> tuple[float, float]:
+    """Standard uncertainty, and half the 95 % interval, of a sum of observations.
+
+    Given the sizes the sum is normal; over their draws it is a mixture of normal distributions about one value.
+
+    Parameters
+    ----------
+    components : of the noise of the observations.
+    sizes : in each of w draws.
+    weights : (m,) of the observations.
+    beside : standard uncertainty of a normal contribution that is no noise, in the unit of the sum.
+    """
+    variances, _ = components.variances(sizes)
+    squares = components.shares.T @ np.asarray(components.turn @ weights) ** 2
+    variance = variances @ squares + components.slow_along(weights, sizes) + beside**2
+    u, sd = float(np.sqrt(variance.mean())), np.sqrt(variance)
+    if not u:
+        return 0.0, 0.0
+    sd = np.maximum(sd, 1e-12 * u)
+    half = root(lambda t: float(special.ndtr(t * u / sd).mean()) - _COVERAGE, 0.0, float(sd.max() / u) * 2.0, 1e-9)
+    return u, half * u

@@ -1,21 +1,145 @@
 """Several ensembles of emcee on one density, until the autocorrelation time says enough.
 
+The step of several ensembles side by side in one sampler of emcee, each with random numbers of its own, as if alone.
+
+Most steps are independence proposals from an approximation of the density; differential-evolution steps repair what the
+approximation misses. (emcee's snooker move is not used: its normalisation is wrong in release 3.1.6.) Independence proposals
+do not depend on where the walkers are, so those of all ensembles are drawn ahead, up to each one's next differential-evolution
+step, and the density is asked for all of them at once, which costs little more than for those of one step.
+
+Several ensembles of emcee on one density, until the autocorrelation time says enough.
+
 The walkers move in coordinates whitened by an approximation of the density (``side_by_side``). Walkers
 of one ensemble are not independent, so the ensembles are compared with each other.
+
+How many independent draws chains are worth.
+
+The bulk effective sample size of Vehtari, Gelman, Simpson, Carpenter and Bürkner (2021), "Rank-normalization, folding, and
+localization: an improved R-hat", Bayesian Analysis 16(2), sections 3.2 and 4.3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.inference.proposals import LogDensity, Proposes
-from cmm_uq.maths.inference.side_by_side import SideBySide
+from cmm_uq.maths.inference.proposals import LogDensity, Numbers, Proposes
+
+SHARES = (0.9, 0.1)
+"""How often the step is an independence proposal, and one of differential evolution."""
+
+_AHEAD = 40
+"""Most steps that are drawn ahead."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Independent:
+    """Independence proposals (w, d), logarithms of what they come from and of the density, and what decides on them, (w,)."""
+
+    proposed: Floats
+    log_proposal: Floats
+    log_density: Floats
+    uniform: Floats
+    log_before: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def rand(self, _: int) -> Floats:
+        """What emcee takes from a source of random numbers."""
+        return self.uniform
+
+    @classmethod
+    def together(cls, steps: Sequence[_Independent], log_before: Floats) -> _Independent:
+        """Those of several ensembles as those of one.
+
+        Parameters
+        ----------
+        log_before : (w,) of what is proposed, where the walkers are.
+        """
+        each = ((step.proposed, step.log_proposal, step.log_density, step.uniform) for step in steps)
+        proposed, log_proposal, log_density, uniform = (np.concatenate(of) for of in zip(*each, strict=True))
+        return cls(proposed, log_proposal, log_density, uniform, log_before)
+
+
+class SideBySide:
+    """A move of emcee's.
+
+    Parameters
+    ----------
+    proposal : roughly the density.
+    randoms : random numbers of each ensemble, of which the walkers follow one another.
+    """
+
+    def __init__(self, proposal: Proposes, randoms: Sequence[Any]) -> None:
+        from emcee.moves import DEMove, MHMove
+
+        self._proposal, self._randoms = proposal, randoms
+        self._independence, self._differences = MHMove(self._proposed), DEMove()
+        self._ahead: tuple[deque[_Independent | None], ...] = tuple(deque() for _ in randoms)
+        self._at, self._log_proposal = np.zeros((0, 0)), np.zeros(0)
+
+    def propose(self, model: Any, state: Any) -> tuple[Any, NDArray[np.bool_]]:
+        """One step of every ensemble: where the walkers are then, and which of them moved."""
+        accepted = np.zeros(len(state.coords), dtype=bool)
+        of_ensemble = np.arange(len(accepted)).reshape(len(self._randoms), -1)
+        self._draw_ahead(model, of_ensemble.shape[1])
+        if not np.array_equal(self._at, state.coords):
+            self._log_proposal = self._proposal.log_density(state.coords)
+        chosen = [steps.popleft() for steps in self._ahead]
+        for i, step in enumerate(chosen):
+            if step is None:
+                rows = of_ensemble[i]
+                self._move(self._differences, model._replace(random=self._randoms[i]), state, rows, accepted)
+                moved = rows[accepted[rows]]
+                if len(moved):
+                    self._log_proposal[moved] = self._proposal.log_density(state.coords[moved])
+        if independent := [step for step in chosen if step is not None]:
+            rows = of_ensemble[[step is not None for step in chosen]].ravel()
+            several = _Independent.together(independent, self._log_proposal[rows])
+            known = model._replace(random=several, compute_log_prob_fn=lambda _: (several.log_density, None))
+            self._move(self._independence, known, state, rows, accepted)
+            self._log_proposal[rows] = np.where(accepted[rows], several.log_proposal, several.log_before)
+        self._at = state.coords.copy()
+        return state, accepted
+
+    def _move(self, move: Any, model: Any, state: Any, rows: NDArray[np.int64], accepted: NDArray[np.bool_]) -> None:
+        """A move of emcee's for some of the walkers, in their place."""
+        part = type(state)(state.coords[rows], log_prob=state.log_prob[rows])
+        part, accepted[rows] = move.propose(model, part)
+        state.coords[rows], state.log_prob[rows] = part.coords, part.log_prob
+
+    def tune(self, state: Any, accepted: NDArray[np.bool_]) -> None:
+        """Nothing: the step stays as it is."""
+
+    def _draw_ahead(self, model: Any, walkers: int) -> None:
+        """Next steps of each ensemble that has none: independent ones, and ``None`` for one of differential evolution."""
+        drawn: list[tuple[deque[_Independent | None], Numbers, Floats]] = []
+        differences = []
+        for steps, random in zip(self._ahead, self._randoms, strict=True):
+            for _ in range(0 if steps else _AHEAD):
+                if random.random_sample() >= SHARES[0]:  # its random numbers are the next
+                    differences.append(steps)
+                    break
+                drawn.append((steps, self._proposal.numbers_of(walkers, random), random.rand(walkers)))
+        if drawn:
+            each = zip(*(numbers for _, numbers, _ in drawn), strict=True)
+            z = self._proposal.made(tuple(np.concatenate(column) for column in each))
+            log_proposal, log_density = self._proposal.log_density(z), model.compute_log_prob_fn(z)[0]
+            for i, (steps, _, uniform) in enumerate(drawn):
+                own = slice(i * walkers, (i + 1) * walkers)
+                steps.append(_Independent(z[own], log_proposal[own], log_density[own], uniform))
+        for steps in differences:
+            steps.append(None)
+
+    def _proposed(self, _: Floats, drawn: _Independent) -> tuple[Floats, Floats]:
+        """Proposals that do not depend on where the walkers are, with their Hastings ratio."""
+        return drawn.proposed, drawn.log_before - drawn.log_proposal
+
 
 ENSEMBLES = 4
 STEPS_AT_ONCE = 300
@@ -200,3 +324,43 @@ def _split_rhat(values: Floats) -> Floats:
         divide="ignore", invalid="ignore"
     ):  # chains that never moved: infinite or not a number, not converged
         return np.asarray(np.sqrt((n - 1) / n + between / within), dtype=np.float64)
+
+
+def bulk_ess(chains: Floats, scores: Floats | None = None) -> float:
+    """Smallest bulk effective sample size of the parameters.
+
+    Parameters
+    ----------
+    chains : (c, n, d) draws, n at least 8.
+    scores : of the chains' halves, where they are known already.
+    """
+    scores = normal_scores(split(chains)) if scores is None else scores
+    return min(_effective(scores[:, :, i]) for i in range(scores.shape[2]))
+
+
+def _effective(values: Floats) -> float:
+    """Of one quantity, (c, n): the draws over their integrated autocorrelation time (equations 10 and 11)."""
+    c, n = values.shape
+    if np.ptp(values) == 0:
+        return float(c * n)  # what does not vary is known from any draw
+    correlation = _autocorrelation(values)
+    pairs = correlation[: (n - 1) // 2 * 2].reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(pairs <= 0)  # Geyer's initial positive sequence: its sums of pairs are all positive
+    last = int(ends[0]) if len(ends) else len(pairs) - 1
+    monotone = np.minimum.accumulate(pairs[:last]) if last else pairs[:0]  # and, as they must be, never growing
+    time = -1.0 + 2.0 * float(monotone.sum()) + max(float(correlation[2 * last]), 0.0)
+    draws = c * n
+    return float(draws / max(time, 1.0 / np.log10(draws)))
+
+
+def _autocorrelation(values: Floats) -> Floats:
+    """(n,) at every lag, of (c, n), from the variances within the chains and between them (equation 10)."""
+    n = values.shape[1]
+    about = values - values.mean(axis=1, keepdims=True)
+    spectrum = np.fft.rfft(about, n=2 * n, axis=1)
+    covariance = np.fft.irfft(np.abs(spectrum) ** 2, n=2 * n, axis=1)[:, :n].mean(axis=0) / n
+    within = covariance[0] * n / (n - 1)
+    whole = covariance[0] + values.mean(axis=1).var(ddof=1)
+    found = 1.0 - (within - covariance) / whole
+    found[0] = 1.0
+    return np.asarray(found, dtype=np.float64)

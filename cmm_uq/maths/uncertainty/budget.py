@@ -17,8 +17,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, foreign, say, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit_as_written
-from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
-from cmm_uq.maths.uncertainty.rounding import figure, rounded, significant
+from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
+from cmm_uq.maths.uncertainty.type_a import coverage_factor
 
 if TYPE_CHECKING:
     import pandas as pd

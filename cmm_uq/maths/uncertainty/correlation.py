@@ -1,13 +1,23 @@
-"""Correlation between inputs: the matrix, what makes it possible, and which inputs it ties together."""
+"""Correlation between inputs, and draws from their joint distribution.
+
+Draws from the joint distribution of all inputs.
+
+Inputs that nothing ties are drawn one by one. Tied ones are drawn jointly: normal ones as a multivariate normal (JCGM
+101:2008 6.4.8), the means of simultaneous readings as a multivariate t (JCGM 102:2011 5.3.2), the columns of an earlier
+sample row by row. Other distributions have no standard joint form: a Gaussian copula gives each its own distribution
+and the pair the stated correlation coefficient (Cario and Nelson 1997, "NORmal To Anything").
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import Floats
+from cmm_uq.maths.uncertainty.distributions import Distribution
 
 Correlations = Mapping[tuple[str, str], float]
 
@@ -76,3 +86,155 @@ def correlation_of(covariance: Floats) -> Floats:
     u = np.sqrt(np.diagonal(covariance))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(covariance / np.outer(u, u))
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance of several estimates.
+
+    Parameters
+    ----------
+    parameters : k names.
+    units : of each, as printed.
+    matrix : (k, k); an element is in the product of the units of its row and column.
+    """
+
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    matrix: Floats
+
+    @classmethod
+    def of_draws(cls, draws: Mapping[str, tuple[Floats, str]]) -> Covariance:
+        """From joint draws (N,) of each parameter and its unit, by name."""
+        columns = np.array([values for values, _ in draws.values()])
+        matrix = np.atleast_2d(np.cov(columns)) if len(columns) else np.zeros((0, 0))
+        return cls(tuple(draws), tuple(unit for _, unit in draws.values()), np.asarray(matrix, dtype=np.float64))
+
+
+Draw = Callable[[np.random.Generator, int], list[Floats]]
+
+_HERMITE_NODES = 80
+_SEARCH_STEPS = 60
+_SERIES_REMAINDER = 2e-3
+
+
+def joint_draws(inputs: Mapping[str, Distribution], matrix: Floats) -> Draw:
+    """Function that draws all inputs together: ``draw(rng, n)`` gives one array (n,) an input.
+
+    Raises
+    ------
+    CmmUqError : a correlation that the two distributions cannot have, or inputs tied in a way that has no joint form.
+    """
+    names, given = list(inputs), list(inputs.values())
+    groups = [(group, _group_draw([names[i] for i in group], [given[i] for i in group], matrix[np.ix_(group, group)]))
+              for group in _groups(given, matrix)]  # fmt: skip
+
+    def draw(rng: np.random.Generator, n: int) -> list[Floats]:
+        drawn: list[Floats] = [np.empty(0)] * len(given)
+        for group, draw_group in groups:
+            for i, values in zip(group, draw_group(rng, n), strict=True):
+                drawn[i] = values
+        return drawn
+
+    return draw
+
+
+def _groups(inputs: Sequence[Distribution], matrix: Floats) -> list[list[int]]:
+    linked = matrix != 0
+    for i, a in enumerate(inputs):
+        for j, b in enumerate(inputs):
+            linked[i, j] |= bool(a.together) and a.together == b.together
+    return tied(linked.astype(float))
+
+
+def _group_draw(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats) -> Draw:
+    if len(inputs) == 1:
+        return lambda rng, n: [inputs[0].sample(rng, n)]
+    for name, given in zip(names, inputs, strict=True):
+        if given.kind == "constant":
+            raise CmmUqError(f"{name} is a constant and is correlated with nothing", where="correlation")
+    if all(given.together and given.together == inputs[0].together for given in inputs):
+        return _rows(inputs)
+    if all(given.kind in ("normal", "t") for given in inputs) and len({float(given.dof) for given in inputs}) == 1:
+        return _elliptical(inputs, matrix)
+    return _copula(names, inputs, matrix)
+
+
+def _rows(inputs: Sequence[Distribution]) -> Draw:
+    columns = np.stack([given.draws for given in inputs if given.draws is not None])
+
+    def draw(rng: np.random.Generator, n: int) -> list[Floats]:
+        return list(columns[:, rng.integers(columns.shape[1], size=n)])
+
+    return draw
+
+
+def _elliptical(inputs: Sequence[Distribution], matrix: Floats) -> Draw:
+    root, dof = square_root(matrix), float(inputs[0].dof)
+
+    def draw(rng: np.random.Generator, n: int) -> list[Floats]:
+        standard = root @ rng.standard_normal((len(inputs), n))
+        if np.isfinite(dof):
+            standard /= np.sqrt(rng.chisquare(dof, n) / dof)
+        return [given.location + given.scale * z for given, z in zip(inputs, standard, strict=True)]
+
+    return draw
+
+
+def _copula(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats) -> Draw:
+    from scipy import special
+
+    underlying = np.eye(len(inputs))
+    for i in range(len(inputs)):
+        for j in range(i):
+            r = _underlying_correlation((names[j], inputs[j]), (names[i], inputs[i]), matrix[i, j])
+            underlying[i, j] = underlying[j, i] = r
+    if np.linalg.eigvalsh(underlying)[0] < -1e-9:
+        raise CmmUqError(
+            f"the correlations of {', '.join(names)} cannot be had together with their distributions",
+            where="correlation",
+            fix="Describe them by a joint sample, or by quantities that are independent",
+        )
+    root = square_root(underlying)
+
+    def draw(rng: np.random.Generator, n: int) -> list[Floats]:
+        probabilities = special.ndtr(root @ rng.standard_normal((len(inputs), n)))
+        inside = np.clip(probabilities, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+        return [given.quantile(p) for given, p in zip(inputs, inside, strict=True)]
+
+    return draw
+
+
+def _underlying_correlation(a: tuple[str, Distribution], b: tuple[str, Distribution], wanted: float) -> float:
+    """Correlation of two normal variables that gives the two transformed ones the wanted correlation."""
+    from scipy import special
+
+    if wanted == 0:
+        return 0.0
+    nodes, weights = special.roots_hermitenorm(_HERMITE_NODES)
+    weights = weights / np.sqrt(2 * np.pi)
+    inside = np.clip(special.ndtr(nodes), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    orders = np.arange(1, _HERMITE_NODES // 2)
+    basis = special.eval_hermitenorm(orders[:, None], nodes) / np.sqrt(special.factorial(orders))[:, None]
+    # by Mehler's formula the covariance of the two is a power series in the correlation of the normal variables
+    terms = np.prod([basis @ (weights * given.quantile(inside)) for _, given in (a, b)], axis=0)
+    spread = float(a[1].standard_deviation) * float(b[1].standard_deviation)
+    if not np.isfinite(spread):
+        raise CmmUqError(
+            f"{a[0]} or {b[0]} has no standard deviation (ν ≤ 2), hence no correlation", where="correlation"
+        )
+
+    def reached(r: float) -> float:
+        return float(np.sum(terms * r**orders) / spread)
+
+    low, high = -1.0, 1.0
+    if not reached(low) - _SERIES_REMAINDER <= wanted <= reached(high) + _SERIES_REMAINDER:
+        raise CmmUqError(
+            f"{a[1].kind} and {b[1].kind} distributions can have correlations from {reached(low):.3f} to "
+            f"{reached(high):.3f} only, not {wanted}",
+            where=f"correlation {a[0]},{b[0]}",
+        )
+    for _ in range(_SEARCH_STEPS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if reached(middle) < wanted else (low, middle)
+    return (low + high) / 2

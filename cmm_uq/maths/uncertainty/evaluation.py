@@ -18,15 +18,23 @@ from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.maths.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
-from cmm_uq.maths.uncertainty.choice import Method, Ways, beside, by_propagation, choose, must_be_possible, stability
+from cmm_uq.maths.uncertainty.choice import (
+    Method,
+    Ways,
+    beside,
+    by_propagation,
+    choose,
+    must_be_possible,
+    simulate_to_validate,
+    stability,
+)
 from cmm_uq.maths.uncertainty.correlation import correlation_of
-from cmm_uq.maths.uncertainty.degrees_of_freedom import check_coverage, coverage_factor
 from cmm_uq.maths.uncertainty.distributions import constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, simulate, simulate_adaptively
 from cmm_uq.maths.uncertainty.propagation import Propagated
-from cmm_uq.maths.uncertainty.rounding import rounded
-from cmm_uq.maths.uncertainty.validation import simulate_to_validate
+from cmm_uq.maths.uncertainty.quantity import rounded
+from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
 
 METHODS = ("first", "second", "monte_carlo", "auto")
 

@@ -1,4 +1,6 @@
-"""Arithmetic expressions as text: parsed, checked, and turned into calls of NumPy's functions; never run as code.
+"""Arithmetic expressions as text: parsed, checked, and turned into calls of NumPy.
+
+Arithmetic expressions as text: parsed, checked, and turned into calls of NumPy's functions; never run as code.
 
 An expression knows numbers, names, ``+ - * / **``, brackets, the functions of :data:`FUNCTIONS` and ``pi``. It is kept as
 a list of steps for a stack, so that neither its depth nor its length can overflow anything, and works on floats, arrays,
@@ -227,3 +229,18 @@ class _Translation:
 
     def _refused(self, problem: str, fix: str | None) -> CmmUqError:
         return CmmUqError(problem, where=self.where, fix=fix)
+
+
+@dataclass(frozen=True)
+class Located:
+    """Adds the place to an error that does not know it."""
+
+    where: str
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
+        if isinstance(error, CmmUqError):
+            where = f"{self.where} {error.where}" if error.where else self.where
+            raise CmmUqError(error.problem, where=where, fix=error.fix) from error

@@ -14,11 +14,10 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.coverage_intervals import Tails, both_intervals
-from cmm_uq.maths.uncertainty.degrees_of_freedom import check_coverage
-from cmm_uq.maths.uncertainty.heavy_tails import draws_in_tail, tail_of
-from cmm_uq.maths.uncertainty.joint_draws import Draw, joint_draws
+from cmm_uq.maths.uncertainty.correlation import Draw, joint_draws
+from cmm_uq.maths.uncertainty.coverage import Tails, both_intervals, draws_in_tail, tail_of
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.type_a import check_coverage
 
 BLOCK = 10_000
 LARGEST = 20_000_000
@@ -62,7 +61,7 @@ class Simulated:
         ``nan`` for fewer than two blocks.
     stable : whether every figure is known to its numerical tolerance, rare draws that did not come included; None when no
         digits were asked for.
-    shape : (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.heavy_tails`).
+    shape : (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
     unseen : (p,) by how much u would be larger with draws that are too rare to have come; infinite where it does not exist.
     edges, density : (p, b + 1) and (p, b) histogram of the output, for pictures.
     """

@@ -17,9 +17,14 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor, effective_dof
-from cmm_uq.maths.uncertainty.derivatives import Derivatives, complex_step, derivatives, hessian_along
-from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.measurement_model import (
+    Derivatives,
+    MeasurementModel,
+    complex_step,
+    derivatives,
+    hessian_along,
+)
+from cmm_uq.maths.uncertainty.type_a import coverage_factor, effective_dof
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from cmm_uq.maths.uncertainty.quantity import MINUS
 from cmm_uq.maths.uncertainty.reference import coordinate_metrology, jcgm_100, jcgm_101, jcgm_102, refractive_index
 from cmm_uq.maths.uncertainty.reference.case import ReferenceCase
-from cmm_uq.maths.uncertainty.rounding import MINUS
 
 REFERENCE_CASES: Sequence[ReferenceCase] = (
     *jcgm_100.CASES,

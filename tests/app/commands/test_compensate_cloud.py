@@ -232,7 +232,7 @@ def test_a_cloud_is_read_line_by_line_wherever_its_blocks_end(tmp_path: Path, mo
     lines = [", ".join(f"{value:.17g}" for value in row) for row in rows]
     lines[5:5] = ["# µµµµµµµµ, ″", "", "  "]
     (tmp_path / "cloud.csv").write_text("\ufeff# a remark\n" + f"{HEAD}\r\n" + "\r\n".join(lines), encoding="utf-8")
-    monkeypatch.setattr("cmm_uq.machine.physics.cloud_csv.CHUNK", 7)
+    monkeypatch.setattr("cmm_uq.machine.physics.point_cloud.CHUNK", 7)
     write_compensated_cloud(job, tmp_path / "cloud.csv", tmp_path / "out")
     np.testing.assert_allclose(read_csv(tmp_path / "out" / "cloud-compensated.csv"), by_hand(rows), rtol=0, atol=6e-8)
     lines[20] = lines[20].replace(",", ";", 1)

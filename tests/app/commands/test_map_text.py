@@ -13,9 +13,7 @@ from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.machine.model.machine_maps import maps_of
-from cmm_uq.machine.physics.error_map import read_error_map
-from cmm_uq.machine.physics.error_map_file import parse_map_file
-from cmm_uq.machine.physics.error_map_text import read_error_map_text
+from cmm_uq.machine.physics.error_map import parse_map_file, read_error_map, read_error_map_text
 from tests.app.cli.process import run
 from tests.app.commands.test_compensate import straight
 from tests.app.commands.test_map_squareness import HARRIS, TABLE_7, at, stated, with_maps

@@ -15,8 +15,7 @@ from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.machine.model.noise import noise_of
-from cmm_uq.maths.inference.posterior import Density
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import Density, sample_with_noise
 from tests.conftest import ROOT
 
 RECORDINGS = 120

@@ -16,8 +16,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.machine.model import MeasurementModel, Noise
-from cmm_uq.machine.physics.alignment import Alignment, mount_offset
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.machine.physics.digitizer import Alignment, mount_offset
+from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.posterior import sample
 from tests.artefacts.constructions import estimated, free, indicated
 from tests.artefacts.digitizer.aligned import OFFSET, RADIUS, SIX, SPHERE, THREE, cap, centres, recording, scans, turned

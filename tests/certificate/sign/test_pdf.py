@@ -203,7 +203,7 @@ def also(writer: object, change: str) -> None:
 def test_a_further_signature_may_change_nothing_else(
     change: str, signed: bytes, curve_held: Held, trust: Trust, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cmm_uq.certificate.sign import tagging
+    from cmm_uq.certificate.sign import pdf_library as tagging
 
     tag = tagging.tag
 

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.certificate.verify.consistent import check_figures, check_verdicts
-from cmm_uq.certificate.verify.decided_again import check_decisions
+from cmm_uq.certificate.verify.decisions import check_decisions
+from cmm_uq.certificate.verify.figures import check_figures, check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import read_html
 from cmm_uq.certificate.verify.stated import as_stated, check_stated

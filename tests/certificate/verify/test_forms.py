@@ -20,7 +20,7 @@ from cmm_uq.certificate.verify.again import Again, beyond_sampling, by_other_ker
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import read_html
 from cmm_uq.certificate.verify.pdf_file import read_pdf
-from cmm_uq.certificate.verify.views_agree import compare_views, without_foot
+from cmm_uq.certificate.verify.views import compare_views, without_foot
 from cmm_uq.jobs.job import Job
 from tests.conftest import ROOT
 

@@ -16,10 +16,9 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import PDF_UNPACKED
 from cmm_uq.certificate.verify import pdf_file
 from cmm_uq.certificate.verify.found import Inquiry
-from cmm_uq.certificate.verify.given import Given, check_files, read_given
+from cmm_uq.certificate.verify.given import Given, canonical, check_files, read_given, strict_json
 from cmm_uq.certificate.verify.html_page import read_html
 from cmm_uq.certificate.verify.pdf_file import PdfFile, read_pdf
-from cmm_uq.certificate.verify.strict_json import canonical, strict_json
 
 
 @pytest.mark.parametrize(("content", "told"), [

@@ -9,12 +9,11 @@ from typing import Any
 import pytest
 
 from cmm_uq.certificate.verify.again import beyond_sampling, differences
-from cmm_uq.certificate.verify.consistent import check_verdicts
+from cmm_uq.certificate.verify.decisions import check_part_decisions
+from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
 from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import read_html
-from cmm_uq.certificate.verify.part_decided import check_part_decisions
-from cmm_uq.certificate.verify.part_figures import check_part_figures
-from cmm_uq.certificate.verify.part_stated import check_part_stated
+from cmm_uq.certificate.verify.stated import check_part_stated
 from tests.part_reports import plate_report
 
 

@@ -13,9 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.geometry.circle import fit_circle
-from cmm_uq.maths.geometry.cylinder import fit_cylinder
-from cmm_uq.maths.geometry.sphere import fit_sphere
+from cmm_uq.maths.geometry.axial import fit_cylinder
+from cmm_uq.maths.geometry.round import fit_circle, fit_sphere
 from tests.jobs.part.parts import feature
 
 ROUND = {"diameter_mm": 30.0}

@@ -11,7 +11,7 @@ import pytest
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.machine.model import MeasurementModel
-from cmm_uq.machine.model.bending import with_curvature
+from cmm_uq.machine.model.measurement import with_curvature
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.ensembles import ENSEMBLES
@@ -110,7 +110,7 @@ def test_small_angles_are_not_even_looked_at(monkeypatch: pytest.MonkeyPatch) ->
     points = recorded(np.array([500.0, -500.0, 300.0, 60.0, -60.0, 40.0]), sigma=SIGMA, count=30)
     model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), SIGMA)
     straight = linear_draws(model, steps=10, walkers=20)
-    monkeypatch.setattr("cmm_uq.machine.model.bending.bend", lambda *_: pytest.fail("looked"))
+    monkeypatch.setattr("cmm_uq.machine.model.measurement.bend", lambda *_: pytest.fail("looked"))
     assert with_curvature(model, noise_of(model), straight) is straight
 
 

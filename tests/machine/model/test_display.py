@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.machine.model.display import Display, display_step, of_last_digit
+from cmm_uq.machine.model.recorded import Display, display_step, of_last_digit
 from cmm_uq.maths.inference.noise import display_shared
 
 

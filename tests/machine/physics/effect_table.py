@@ -14,7 +14,7 @@ from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import CATALOGUE, EVERY, FURTHER, OWN
 from cmm_uq.machine.physics.effect import Effect, Parameter, Shape
-from cmm_uq.maths.inference.freedoms import Freedoms
+from cmm_uq.maths.inference.linear_model import Freedoms
 from tests.recordings import with_columns
 
 ROOT = Path(__file__).parents[3]

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.machine.physics.alignment import Alignment, align_on_sphere, mount_offset, three_alignment_offset
-from cmm_uq.machine.physics.digitizer import euler_313
+from cmm_uq.machine.physics.digitizer import Alignment, align_on_sphere, euler_313, mount_offset, three_alignment_offset
 from cmm_uq.maths.geometry import cap_directions
 
 OFFSET = np.array([1.001, 264.505, 129.575])

@@ -12,12 +12,7 @@ from hypothesis import strategies as st
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.machine.physics.compensation import (
-    Circumstances,
-    Compensation,
-    compensate_points,
-    machine_compensation,
-)
+from cmm_uq.machine.physics.compensation import Circumstances, Compensation, compensate_points, machine_compensation
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 

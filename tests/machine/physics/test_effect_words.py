@@ -19,7 +19,7 @@ from tests.conftest import ROOT
 from tests.recordings import TRAVEL
 
 PACKAGE = ROOT / "cmm_uq"
-DEFINE = {f"machine/physics/{name}.py" for name in (
+DEFINE = {f"machine/physics/effects/{name}.py" for name in (
     "rigid_body", "drives", "thermal", "probing", "reversal", "scales", "warming", "stylus", "scanning",
     "own_errors", "own_states",
 )}  # fmt: skip

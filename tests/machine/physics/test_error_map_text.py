@@ -7,8 +7,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.machine.physics.error_map import read_error_map
-from cmm_uq.machine.physics.error_map_text import error_map_text, parse_error_map_text, read_error_map_text
+from cmm_uq.machine.physics.error_map import error_map_text, parse_error_map_text, read_error_map, read_error_map_text
 
 HARRIS = Path(__file__).parent / "harris2004"
 

@@ -14,9 +14,8 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import EVERY, OWN, effects
-from cmm_uq.machine.physics.common_size import CommonSize
-from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.own_errors import GEOMETRY
+from cmm_uq.machine.physics.effect import CommonSize, Effect
+from cmm_uq.machine.physics.effects.own_errors import GEOMETRY
 from tests.artefacts.constructions import MIDDLE, plate, recording, spheres, step_gauge, swept
 from tests.recordings import bar_facts, bars, with_columns
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.machine.physics.probe_offset import offset_plane
+from cmm_uq.machine.physics.compensation import offset_plane
 
 CONTACTS = np.array([[0.0, 0, 5], [40, 0, 5], [40, 30, 5], [0, 30, 5], [20, 15, 5]])
 

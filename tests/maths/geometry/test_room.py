@@ -26,5 +26,5 @@ def test_the_room_has_these_names_and_no_others() -> None:
 
 
 def test_a_rotation_loads_no_fit() -> None:
-    code = "import sys, cmm_uq.maths.geometry.rotation; sys.exit('cmm_uq.maths.geometry.cone' in sys.modules)"
+    code = "import sys, cmm_uq.maths.geometry.feature; sys.exit('cmm_uq.maths.geometry.axial' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.maths.geometry.shapes import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE
+from cmm_uq.maths.geometry.minimax import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE
 
 STATES = {
     "line in a plane": (LINE_IN_PLANE, 2, [0.3, -0.2]),

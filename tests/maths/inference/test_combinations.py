@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.maths.inference.combinations import uncertainty_of_sum
+from cmm_uq.maths.inference.draws import uncertainty_of_sum
 from cmm_uq.maths.inference.noise import Sizes
 from tests.maths.inference.test_noise import SIZES, M, components, covariance
 

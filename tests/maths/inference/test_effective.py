@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.inference.effective import bulk_ess
+from cmm_uq.maths.inference.ensembles import bulk_ess
 
 
 def autoregressive(seed: int, memory: float, chains: int, draws: int) -> Floats:

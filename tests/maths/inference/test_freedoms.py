@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from scipy import linalg, sparse
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.inference.freedoms import Freedoms
 from cmm_uq.maths.inference.least_squares import solve
-from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
+from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import AXES, PLACING, Components
 

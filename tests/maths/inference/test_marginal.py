@@ -13,8 +13,8 @@ from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import PLACING, Components
+from cmm_uq.maths.inference.posterior import sample_with_noise, start
 from cmm_uq.maths.inference.proposals import Proposal
-from cmm_uq.maths.inference.sampling import sample_with_noise, start
 from tests.maths.inference.test_noise import M, components, covariance
 
 

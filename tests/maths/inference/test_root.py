@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import optimize, special
 
-from cmm_uq.maths.inference.root import root
+from cmm_uq.maths.inference.slow import root
 
 FUNCTIONS = {
     "polynomial": lambda x: x**3 - 2 * x - 5,

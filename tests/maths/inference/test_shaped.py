@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.points import Floats
+from cmm_uq.maths.inference.curvature import Shaped, sample_shaped
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
-from cmm_uq.maths.inference.shaped import Shaped, sample_shaped
 
 M = 60
 

@@ -6,9 +6,8 @@ import emcee
 import numpy as np
 
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.inference.ensembles import BURN_IN, ENSEMBLES, run_ensembles
+from cmm_uq.maths.inference.ensembles import BURN_IN, ENSEMBLES, SHARES, run_ensembles
 from cmm_uq.maths.inference.proposals import Proposal
-from cmm_uq.maths.inference.side_by_side import SHARES
 
 WALKERS, STEPS, SEED = 12, 40, 7
 MIXTURE = Proposal(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.maths.uncertainty.coverage_intervals import (
+from cmm_uq.maths.uncertainty.coverage import (
     Tails,
     both_intervals,
     inner_draws,

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.coverage_regions import (
-    elliptical_factor,
-    elliptical_region,
-    rectangular_region,
-    smallest_region,
-)
+from cmm_uq.maths.uncertainty.coverage import elliptical_factor, elliptical_region, rectangular_region, smallest_region
 from cmm_uq.maths.uncertainty.distributions import normal, rectangular
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.monte_carlo import draw_outputs

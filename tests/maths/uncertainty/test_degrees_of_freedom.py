@@ -8,8 +8,8 @@ from scipy import stats
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import unit
-from cmm_uq.maths.uncertainty.degrees_of_freedom import check_coverage, coverage_factor, effective_dof, factor_of_noise
 from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor, effective_dof, factor_of_noise
 
 INDEPENDENT = np.eye(3)
 PAIR = np.array([[1.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])

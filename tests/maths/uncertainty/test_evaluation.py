@@ -9,10 +9,10 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.budget import Labels
+from cmm_uq.maths.uncertainty.choice import compare
 from cmm_uq.maths.uncertainty.distributions import normal, rectangular, student_t
 from cmm_uq.maths.uncertainty.evaluation import Request, evaluate, one_at_a_time
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.validation import compare
 
 
 def test_a_linear_model_of_normal_inputs_is_stated_by_first_order() -> None:

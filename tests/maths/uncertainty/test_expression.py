@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.derivatives import derivatives
 from cmm_uq.maths.uncertainty.expression import LONGEST, name_problem, parse
+from cmm_uq.maths.uncertainty.measurement_model import derivatives
 
 
 @pytest.mark.parametrize(

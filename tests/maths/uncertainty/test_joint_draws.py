@@ -7,9 +7,8 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty import distributions as make
-from cmm_uq.maths.uncertainty.correlation import correlation_matrix, square_root, tied
+from cmm_uq.maths.uncertainty.correlation import correlation_matrix, joint_draws, square_root, tied
 from cmm_uq.maths.uncertainty.distributions import Distribution
-from cmm_uq.maths.uncertainty.joint_draws import joint_draws
 
 N = 200_000
 

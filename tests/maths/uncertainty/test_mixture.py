@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy import optimize, stats
 
 from cmm_uq.base.units import unit
-from cmm_uq.maths.uncertainty.mixture import averaged, mixed
-from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.quantity import Quantity, averaged, mixed
 
 K = float(stats.norm.ppf(0.975))
 

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
 from cmm_uq.maths.uncertainty.distributions import constant, normal, student_t
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.propagation import first_order, second_order
-from cmm_uq.maths.uncertainty.type_a import multivariate_normal, simultaneous_readings
+from cmm_uq.maths.uncertainty.type_a import coverage_factor, multivariate_normal, simultaneous_readings
 
 
 def test_end_gauge_by_first_order(end_gauge: MeasurementModel) -> None:

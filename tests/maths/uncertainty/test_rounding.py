@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.rounding import alike, figure, rounded, significant
+from cmm_uq.maths.uncertainty.quantity import alike, figure, rounded, significant
 
 
 @pytest.mark.parametrize(

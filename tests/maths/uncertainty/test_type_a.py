@@ -8,12 +8,7 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.propagation import first_order
-from cmm_uq.maths.uncertainty.type_a import (
-    multivariate_normal,
-    repeated_readings,
-    simultaneous_readings,
-    straight_line,
-)
+from cmm_uq.maths.uncertainty.type_a import multivariate_normal, repeated_readings, simultaneous_readings, straight_line
 
 THERMOMETER = [21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511]
 CORRECTION = [-0.171, -0.169, -0.166, -0.159, -0.164, -0.165, -0.156, -0.157, -0.159, -0.161, -0.160]

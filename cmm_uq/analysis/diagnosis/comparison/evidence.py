@@ -38,7 +38,7 @@ from cmm_uq.analysis.diagnosis.comparison.conditional import (
 from cmm_uq.analysis.diagnosis.comparison.explanations import Explanation
 from cmm_uq.analysis.diagnosis.noise import OFTEN, NoiseKind
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.machine.model.display import Display
+from cmm_uq.machine.model.recorded import Display
 
 _KEPT = 8_000_000  # numbers that are kept of what follows from what was given last
 

@@ -16,7 +16,7 @@ from cmm_uq.analysis.parts.plan import DIRECTED, Feature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.maths.geometry.frame import frame_about
+from cmm_uq.maths.geometry.feature import frame_about
 
 FORM = "form"
 

@@ -21,8 +21,8 @@ from scipy.special import sici
 
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.physics.drives import PeriodicScale
 from cmm_uq.machine.physics.effect import Effect, Parameter
+from cmm_uq.machine.physics.effects.drives import PeriodicScale
 
 _SAME = 1e-6  # of the shortest period: a distance over which nothing changes
 _LOOKED_AT = 61  # readings

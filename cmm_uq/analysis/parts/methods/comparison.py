@@ -23,7 +23,7 @@ from cmm_uq.analysis.parts.methods.method import (
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import Text, Verbatim, listed, number, say
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
-from cmm_uq.maths.uncertainty.rounding import significant
+from cmm_uq.maths.uncertainty.quantity import significant
 
 MATTERS = 0.05  # share of the variance from which on a cause is told by name
 CHANCE = 0.05  # probability at which a scatter counts as another than the one that is expected

@@ -36,8 +36,7 @@ from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values
 from cmm_uq.laboratory.records.facts import spelled
 from cmm_uq.laboratory.records.place import DEFAULT, beside, place_of
-from cmm_uq.maths.uncertainty.quantity import Quantity
-from cmm_uq.maths.uncertainty.rounding import rounded
+from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.facts import RecordedCertificate as Certificate

@@ -17,9 +17,14 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.air.ciddor import ciddor
-from cmm_uq.maths.uncertainty.air.edlen import birch_downs_1994, edlen_1966, harris_2004, modified_edlen
-from cmm_uq.maths.uncertainty.air.water_vapour import relative_humidity
+from cmm_uq.maths.uncertainty.air.refractivity import (
+    birch_downs_1994,
+    ciddor,
+    edlen_1966,
+    harris_2004,
+    modified_edlen,
+    relative_humidity,
+)
 from cmm_uq.maths.uncertainty.budget import Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution, Number, constant, normal, rectangular
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel

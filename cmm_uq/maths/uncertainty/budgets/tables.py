@@ -20,9 +20,8 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.geometry import cap_directions
-from cmm_uq.maths.geometry.ball_form import BallForm
+from cmm_uq.maths.geometry.feature import BallForm
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, Line
-from cmm_uq.maths.uncertainty.budgets.ballbar import BallbarPosition, ballbar_length
 from cmm_uq.maths.uncertainty.budgets.machine import (
     expanded_without_correction,
     length_test_uncertainty,
@@ -30,7 +29,12 @@ from cmm_uq.maths.uncertainty.budgets.machine import (
     use_by_calibrated_workpiece,
     use_by_simulation,
 )
-from cmm_uq.maths.uncertainty.budgets.sphere import sphere_budgets, sphere_covariance
+from cmm_uq.maths.uncertainty.budgets.measurements import (
+    BallbarPosition,
+    ballbar_length,
+    sphere_budgets,
+    sphere_covariance,
+)
 
 Coefficient = Annotated[float, Field(ge=0, le=1e-3)]
 """Of expansion, or its standard uncertainty, 1/K."""

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cmm_uq.maths.uncertainty.budgets.ballbar import harris_compensated, harris_uncompensated
-from cmm_uq.maths.uncertainty.budgets.sphere import sphere_covariance
+from cmm_uq.maths.uncertainty.budgets.measurements import harris_compensated, harris_uncompensated, sphere_covariance
 from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.reference.case import Figures, ReferenceCase
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.maths.uncertainty.correlation import correlation_of
-from cmm_uq.maths.uncertainty.degrees_of_freedom import coverage_factor
 from cmm_uq.maths.uncertainty.distributions import (
     arcsine,
     normal,
@@ -16,9 +15,9 @@ from cmm_uq.maths.uncertainty.distributions import (
 )
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.propagation import first_order, second_order
+from cmm_uq.maths.uncertainty.quantity import rounded
 from cmm_uq.maths.uncertainty.reference.case import Figures, ReferenceCase
-from cmm_uq.maths.uncertainty.rounding import rounded
-from cmm_uq.maths.uncertainty.type_a import simultaneous_readings, straight_line
+from cmm_uq.maths.uncertainty.type_a import coverage_factor, simultaneous_readings, straight_line
 
 READINGS = {
     "V": [5.007, 4.994, 5.005, 4.990, 4.999],

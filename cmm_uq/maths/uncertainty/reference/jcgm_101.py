@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cmm_uq.maths.uncertainty.choice import compare
 from cmm_uq.maths.uncertainty.distributions import (
     Distribution,
     arcsine,
@@ -20,7 +21,6 @@ from cmm_uq.maths.uncertainty.monte_carlo import Simulated, simulate, simulate_a
 from cmm_uq.maths.uncertainty.propagation import first_order, second_order
 from cmm_uq.maths.uncertainty.reference.case import SEED, Figures, ReferenceCase
 from cmm_uq.maths.uncertainty.reference.jcgm_100 import comparison
-from cmm_uq.maths.uncertainty.validation import compare
 
 _SIDE = np.sqrt(3)
 

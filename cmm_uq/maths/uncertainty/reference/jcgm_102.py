@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cmm_uq.maths.uncertainty.coverage_regions import elliptical_factor
+from cmm_uq.maths.uncertainty.coverage import elliptical_factor
 from cmm_uq.maths.uncertainty.distributions import (
     normal,
 )

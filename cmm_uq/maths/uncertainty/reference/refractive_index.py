@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cmm_uq.maths.uncertainty.air.ciddor import ciddor
-from cmm_uq.maths.uncertainty.air.edlen import birch_downs_1994, harris_2004, modified_edlen
-from cmm_uq.maths.uncertainty.derivatives import derivatives
+from cmm_uq.maths.uncertainty.air.refractivity import birch_downs_1994, ciddor, harris_2004, modified_edlen
+from cmm_uq.maths.uncertainty.measurement_model import derivatives
 from cmm_uq.maths.uncertainty.reference.case import Expected, Figures, ReferenceCase
 
 _AIR_TABLE = (
@@ -56,7 +55,7 @@ def _harris_air() -> Figures:
 
 def _water_constant() -> Figures:
     wet, dry = (birch_downs_1994(20.0, 1e5, h, 0.0, 633.0) for h in (100.0, 0.0))
-    from cmm_uq.maths.uncertainty.air.water_vapour import saturation_pressure
+    from cmm_uq.maths.uncertainty.air.refractivity import saturation_pressure
 
     slope = float((dry - wet) / saturation_pressure(20.0)) * 1e10
     return {"constant": slope + 0.0401 / 0.633**2}

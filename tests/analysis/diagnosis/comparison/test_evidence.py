@@ -18,7 +18,7 @@ from cmm_uq.analysis.diagnosis.noise import TAILS, heavy_tails, probable_tails, 
 from cmm_uq.analysis.diagnosis.noise_shapes import drawn_shapes, representative_kinds
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model.display import Display
+from cmm_uq.machine.model.recorded import Display
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.noise import Sizes, slow_variances

@@ -42,7 +42,7 @@ from cmm_uq.machine.model.drawn_noise import Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.noise import Sizes
-from cmm_uq.maths.inference.sampling import sample_with_noise
+from cmm_uq.maths.inference.posterior import sample_with_noise
 from tests.conftest import ROOT
 from tests.parts_drawn import MACHINE, spot
 

@@ -6,13 +6,18 @@ import numpy as np
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.air.ciddor import ciddor
-from cmm_uq.maths.uncertainty.air.edlen import birch_downs_1994, edlen_1966, harris_2004
+from cmm_uq.maths.uncertainty.air.refractivity import (
+    birch_downs_1994,
+    ciddor,
+    edlen_1966,
+    harris_2004,
+    relative_humidity,
+    saturation_pressure,
+)
 from cmm_uq.maths.uncertainty.air.state import EQUATIONS, Air, air_model, refractive_index, standard_pressure
-from cmm_uq.maths.uncertainty.air.water_vapour import relative_humidity, saturation_pressure
 from cmm_uq.maths.uncertainty.budget import budget_of
-from cmm_uq.maths.uncertainty.derivatives import complex_step, derivatives
 from cmm_uq.maths.uncertainty.distributions import normal
+from cmm_uq.maths.uncertainty.measurement_model import complex_step, derivatives
 from cmm_uq.maths.uncertainty.monte_carlo import simulate
 from cmm_uq.maths.uncertainty.propagation import first_order
 

@@ -8,12 +8,6 @@ import pytest
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Line
-from cmm_uq.maths.uncertainty.budgets.ballbar import (
-    BallbarPosition,
-    ballbar_length,
-    harris_compensated,
-    harris_uncompensated,
-)
 from cmm_uq.maths.uncertainty.budgets.machine import (
     expanded_without_correction,
     length_test_uncertainty,
@@ -21,9 +15,18 @@ from cmm_uq.maths.uncertainty.budgets.machine import (
     use_by_calibrated_workpiece,
     use_by_simulation,
 )
-from cmm_uq.maths.uncertainty.budgets.sphere import sphere_budgets, sphere_covariance
-from cmm_uq.maths.uncertainty.budgets.temperature import labels, length_at_20, scale_error
-from cmm_uq.maths.uncertainty.budgets.triangle import triangle_angles
+from cmm_uq.maths.uncertainty.budgets.measurements import (
+    BallbarPosition,
+    ballbar_length,
+    harris_compensated,
+    harris_uncompensated,
+    labels,
+    length_at_20,
+    scale_error,
+    sphere_budgets,
+    sphere_covariance,
+    triangle_angles,
+)
 from cmm_uq.maths.uncertainty.distributions import constant, normal, rectangular
 from cmm_uq.maths.uncertainty.evaluation import evaluate
 from cmm_uq.maths.uncertainty.monte_carlo import simulate

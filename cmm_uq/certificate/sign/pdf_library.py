@@ -1,0 +1,364 @@
+"""What the library of PDF signatures is given: a signer, a field, revisions appended, time stamps and evidence for years.
+
+What may be appended to a signed PDF: time stamps, evidence, and further signatures with their place in the structure.
+
+The library's policy knows all but the last: it takes a further signature of a tagged PDF for a change of its structure. The
+rule here lets the structure grow by form controls of signatures, at its end, and by nothing else.
+"""
+
+from __future__ import annotations
+
+import datetime as dt
+import hashlib
+import http.client
+import io
+import urllib.error
+import urllib.request
+from collections.abc import Iterable
+from typing import Any
+
+from asn1crypto import tsp, x509
+from asn1crypto.algos import SignedDigestAlgorithm
+from cryptography.hazmat.primitives.serialization import Encoding
+from pyhanko.pdf_utils.generic import (
+    ArrayObject,
+    DictionaryObject,
+    IndirectObject,
+    NameObject,
+    NumberObject,
+    PdfObject,
+    pdf_string,
+)
+from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+from pyhanko.pdf_utils.reader import PdfFileReader
+from pyhanko.sign import signers
+from pyhanko.sign.diff_analysis import DEFAULT_DIFF_POLICY, ModificationLevel, StandardDiffPolicy
+from pyhanko.sign.diff_analysis.rules_api import ReferenceUpdate, WhitelistRule
+from pyhanko.sign.signers import PdfTimeStamper
+from pyhanko.sign.timestamps import TimeStamper, TimestampRequestError
+from pyhanko.sign.validation.dss import DocumentSecurityStore
+from pyhanko_certvalidator import CertificateValidator, ValidationContext
+from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError
+from pyhanko_certvalidator.registry import SimpleCertificateStore
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.sign.extra import installed
+from cmm_uq.certificate.sign.found import Trust
+from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
+
+_ROOM = 16
+"""Bytes by which two signatures of an ECDSA key may differ in length, as DER."""
+
+
+class Adapted(signers.Signer):  # type: ignore[misc]
+    """Signs whatever the library gives it with a :class:`~cmm_uq.certificate.sign.signer.Signer`."""
+
+    def __init__(self, signer: Signer) -> None:
+        registry = SimpleCertificateStore()
+        registry.register_multiple([translated(one) for one in signer.chain])
+        mechanism = {"rsa": f"{ONE_DIGEST}_rsa", "ecdsa": f"{ONE_DIGEST}_ecdsa"}[signer.algorithm]
+        super().__init__(
+            signing_cert=translated(signer.certificate), cert_registry=registry,
+            signature_mechanism=SignedDigestAlgorithm({"algorithm": mechanism}),
+        )  # fmt: skip
+        self.signer = signer
+
+    async def async_sign_raw(self, data: bytes, digest_algorithm: str, dry_run: bool = False) -> bytes:
+        """Signature of data; of a rehearsal only its length counts."""
+        if dry_run:
+            return bytes((self.signer.bits + 7) // 8 * 2 + _ROOM)
+        return self.signer.signed(data)
+
+
+def translated(certificate: Any) -> x509.Certificate:
+    """A certificate as the library knows one."""
+    return x509.Certificate.load(certificate.public_bytes(Encoding.DER))
+
+
+def show(writer: IncrementalPdfFileWriter, field: DictionaryObject, picture: bytes) -> None:
+    """The page of a PDF in the place of a field, with the fonts that it has embedded."""
+    seen = writer.import_page_as_xobject(PdfFileReader(io.BytesIO(picture)))
+    field["/AP"] = DictionaryObject({NameObject("/N"): seen})
+
+
+def tag(writer: IncrementalPdfFileWriter, reference: IndirectObject, says: str) -> None:
+    """Put a field into the structure of a tagged PDF as a form control (ISO 14289-1, 7.18.1 and 7.18.4).
+
+    Parameters
+    ----------
+    writer : of the revision that has the field.
+    reference : to the field, to be found by screen readers.
+    says : what they say of it.
+    """
+    field = reference.get_object()
+    field["/Contents"] = pdf_string(says)
+    root = writer.root["/StructTreeRoot"] if "/StructTreeRoot" in writer.root else DictionaryObject()
+    if "/ParentTree" not in root or "/Nums" not in root["/ParentTree"]:
+        return  # not tagged, or by a program that lays its tree out in another way
+    top = root["/K"][0] if isinstance(root["/K"], ArrayObject) else root["/K"]
+    key = NumberObject(int(root["/ParentTreeNextKey"]))
+    element = writer.add_object(DictionaryObject({
+        NameObject("/Type"): NameObject("/StructElem"),
+        NameObject("/S"): NameObject("/Form"),
+        NameObject("/P"): _to(top),
+        NameObject("/Alt"): pdf_string(says),
+        NameObject("/Pg"): field.raw_get("/P"),
+        NameObject("/K"): DictionaryObject({
+            NameObject("/Type"): NameObject("/OBJR"),
+            NameObject("/Obj"): reference,
+            NameObject("/Pg"): field.raw_get("/P"),
+        }),
+    }))  # fmt: skip
+    field["/StructParent"] = key
+    _append(writer, top, "/K", element)
+    _append(writer, root["/ParentTree"], "/Nums", key, element)
+    root["/ParentTreeNextKey"] = NumberObject(int(key) + 1)
+    writer.update_container(root)
+
+
+def _append(writer: IncrementalPdfFileWriter, owner: DictionaryObject, key: str, *values: PdfObject) -> None:
+    """Values at the end of a list, wherever that is kept."""
+    held = owner[key]
+    if not isinstance(held, ArrayObject):
+        owner[NameObject(key)] = held = ArrayObject([owner.raw_get(key)])
+    held.extend(values)
+    writer.update_container(held)
+    writer.update_container(owner)
+
+
+def _to(held: PdfObject) -> IndirectObject:
+    """To an object that has a number of its own."""
+    place = held.container_ref
+    return IndirectObject(place.idnum, place.generation, place.get_pdf_handler())
+
+
+def appending(pdf: bytes) -> IncrementalPdfFileWriter:
+    """A writer that appends a revision, and draws nothing at random.
+
+    Raises
+    ------
+    CmmUqError : it cannot be read as a PDF.
+    """
+    with installed():
+        from pyhanko.pdf_utils import generic
+        from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+        from pyhanko.pdf_utils.misc import PdfError
+
+    class Appending(IncrementalPdfFileWriter):  # type: ignore[misc]
+        def _update_meta(self) -> None:
+            """Metadata stay: they are of the document, and PDF/A asks that both its copies agree."""
+
+        @classmethod
+        def _handle_id(cls, prev: Any) -> Any:
+            drawn = generic.ByteStringObject(hashlib.sha256(pdf).digest()[:16])
+            return generic.ArrayObject([prev.trailer["/ID"][0] if "/ID" in prev.trailer else drawn, drawn])
+
+    try:
+        return Appending(io.BytesIO(pdf))
+    except (PdfError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None
+
+
+_ELEMENT = {"/Type", "/S", "/P", "/Alt", "/Pg", "/K"}
+_GROWING = {"/K", "/ParentTree", "/ParentTreeNextKey"}
+
+
+class Tagged(WhitelistRule):  # type: ignore[misc]
+    """Approves a structure tree that differs by form controls of signatures at its end."""
+
+    def apply(self, old: Any, new: Any) -> Iterable[ReferenceUpdate]:
+        """References of what grew, or none where anything else differs."""
+        try:
+            return [ReferenceUpdate(one) for one in _grown(old, new)]
+        except (KeyError, IndexError, TypeError, AttributeError, ValueError):
+            return []
+
+
+POLICY = StandardDiffPolicy(
+    [*DEFAULT_DIFF_POLICY.global_rules, Tagged().as_qualified(ModificationLevel.FORM_FILLING)],
+    DEFAULT_DIFF_POLICY.form_rule,
+)
+
+
+def _grown(old: Any, new: Any) -> list[Any]:
+    """References of what grew; none where the tree is a part of an object that holds more, or differs otherwise."""
+    if not isinstance(new.root.raw_get("/StructTreeRoot"), IndirectObject):
+        return []
+    before, after = old.root["/StructTreeRoot"], new.root["/StructTreeRoot"]
+    top_before, top_after = _top(before), _top(after)
+    numbers_before, numbers_after = before["/ParentTree"]["/Nums"], after["/ParentTree"]["/Nums"]
+    kids = _added(_list(top_before), _list(top_after))
+    numbers = _added(numbers_before, numbers_after)
+    elements = [one.reference for one in kids]
+    listed = [one.reference for one in numbers[1::2]]
+    same = (
+        _same(before, after, _GROWING) and _same(top_before, top_after, {"/K"})
+        and _same(before["/ParentTree"], after["/ParentTree"], {"/Nums"})
+        and _text(before.raw_get("/K")) == _text(after.raw_get("/K"))
+        and elements == listed and all(old.is_ref_unassignable(one) and _is_control(new(one)) for one in elements)
+    )  # fmt: skip
+    if not same or not elements:
+        return []
+    holders = [after, top_after, after["/ParentTree"], numbers_after, _list(top_after)]
+    held = [one.container_ref for one in holders if one.container_ref is not None]
+    return [*elements, *held]
+
+
+def _top(root: Any) -> Any:
+    """The element that all others are below."""
+    return root["/K"][0] if isinstance(root["/K"], ArrayObject) else root["/K"]
+
+
+def _list(element: Any) -> Any:
+    held = element["/K"]
+    return held if isinstance(held, ArrayObject) else ArrayObject([element.raw_get("/K")])
+
+
+def _added(before: Any, after: Any) -> list[Any]:
+    """What stands behind the end of a list that is otherwise the same.
+
+    Raises
+    ------
+    ValueError : it is not the same.
+    """
+    if [_text(one) for one in before] != [_text(after.raw_get(i)) for i in range(len(before))]:
+        raise ValueError
+    return [after.raw_get(i) for i in range(len(before), len(after))]
+
+
+def _same(before: Any, after: Any, but: set[str]) -> bool:
+    keys = set(before) - but
+    return set(after) - but == keys and all(_text(before.raw_get(key)) == _text(after.raw_get(key)) for key in keys)
+
+
+def _is_control(element: Any) -> bool:
+    """Whether an element of the structure is that of a signature's field, and of nothing else."""
+    target = element["/K"]
+    return bool(
+        isinstance(element, DictionaryObject) and set(element) <= _ELEMENT and element["/S"] == "/Form"
+        and target["/Type"] == "/OBJR" and target["/Obj"]["/FT"] == "/Sig"
+    )  # fmt: skip
+
+
+def _text(held: Any) -> bytes:
+    """An object as a file has it, references by their numbers."""
+    if isinstance(held, IndirectObject):
+        return b"%d %d R" % (held.idnum, held.generation)
+    output = io.BytesIO()
+    held.write_to_stream(output)
+    return output.getvalue()
+
+
+TIMEOUT_S = 10.0
+MOST_BYTES = 1_000_000
+
+_FIX = "Try again, name another server, or sign at level B-B without one"
+
+
+class Server(TimeStamper):  # type: ignore[misc]
+    """Asks a server for time stamps."""
+
+    def __init__(self, url: str) -> None:
+        super().__init__()
+        self.url = url
+
+    async def async_request_tsa_response(self, req: tsp.TimeStampReq) -> tsp.TimeStampResp:
+        """What the server answers.
+
+        Raises
+        ------
+        CmmUqError : it does not answer, or with something else than a time stamp.
+        """
+        headers = {"Content-Type": "application/timestamp-query", "Accept": "application/timestamp-reply"}
+        request = urllib.request.Request(self.url, req.dump(), headers)  # noqa: S310 - the scheme was looked at
+        try:
+            with urllib.request.urlopen(request, timeout=TIMEOUT_S) as answer:  # noqa: S310 - the same
+                sort, data = answer.headers.get_content_type(), answer.read(MOST_BYTES + 1)
+        except urllib.error.HTTPError as error:
+            raise CmmUqError(f"the time stamp server answers {error.code}", where=self.url, fix=_FIX) from None
+        except (OSError, http.client.HTTPException) as error:
+            why = getattr(error, "reason", error)
+            raise CmmUqError(f"the time stamp server does not answer: {why}", where=self.url, fix=_FIX) from None
+        if sort != "application/timestamp-reply" or len(data) > MOST_BYTES:
+            raise CmmUqError("the server answers something else than a time stamp", where=self.url, fix=_FIX)
+        return tsp.TimeStampResp.load(data)
+
+    async def async_timestamp(self, message_digest: bytes, md_algorithm: str) -> Any:
+        """A time stamp of a digest.
+
+        Raises
+        ------
+        CmmUqError : the server refuses, or stamps something else.
+        """
+        try:
+            token = await super().async_timestamp(message_digest, md_algorithm)
+            stamped = (
+                token["content"]["encap_content_info"]["content"].parsed["message_imprint"]["hashed_message"].native
+            )
+        except TimestampRequestError as error:
+            raise CmmUqError(f"the time stamp server refuses: {error}", where=self.url, fix=_FIX) from None
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise CmmUqError("the server answers something else than a time stamp", where=self.url, fix=_FIX) from None
+        if stamped != message_digest:
+            raise CmmUqError("the server stamped something else than it was asked", where=self.url, fix=_FIX)
+        return token
+
+
+STAMP = "TimeStamp"
+"""Name of the field of a document's time stamp, before its number."""
+
+
+class Proof:
+    """What proves the certificates of a signature at a time, fetched from those who issued them.
+
+    Parameters
+    ----------
+    signer : who signs.
+    server : of time stamps.
+    trust : whom a chain of either must lead to.
+    at : the time.
+    """
+
+    def __init__(self, signer: Signer, server: Server, trust: Trust, at: dt.datetime) -> None:
+        self._signer, self._server = signer, server
+        self.context = ValidationContext(
+            trust_roots=[x509.Certificate.load(anchor) for anchor in trust.anchors],
+            other_certs=[translated(one) for one in signer.chain], allow_fetching=True, moment=at,
+            revocation_mode="require", retroactive_revinfo=True,
+        )  # fmt: skip
+        self.paths: list[Any] = []
+
+    async def gather(self) -> None:
+        """Fetch it, before anything is signed.
+
+        Raises
+        ------
+        CmmUqError : a chain does not lead to anybody trusted, or nobody says whether a certificate was revoked.
+        """
+        signer = CertificateValidator(translated(self._signer.certificate), validation_context=self.context)
+        try:
+            self.paths.append(await signer.async_validate_path())
+            async for path in self._server.validation_paths(self.context):
+                self.paths.append(path)
+        except (PathBuildingError, PathValidationError) as error:
+            raise CmmUqError(f"a certificate cannot be proven: {error}", where=self._signer.where,
+                             fix="Trust its root with --trust, or sign at level B-T") from None  # fmt: skip
+        finally:
+            await self.context.aclose()
+
+    def kept(self, pdf: bytes) -> Any:
+        """A writer of a PDF with a further revision that holds it."""
+        writer = appending(pdf)
+        DocumentSecurityStore.supply_dss_in_writer(writer, None, paths=self.paths, validation_context=self.context)
+        return writer
+
+
+async def stamped(writer: Any, server: Server) -> bytes:
+    """The whole document stamped, with what its revision holds."""
+    from pyhanko.sign.fields import enumerate_sig_fields
+
+    taken = {name for name, _, _ in enumerate_sig_fields(writer)}
+    name = next(name for name in (f"{STAMP}{i}" for i in range(1, len(taken) + 2)) if name not in taken)
+    output = await PdfTimeStamper(server, field_name=name).async_timestamp_pdf(writer, ONE_DIGEST)
+    output.seek(0)
+    return bytes(output.read())

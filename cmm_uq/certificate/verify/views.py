@@ -1,0 +1,242 @@
+"""Whether PDF and HTML show the same text, and where two PDFs differ.
+
+Whether PDF and HTML show the same text, in the same order, to the character.
+
+Both are views of one document. What a PDF has more is taken off first: the foot of every page, the banner at its head, the
+head of a table that goes on over pages, signs of lists. White space tells nothing: lines break elsewhere.
+"""
+
+from __future__ import annotations
+
+import html
+import io
+import re
+import unicodedata
+from collections.abc import Sequence
+from typing import Any
+
+from cmm_uq.certificate.verify.found import Inquiry
+from cmm_uq.certificate.verify.html_page import HtmlPage
+from cmm_uq.certificate.verify.pdf_file import PdfFile, reading
+
+_NO_TEXT = re.compile(r"[\s\u00ad\u200b-\u200d\u2060\ufeff•—]+")
+"""What a view may have and the other not: white space, marks where words break, signs of lists and about the end."""
+
+MISSING = "□"
+"""In place of a character that a PDF's fonts lack."""
+
+_ANCHOR = 24
+"""Characters by which the views are brought together again behind a difference."""
+
+_MOST_SHOWN = 20
+_CONTEXT = 24
+
+
+def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tuple[str, str]) -> None:
+    """Keep every difference between the text of a PDF and that of a page.
+
+    Parameters
+    ----------
+    files : names of the PDF and of the HTML.
+    """
+    name, beside = files
+    banner = squashed(page.banner)
+    whole, count = squashed(page.text).removeprefix(banner), 0
+    replaced = any(MISSING in text for text in pdf.pages) and MISSING not in page.text
+    heads = sorted({squashed("".join(table.headings)) for table in page.tables} - {""}, key=len, reverse=True)
+    at = 0
+    for number, text in enumerate(pdf.pages, 1):
+        shown, foot = without_foot(squashed(text), squashed(page.title), number, len(pdf.pages))
+        if not foot:
+            inquiry.wrong("forms", name, f"page {number}", "has no foot with title, number and count of pages",
+                          text[-60:].strip(), page.title)  # fmt: skip
+        if not shown.startswith(banner):
+            inquiry.wrong("forms", name, f"page {number}", "does not begin with the banner", shown[:60], page.banner)
+        shown = shown.removeprefix(banner)
+        found, at = _differences(shown, whole, at, heads, replaced=replaced)
+        for stands, should in found:
+            count += 1
+            if count <= _MOST_SHOWN:
+                inquiry.wrong("forms", name, f"page {number}", f"says something else than {beside}", stands, should)
+    if at < len(whole):
+        inquiry.wrong("forms", name, f"page {len(pdf.pages)}", f"ends before {beside} does", "", whole[at:])
+    inquiry.looked("forms", len(pdf.pages))
+    _compare_information(inquiry, pdf, page, name)
+
+
+def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
+    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else.
+
+    Parameters
+    ----------
+    page : of this version of the package.
+    name : of its file.
+    """
+    from cmm_uq.certificate.render.html import style_sheet
+
+    inquiry.looked("files")
+    should = style_sheet(page.title, page.banner, page.language)
+    if page.style.strip() != should.strip():
+        inquiry.wrong("files", name, "style sheet", "is not that of the template")
+
+
+def squashed(text: str) -> str:
+    """Text without what tells nothing; letters composed of two are one."""
+    return _NO_TEXT.sub("", unicodedata.normalize("NFC", text))
+
+
+def without_foot(text: str, title: str, number: int, pages: int) -> tuple[str, bool]:
+    """Text of a page without its foot: title and number of the document, number of the page and count of pages."""
+    at = text.rfind(title)
+    rest = text[at + len(title) :] if at >= 0 else ""
+    if at < 0 or sorted(re.findall(r"\d+", rest)) != sorted((str(number), str(pages))) or len(rest) > 40:
+        return text, False
+    return text[:at], True
+
+
+def _differences(
+    text: str, whole: str, at: int, heads: Sequence[str], *, replaced: bool
+) -> tuple[list[tuple[str, str]], int]:  # fmt: skip
+    """What stands on a page and what should, and the place in the whole up to which they were compared."""
+    here, found = 0, list[tuple[str, str]]()
+    while here < len(text):
+        length = _alike(text, here, whole, at, replaced=replaced)
+        here, at = here + length, at + length
+        if here == len(text):
+            break
+        if head := next((one for one in heads if text.startswith(one, here) and here == 0), ""):
+            here += len(head)
+            continue
+        skipped, on = _together(text, here, whole, at)
+        before = text[max(0, here - _CONTEXT) : here]
+        found.append((before + text[here : here + skipped], before + whole[at:on]))
+        here, at = here + skipped, on
+    return found, at
+
+
+def _alike(text: str, here: int, whole: str, at: int, *, replaced: bool) -> int:
+    """Characters that are the same from two places on."""
+    length, most = 0, min(len(text) - here, len(whole) - at)
+    step = most
+    while step:
+        if (
+            length + step <= most
+            and text[here + length : here + length + step] == whole[at + length : at + length + step]
+        ):
+            length += step
+        elif replaced and length < most and text[here + length] == MISSING:
+            length += 1
+        else:
+            step //= 2
+    return length
+
+
+def _together(text: str, here: int, whole: str, at: int) -> tuple[int, int]:
+    """How much of the page is passed over, and the place in the whole where both go on alike."""
+    for skipped in range(min(2000, len(text) - here)):
+        piece = text[here + skipped : here + skipped + _ANCHOR]
+        found = whole.find(piece, at, at + 4000) if len(piece) >= min(_ANCHOR, len(text) - here) else -1
+        if found >= 0:
+            return skipped, found
+    return len(text) - here, at
+
+
+def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: str) -> None:
+    """Title, language, subject and author in the file's own information, which a reader's window shows."""
+    told = pdf.information
+    asked = [("/Title", page.title), ("/Author", page.metas.get("author", ""))]
+    subject = page.metas.get("description", "")
+    asked.append(("/Subject", f"{page.banner}. {subject}" if page.banner else subject))
+    for key, should in asked:
+        stands = told.get(key, "")
+        if " ".join(stands.split()) != " ".join(should.split()):
+            inquiry.wrong("forms", name, f"information {key}", "is not that of the document", stands, should)
+    for key, value in told.items():
+        words = "".join(value.split())
+        if not key.endswith("Date") and words not in "".join(html.unescape(pdf.xmp).split()):
+            inquiry.wrong("forms", name, f"information {key}", "does not stand in the metadata", "", value)
+    if pdf.language.lower() != page.language.lower():
+        inquiry.wrong("forms", name, "language", "is not that of the document", pdf.language, page.language)
+    inquiry.looked("forms", 4)
+
+
+MOST = 8
+"""Differences that are told."""
+
+_PAGE = re.compile(r"^/Root/Pages/Kids\[(\d+)\]")
+_NOT_STATED = frozenset({"/ID", "/Prev", "/Size", "/XRefStm", "/Length", "/Filter", "/Parent", "/DecodeParms"})
+
+Part = tuple[str, str, str]
+"""Path, what stands there, what should."""
+
+
+def differing_parts(stands: bytes, should: bytes) -> list[Part]:
+    """The first parts that differ; none where only the writing does.
+
+    Parameters
+    ----------
+    stands, should : two PDFs, of which the second is known to be whole and the first was read before.
+    """
+    from pypdf import PdfReader
+
+    with reading("the PDF"):
+        a, b = (PdfReader(io.BytesIO(content), strict=False).trailer for content in (stands, should))
+        return _Pairs().compared(a, b)
+
+
+class _Pairs:
+    """Both files walked together from their trailers, each pair of objects once."""
+
+    def __init__(self) -> None:
+        self.found: list[Part] = []
+        self._seen: set[tuple[object, object]] = set()
+
+    def compared(self, a: Any, b: Any) -> list[Part]:
+        """Differences in the order in which they are reached."""
+        from pypdf.generic import ArrayObject, DictionaryObject, StreamObject
+
+        waiting: list[tuple[str, Any, Any]] = [("", a, b)]
+        while waiting and len(self.found) < MOST:
+            path, one, other = waiting.pop()
+            key = _reference(one), _reference(other)
+            if all(key):
+                if key in self._seen:
+                    continue
+                self._seen.add(key)
+            one, other = one.get_object(), other.get_object()
+            if isinstance(one, DictionaryObject) and isinstance(other, DictionaryObject):
+                if isinstance(one, StreamObject) and isinstance(other, StreamObject):
+                    self._stream(path, one, other)
+                waiting += reversed(self._keys(path, one, other))
+            elif isinstance(one, ArrayObject) and isinstance(other, ArrayObject):
+                if len(one) != len(other):
+                    self._tell(path, f"{len(one)} parts", f"{len(other)} parts")
+                pairs = zip(list.__iter__(one), list.__iter__(other), strict=False)
+                waiting += reversed([(f"{path}[{i}]", x, y) for i, (x, y) in enumerate(pairs)])
+            elif one != other:
+                self._tell(path, repr(one), repr(other))
+        return self.found
+
+    def _keys(self, path: str, one: Any, other: Any) -> list[tuple[str, Any, Any]]:
+        keys = [key for key in dict.fromkeys((*dict.keys(one), *dict.keys(other))) if key not in _NOT_STATED]
+        for key in keys:
+            if key not in one or key not in other:
+                self._tell(f"{path}{key}", "" if key not in one else "there", "" if key not in other else "there")
+        keys.sort(key=lambda key: key != "/Pages")  # what else leads to a page is told by the page
+        raw = dict.__getitem__
+        return [(f"{path}{key}", raw(one, key), raw(other, key)) for key in keys if key in one and key in other]
+
+    def _stream(self, path: str, one: Any, other: Any) -> None:
+        a, b = one.get_data(), other.get_data()
+        if a != b:
+            at = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+            self._tell(path, *(data[max(0, at - 20) : at + 20].decode("latin-1") for data in (a, b)))
+
+    def _tell(self, path: str, stands: str, should: str) -> None:
+        page = _PAGE.match(path)
+        where = f"page {int(page[1]) + 1}: {path[page.end() :]}" if page else path.removeprefix("/Root")
+        self.found.append((where or "trailer", stands, should))
+
+
+def _reference(one: Any) -> object:
+    return getattr(one, "idnum", None)

@@ -1,0 +1,255 @@
+"""Faults of an artefact by how it was kept, laid and held: its temperature, bending, fixture; and the form of a sphere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+
+import numpy as np
+from scipy import linalg, special
+
+from cmm_uq.base.messages import say
+from cmm_uq.base.points import AXES, Floats, Ints, Points
+from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.machine.physics.effect import CommonSize, Effect, Harmonic, Parameter
+from cmm_uq.machine.physics.effects.own_errors import Owner, OwnFault
+from cmm_uq.maths.geometry.feature import frame_about, upward
+
+KELVIN = Parameter("k", unit("K"), 1.0)
+
+TURNED = "turned_deg"
+"""Column: by how much a sphere was turned about Z against its first set-up."""
+
+_DEGREES = (2, 3, 4, 5)
+"""Of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1."""
+
+
+class ArtefactTemperature(OwnFault):
+    """The artefact was warmer than its recorded or assumed temperature says, in the whole recording.
+
+    What is certified of it too short looks the same.
+    """
+
+    name = "artefact_temperature"
+    title = say("Temperature of the artefact")
+    formula = "e = −cte · k · (place about the middle of the set-up)"
+    points_to = say(
+        "the artefact was warmer or colder than recorded, or its certified length is not right: let it soak, and check its "
+        "thermometer, its coefficient of expansion and its certificate"
+    )
+    coefficients = (KELVIN,)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        return (-self.whose().cte * _about_set_up(points))[:, :, None]
+
+
+class OfSetUps(OwnFault, CommonSize):
+    """A fault with coefficients of its own in each set-up, of one common size."""
+
+    each: tuple[str, ...]
+
+    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+        """See :meth:`OwnFault.sized`: those of each set-up."""
+        (c,) = self.coefficients
+        return tuple(
+            Parameter(f"{name}_{m}_{c.name}", c.unit, owner.size) for m in self.numbered(owner) for name in self.each
+        )
+
+    def numbered(self, owner: Owner) -> Ints:
+        """Numbers of the coefficients: those of the set-ups."""
+        return np.unique(owner.points.measurement)
+
+    def made(self, owner: Owner) -> OwnFault:
+        """See :meth:`OwnFault.made`."""
+        found = copy(self)
+        found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
+        found.size = Parameter(self.size.name, self.size.unit, owner.size)
+        return found
+
+    def shown_in(self, points: Points) -> bool:
+        """See :meth:`Effect.shown_in`: in two set-ups."""
+        return len(np.unique(points.measurement)) > 1
+
+    def by_set_up(self, points: Points, each: Floats) -> Floats:
+        """Columns (n, 3, q·j) of coefficients of every set-up from those (n, 3, j) of a single one."""
+        numbers = np.unique(self.whose().points.measurement)
+        own = (points.measurement[:, None] == numbers).astype(np.float64)
+        return np.asarray(np.einsum("nq,nij->niqj", own, each).reshape(len(points), 3, -1))
+
+
+class SetUpTemperature(OfSetUps):
+    """The artefact had another temperature in each set-up than was recorded."""
+
+    name = "artefact_set_up_temperature"
+    title = say("Temperature of the artefact from set-up to set-up")
+    formula = "e = −cte · k of the set-up · (place about the middle of the set-up)"
+    points_to = say(
+        "the artefact was not at one temperature in all set-ups, or its thermometer did not follow: let it soak after each "
+        "change, and handle it with gloves"
+    )
+    coefficients = (KELVIN,)
+    size = Parameter("rms_k", unit("K"), 1.0)
+    each = ("t",)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        each = self.by_set_up(points, (-self.whose().cte * _about_set_up(points))[:, :, None])
+        return np.asarray(each @ self._contrasts())
+
+    def numbered(self, owner: Owner) -> Ints:
+        """See :meth:`OfSetUps.numbered`: one less, as the mean of all is the artefact's temperature in all of them."""
+        return np.arange(1, len(np.unique(owner.points.measurement)))
+
+    def errors(self, coefficients: Floats) -> Floats:
+        """See :meth:`CommonSize.errors`: temperatures about the mean of all set-ups."""
+        return np.asarray(coefficients @ self._contrasts().T)
+
+    def _contrasts(self) -> Floats:
+        """(q, q − 1) orthonormal, each without a mean (Helmert)."""
+        return np.asarray(linalg.helmert(len(np.unique(self.whose().points.measurement))).T, dtype=np.float64)
+
+
+class ArtefactBending(OwnFault):
+    """A flat artefact bends between its supports by its own weight: most as it lies, not at all where it stands upright."""
+
+    name = "artefact_bending"
+    title = say("Bending of the artefact by its own weight")
+    formula = "e = +um·(n·Z)·(1 − ρ²)·n, n the artefact's normal, ρ the distance from its middle over the largest"
+    points_to = say(
+        "the artefact sags between its supports: support it at the marked points, as it was when it was calibrated"
+    )
+    coefficients = (Parameter("um", unit("µm"), 10.0),)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        normal, across = _flat(self.whose(), points)
+        rho2 = np.sum(across**2, axis=1)
+        return np.asarray((MICROMETRE * (normal[:, 2] * (1 - rho2))[:, None] * normal)[:, :, None])
+
+
+class ArtefactFixture(OfSetUps):
+    """The fixture bends and twists a flat artefact, otherwise in each set-up."""
+
+    name = "artefact_fixture"
+    title = say("Bending of the artefact by its fixture")
+    formula = "e = −(a·u² + b·v² + c·u·v)·n in each set-up, n the normal, u and v the place over the largest distance"
+    points_to = say(
+        "the artefact was bent or twisted when it was clamped: hold it at three points without strain, and set it up again"
+    )
+    coefficients = (Parameter("um", unit("µm"), 5.0),)
+    size = Parameter("rms_um", unit("µm"), 5.0)
+    each = ("u", "v", "uv")
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        normal, across = _flat(self.whose(), points)
+        u, v = across.T
+        bends = np.column_stack([u**2, v**2, u * v])
+        return self.by_set_up(points, -MICROMETRE * normal[:, :, None] * bends[:, None, :])
+
+
+class OwnLobes(OwnFault, Harmonic):
+    """The sphere itself has three lobes, which turn with it."""
+
+    name = "artefact_lobing"
+    title = say("Three lobes of the sphere itself")
+    formula = "e = −A·cos(3θ + φ)·n, θ = atan2(ny, nx) less how far the sphere was turned"
+    points_to = say("the sphere is not round: turn it about its stem and probe it again; what turns with it is its own")
+    amplitude = Parameter("amplitude_um", unit("µm"), 1.0)
+    coefficients = (Parameter("cosine_um", unit("µm"), 1.0), Parameter("sine_um", unit("µm"), 1.0))
+    columns = ("nx", "ny", "nz")
+
+    def belongs_to(self, points: Points) -> bool:
+        """See :meth:`OwnFault.belongs_to`: a sphere has no places."""
+        return self.owner is not None
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
+        self.whose()
+        angle = 3 * (np.arctan2(points.column("ny"), points.column("nx")) - _turned(points))
+        lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
+        return np.asarray(-MICROMETRE * _normals(points)[:, :, None] * lobes[:, None, :])
+
+
+class OwnForm(OwnFault, CommonSize):
+    """The sphere itself is not round: spherical harmonics of the degrees 2 to 5, which turn with it."""
+
+    name = "artefact_form"
+    title = say("Form of the sphere itself")
+    formula = "e = −Σ c_lm·Y_lm(n turned back with the sphere)·n, l = 2 … 5"
+    points_to = say("the sphere's form deviates: turn it about its stem, or take another ball, and probe it again")
+    coefficients = (Parameter("um", unit("µm"), 1.0),)
+    size = Parameter("rms_um", unit("µm"), 1.0)
+    columns = ("nx", "ny", "nz")
+
+    def belongs_to(self, points: Points) -> bool:
+        """See :meth:`OwnFault.belongs_to`: a sphere has no places."""
+        return self.owner is not None
+
+    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+        """See :meth:`OwnFault.sized`: one for every harmonic."""
+        return tuple(
+            Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size)
+            for degree in _DEGREES
+            for order in range(-degree, degree + 1)
+        )
+
+    def errors(self, coefficients: Floats) -> Floats:
+        """See :meth:`CommonSize.errors`: harmonics of mean square one over the sphere; their sum is that of the form."""
+        return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        """See :meth:`Effect.basis`."""
+        self.whose()
+        normals = _normals(points)
+        azimuth = np.arctan2(normals[:, 1], normals[:, 0]) - _turned(points)
+        polar = np.arccos(np.clip(normals[:, 2], -1.0, 1.0))
+        heights = np.column_stack(
+            [_harmonic(l, m, polar, azimuth) for l in _DEGREES for m in range(-l, l + 1)]  # noqa: E741
+        )
+        return -MICROMETRE * normals[:, :, None] * heights[:, None, :]
+
+
+def _harmonic(degree: int, order: int, polar: Floats, azimuth: Floats) -> Floats:
+    """Real spherical harmonic (n,) of mean square one over the sphere."""
+    k = abs(order)
+    legendre = special.lpmv(k, degree, np.cos(polar))
+    log_ratio = special.gammaln(degree - k + 1) - special.gammaln(degree + k + 1)
+    norm = np.sqrt((2 * degree + 1) * (1 if k == 0 else 2) * np.exp(log_ratio))
+    wave = np.cos(k * azimuth) if order >= 0 else np.sin(k * azimuth)
+    return np.asarray(norm * legendre * wave, dtype=np.float64)
+
+
+def _about_set_up(points: Points) -> Floats:
+    """(n, 3) places about the middle of each set-up, mm."""
+    _, index = np.unique(points.measurement, return_inverse=True)
+    index = index.ravel()
+    total = np.zeros((int(index.max()) + 1, 3))
+    np.add.at(total, index, points.xyz)
+    return np.asarray(points.xyz - (total / np.bincount(index)[:, None])[index], dtype=np.float64)
+
+
+def _flat(owner: Owner, points: Points) -> tuple[Floats, Floats]:
+    """Normal (n, 3) of a flat artefact as it lay, and place (n, 2) across it, over the largest distance from its middle."""
+    places = owner.body.about_middle()
+    u, v, normal = frame_about(upward(np.linalg.svd(places, full_matrices=False)[2][2]))
+    poses = owner.body.poses(points)
+    across = (places @ np.column_stack([u, v]))[poses.node] / owner.body.extent
+    return np.asarray(poses.rotation @ normal), np.asarray(across)
+
+
+def _normals(points: Points) -> Floats:
+    return np.column_stack([points.column(f"n{a}") for a in AXES])
+
+
+def _turned(points: Points) -> Floats:
+    """How far the sphere was turned, rad: not at all where nothing says so."""
+    return np.radians(points.columns.get(TURNED, np.zeros(len(points))))
+
+
+TEMPERATURE, SET_UP_TEMPERATURE = ArtefactTemperature(), SetUpTemperature()
+BENDING, FIXTURE = ArtefactBending(), ArtefactFixture()
+LOBES, FORM = OwnLobes(), OwnForm()
+
+EFFECTS: tuple[Effect, ...] = (TEMPERATURE, SET_UP_TEMPERATURE, BENDING, FIXTURE, LOBES, FORM)

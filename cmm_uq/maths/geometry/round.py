@@ -1,0 +1,281 @@
+"""Least-squares circles and spheres, and whether another centre has a narrower ring or shell.
+
+Whether another centre has a narrower ring or shell: a search that leaves out no place where one could be.
+
+With the centre c moved by δ, distances change by at most |δ|, so a box of half width h about c holds no ring narrower than
+that about c less 2·h·√d. Far away a ring is nearly a strip, and no narrower than the points are wide. Next to a ring that is
+held by its contact points it is their multipliers that exclude a narrower one: see :func:`safe_radius`. What is left are
+boxes between, halved until each is excluded, or holds a narrower ring. Whatever some of the points exclude, all of them do,
+so that of many points a sample is looked at.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.maths.geometry.feature import (
+    Feature,
+    centred,
+    checked_points,
+    determined_radius,
+    fit_figures,
+    frame_about,
+    no_line,
+    no_plane,
+    tilted,
+    upward,
+)
+from cmm_uq.maths.geometry.orthogonal_distance import Minimum, minimise, principal
+from cmm_uq.maths.geometry.straight import narrowest
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sphere(Feature):
+    """Least-squares sphere; the covariance is of x, y, z of the centre and r."""
+
+    centre: Floats
+    radius: float
+
+
+def fit_sphere(points: ArrayLike, *, u_point: float | None = None) -> Sphere:
+    """Sphere through at least four points, not all in one plane.
+
+    Parameters
+    ----------
+    points : (n, 3) in mm.
+    u_point : standard uncertainty of a point along the normal, mm; estimated from the residuals when left out.
+
+    Raises
+    ------
+    CmmUqError : too few points, points in one plane, or a cap so small that the radius is not determined.
+    """
+    array = checked_points(points, "sphere", 4)
+    about, centroid, extent = centred(array)
+    no_plane(about, "sphere")
+    found = radial_minimum(about, "sphere")
+    sphere = Sphere(
+        centre=centroid + extent * found.state[:3],
+        radius=float(extent * found.state[3]),
+        **fit_figures(found, extent, ("x", "y", "z", "r"), extent * np.eye(4), u_point, "sphere"),
+    )
+    determined_radius(sphere, sphere.radius, "sphere")
+    return sphere
+
+
+def radial_minimum(about: Floats, what: str) -> Minimum[Floats]:
+    """Centre and radius (d + 1,) for centred points (d, n): circle in a plane (d = 2) or sphere (d = 3)."""
+    dimension, n = about.shape
+
+    def linearise(state: Floats) -> Floats:
+        rows = np.empty((dimension + 2, n))
+        np.subtract(state[:-1, None], about, out=rows[:-2])
+        distance = np.sqrt(np.einsum("ij,ij->j", rows[:-2], rows[:-2]))
+        rows[:-2] /= np.maximum(distance, np.finfo(np.float64).tiny)
+        rows[-2] = -1.0
+        np.subtract(distance, state[-1], out=rows[-1])
+        return rows
+
+    return minimise(_algebraic(about), linearise, np.add, what)
+
+
+def _algebraic(about: Floats) -> Floats:
+    """Start (d + 1,) from |p|² = 2c·p + r² − |c|², linear in c."""
+    squares = np.einsum("ij,ij->j", about, about)
+    centre = 0.5 * np.linalg.lstsq(about @ about.T, about @ squares, rcond=None)[0]
+    return np.append(centre, np.sqrt(squares.mean() + centre @ centre))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Circle(Feature):
+    """Least-squares circle.
+
+    In a plane the covariance is of x, y of the centre and r, and there is no normal. In space it is of x, y, z, the
+    components nx, ny, nz of the unit normal, whose largest is positive, and r; residuals are then (n, 2): radial, and
+    along the normal.
+    """
+
+    centre: Floats
+    radius: float
+    normal: Floats | None
+
+    @property
+    def form_deviation(self) -> float:
+        """Roundness deviation: peak to valley of the radial distances, mm."""
+        radial = self.residuals if self.residuals.ndim == 1 else self.residuals[:, 0]
+        return float(np.ptp(radial))
+
+
+def fit_circle(points: ArrayLike, *, u_point: float | None = None) -> Circle:
+    """Circle through at least three points, not on one line.
+
+    Parameters
+    ----------
+    points : (n, 2), or (n, 3) for a circle in space, mm.
+    u_point : standard uncertainty of a point radially, and in space along the normal, mm; estimated when left out.
+
+    Raises
+    ------
+    CmmUqError : too few points, points on one line, or an arc so short that the radius is not determined.
+    """
+    array = checked_points(points, "circle", 3, (2, 3))
+    about, centroid, extent = centred(array)
+    no_line(about, "circle")
+    circle = (_in_plane if len(about) == 2 else _in_space)(about, centroid, extent, u_point)
+    determined_radius(circle, circle.radius, "circle")
+    return circle
+
+
+def _in_plane(about: Floats, centroid: Floats, extent: float, u_point: float | None) -> Circle:
+    found = radial_minimum(about, "circle")
+    return Circle(
+        centre=centroid + extent * found.state[:2],
+        radius=float(extent * found.state[2]),
+        normal=None,
+        **fit_figures(found, extent, ("x", "y", "r"), extent * np.eye(3), u_point, "circle"),
+    )
+
+
+class _Placed(NamedTuple):
+    """A circle's frame (its normal last), centre and radius."""
+
+    frame: Floats
+    centre: Floats
+    radius: float
+
+
+def _in_space(about: Floats, centroid: Floats, extent: float, u_point: float | None) -> Circle:
+    n = about.shape[1]
+
+    def linearise(state: _Placed) -> Floats:
+        x, y, z = state.frame @ (about - state.centre[:, None])
+        rho = np.hypot(x, y)
+        ex, ey = x / rho, y / rho
+        none = np.zeros(n)
+        # step: centre along u, v, w; tilts of w to u and v; radius. First the radial distances, then those along w
+        radial = [-ex, -ey, none, -z * ex, -z * ey, np.full(n, -1.0), rho - state.radius]
+        axial = [none, none, np.full(n, -1.0), x, y, none, z]
+        return np.hstack([radial, axial])
+
+    def move(state: _Placed, step: Floats) -> _Placed:
+        centre = state.centre + step[:3] @ state.frame
+        return _Placed(tilted(state.frame, step[3], step[4]), centre, float(state.radius + step[5]))
+
+    frame = frame_about(upward(principal(about)[2]))
+    flat = radial_minimum((frame @ about)[:2], "circle")
+    start = _Placed(frame, flat.state[:2] @ frame[:2], float(flat.state[2]))
+    found = minimise(start, linearise, move, "circle")
+    placed = found.state
+    natural = np.zeros((7, 6))
+    natural[:3, :3] = extent * placed.frame.T
+    natural[3:6, 3:5] = placed.frame[:2].T
+    natural[6, 5] = extent
+    return Circle(
+        centre=centroid + extent * placed.centre,
+        radius=float(extent * placed.radius),
+        normal=placed.frame[2],
+        **fit_figures(found, extent, ("x", "y", "z", "nx", "ny", "nz", "r"), natural, u_point, "circle", 2),
+    )
+
+
+MOST_BOXES = 200_000
+SAMPLE = 100
+
+
+def safe_radius(gradients: Floats, nearest: float) -> float:
+    """Distance from the centre within which no other has a narrower ring, mm.
+
+    Some contact's distance, linearised, rises by κ times the move at least, κ being the distance from zero to the surface
+    of the hull of the contacts' gradients; against their curvature, below 1/(nearest − δ), that suffices up to
+    δ = 2κ·(nearest − δ).
+
+    Parameters
+    ----------
+    gradients : (p, d + 1) of the contacts with respect to centre and mean radius, signed as they hold the zone.
+    nearest : distance of the nearest point from the centre, mm.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(gradients) <= gradients.shape[1]:
+        return 0.0
+    try:
+        kappa = -float(ConvexHull(gradients).equations[:, -1].max())
+    except QhullError:
+        return 0.0
+    return 2 * kappa * nearest / (1 + 2 * kappa) if kappa > 0 else 0.0
+
+
+def narrower(
+    points: Floats, width: float, centre: Floats, safe: float, contacts: Ints | None = None
+) -> tuple[bool, Floats | None]:
+    """Whether the search came to an end, and a centre (d,) with a ring narrower than ``width``, mm, if there is one.
+
+    Parameters
+    ----------
+    points : (n, d).
+    centre : (d,) of the ring found, within ``safe`` of which there is no narrower one.
+    contacts : rows of the points that hold it.
+    """
+    sample = points[:: len(points) // SAMPLE + 1]
+    if contacts is not None:
+        sample = np.concatenate([sample, points[contacts]])
+    middle = points.mean(axis=0)
+    largest = float(np.linalg.norm(points - middle, axis=1).max())
+    strip = narrowest(sample)[1]
+    if strip <= width * (1 + 1e-9):
+        return False, None
+    reach = largest + largest**2 / (strip - width)
+    d = points.shape[1]
+    boxes, half, seen = middle[None], reach, 0
+    corners = np.array(list(product((-0.5, 0.5), repeat=d)))
+    smaller = width - 1e-12 * largest
+    while len(boxes):
+        seen += len(boxes)
+        if seen > MOST_BOXES:
+            return False, None
+        widths = _ring_widths(sample, boxes)
+        best = int(np.argmin(widths))
+        if widths[best] < smaller and _ring_widths(points, boxes[best : best + 1])[0] < smaller:
+            return True, boxes[best]
+        diagonal = half * np.sqrt(d)
+        open_ = (widths - 2 * diagonal < smaller) & (np.linalg.norm(boxes - centre, axis=1) + diagonal > safe)
+        boxes = (boxes[open_, None] + half * corners).reshape(-1, d)
+        half /= 2
+    return True, None
+
+
+def _ring_widths(points: Floats, centres: Floats) -> Floats:
+    parts = np.array_split(centres, len(centres) * len(points) // 1_000_000 + 1)
+    return np.concatenate([np.ptp(np.linalg.norm(points - part[:, None], axis=2), axis=1) for part in parts])
+
+
+def largest_empty(points: Floats) -> tuple[Floats, float] | None:
+    """Centre (d,) and radius of the largest circle or sphere that holds none of the points (n, d) and is held by them.
+
+    Its centre is a corner of the Voronoi diagram, inside the triangle or tetrahedron of the points that it touches; all of
+    those are looked at. None where the points surround no such centre.
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    try:
+        simplices = np.asarray(Delaunay(points).simplices)
+    except QhullError:
+        return None
+    corners = points[simplices]
+    edges = corners[:, 1:] - corners[:, :1]
+    regular = np.abs(np.linalg.det(edges)) > 1e-14 * np.linalg.norm(edges, axis=2).prod(axis=1)
+    corners, edges = corners[regular], edges[regular]
+    squares = 0.5 * np.einsum("sij,sij->si", edges, edges)
+    offset = np.linalg.solve(edges, squares[:, :, None])[:, :, 0]
+    share = np.linalg.solve(edges.transpose(0, 2, 1), offset[:, :, None])[:, :, 0]
+    surrounded = (share >= -1e-9).all(axis=1) & (share.sum(axis=1) <= 1 + 1e-9)
+    if not surrounded.any():
+        return None
+    radii = np.where(surrounded, np.linalg.norm(offset, axis=1), -1.0)
+    best = int(np.argmax(radii))
+    return corners[best, 0] + offset[best], float(radii[best])

@@ -1,0 +1,344 @@
+"""Budgets of measurements: ballbar, triangle, sphere, lengths and temperature.
+
+Length of a ballbar from one position of it: the budget of Harris 2004 as printed, and one that holds.
+
+Harris 2004 (sections 6.2.3 and 6.4.1) adds the digitizer's specification and the rms residual of the sphere fit as
+standard uncertainties of a centre, and worst-case scale errors as standard uncertainties of the length. A fit to
+thousands of points leaves far less scatter in the centre, limits are not standard uncertainties, and what all positions
+share does not average out. :func:`ballbar_length` keeps these apart.
+
+Centre and radius of a fitted sphere: what the scatter of the points leaves open, and what the ball's form adds.
+
+The covariance of a least-squares fit is σ²(JᵀJ)⁻¹ and shrinks with the number of points. The form of the ball does not:
+seen from the same side it moves the centre in the same way every time. It is a line of its own.
+
+Lengths and temperature: standardisation to 20 °C, and the error of a scale against a reference.
+
+Near 20 °C the product of expansion coefficient and temperature is flat in one or the other, so that first order loses
+what second order or Monte Carlo keeps (JCGM 100:2008 H.1.7): evaluate these models with method ``auto``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.messages import Text, Verbatim, foreign, say
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE, unit
+from cmm_uq.maths.uncertainty.budget import (
+    CERTIFICATE,
+    JUDGEMENT,
+    REPEATS,
+    SPECIFICATION,
+    Budget,
+    Labels,
+    Line,
+    joint_line,
+)
+from cmm_uq.maths.uncertainty.correlation import Correlations
+from cmm_uq.maths.uncertainty.distributions import Distribution, constant
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+
+
+@dataclass(frozen=True, eq=False)
+class BallbarPosition:
+    """One position of a ballbar.
+
+    Parameters
+    ----------
+    length_mm : distance of the centres.
+    direction : (3,) unit vector along the bar.
+    centre_covariance_mm2 : (3, 3) of one fitted centre, from the scatter of its points.
+    form_shift_mm : how far, at most, a ball's form moves its centre along the bar.
+    probe_mm : limits of what the probing system may shift a ball by, systematically.
+    probe_common : correlation of that shift between the two balls; one when both are seen the same way.
+    scale_mm : (3,) limits of the scale errors of x, y, z over the bar's full length.
+    u_squareness_rad : (3,) standard uncertainties of the squarenesses xy, yz, zx.
+    u_temperature_k, cte_per_k : of the bar, where its length at 20 °C is asked for.
+    """
+
+    length_mm: float
+    direction: Floats
+    centre_covariance_mm2: Floats
+    form_shift_mm: float = 0.0
+    probe_mm: float = 0.0
+    probe_common: float = 0.0
+    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)
+    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)
+    u_temperature_k: float = 0.0
+    cte_per_k: float = 0.0
+    origins: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if abs(np.linalg.norm(self.direction) - 1) > 1e-6:
+            raise CmmUqError("the bar's direction is no unit vector", fix="Divide it by its length")
+
+
+def ballbar_length(position: BallbarPosition) -> Budget:
+    """Budget of the length from one position, mm.
+
+    A limit a enters as a rectangular distribution, u = a/√3. Along a bar of direction w the scales contribute wᵢ² of
+    their error over the full length, the squarenesses wᵢwⱼ of theirs times the length.
+    """
+    w, length = np.asarray(position.direction), position.length_mm
+    scatter = float(w @ position.centre_covariance_mm2 @ w)
+    lines = [
+        Line(say("scatter of the points, ball {ball}", ball=ball), sqrt(scatter), REPEATS, unit=unit("mm"))
+        for ball in (1, 2)
+    ]
+    lines += [_limit(say("form of ball {ball}", ball=ball), position.form_shift_mm, CERTIFICATE) for ball in (1, 2)]
+    lines += [
+        _limit(say("probing system at ball {ball}", ball=ball), position.probe_mm, SPECIFICATION) for ball in (1, 2)
+    ]
+    if position.probe_mm and position.probe_common:
+        # the length is a difference, so what shifts both balls alike cancels
+        shared = -2 * position.probe_common * position.probe_mm**2 / 3
+        both = joint_line(say("both balls shifted alike by the probing system"), shared)
+        lines.append(replace(both, shared=True))
+    lines += [
+        _limit(say("scale {axis}", axis=Verbatim(axis)), position.scale_mm[k], CERTIFICATE, float(w[k] ** 2))
+        for k, axis in enumerate("xyz")
+    ]
+    for name, (i, j), u in zip(("xy", "yz", "zx"), ((0, 1), (1, 2), (2, 0)), position.u_squareness_rad, strict=True):
+        slope = float(abs(w[i] * w[j])) * length
+        lines.append(
+            Line(
+                say("squareness {name}", name=Verbatim(name)),
+                u,
+                CERTIFICATE,
+                unit=unit("rad"),
+                sensitivity=slope,
+                shared=True,
+            )
+        )
+    warm, slope = position.u_temperature_k, position.cte_per_k * length
+    lines.append(Line(say("temperature of the bar"), warm, JUDGEMENT, unit=unit("K"), sensitivity=slope, shared=True))
+    told = [replace(line, origin=foreign(position.origins.get(line.name, line.origin))) for line in lines if line.part]
+    return Budget(say("length of the ballbar, one position"), told, length, unit("mm"))
+
+
+def _limit(name: Text, limit_mm: float, origin: Text, sensitivity: float = 1.0) -> Line:
+    u = limit_mm / sqrt(3)
+    return Line(name, u, origin, 0.0, unit("mm"), "rectangular", sensitivity=sensitivity, shared=True)
+
+
+def harris_compensated() -> Budget:
+    """Harris 2004 section 6.2.3: one length from compensated points, as printed (± 20 µm, 19 before rounding)."""
+    centre = Budget(
+        say("centre of a sphere"),
+        [
+            Line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
+            Line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
+        ],
+        unit=unit("mm"),
+    )
+    return Budget(
+        say("length of the ballbar, as printed in Harris 2004 section 6.2.3"),
+        [centre.as_line(say("centre of ball 1")), centre.as_line(say("centre of ball 2"))],
+        unit=unit("mm"),
+        statement=_PRINTED,
+    )
+
+
+def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budget:
+    """Harris 2004 section 6.4.1: one length from uncompensated points, as printed.
+
+    Parameters
+    ----------
+    scale_um : (3,) largest scale errors of x, y, z; those of 20 °C, or (21, 30, 12) at 25 °C and (26, 38, 20) at 30 °C.
+    """
+    return Budget(
+        say("length of the ballbar, as printed in Harris 2004 section 6.4.1"),
+        [
+            Line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
+            Line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
+            *(
+                Line(
+                    say("largest scale error of {axis}", axis=Verbatim(axis)),
+                    limit * MICROMETRE,
+                    say("error map"),
+                    unit=unit("mm"),
+                )
+                for axis, limit in zip("xyz", scale_um, strict=True)
+            ),
+        ],
+        unit=unit("mm"),
+        statement=_PRINTED,
+    )
+
+
+_PRINTED = say(
+    "As printed. It takes a specification and largest errors for standard uncertainties, the rms "
+    "residual of a fit to thousands of points for the uncertainty of its centre, counts one ball "
+    "of the two in section 6.4.1, and divides what all positions share by the root of their "
+    "number."
+)
+
+
+def triangle_angles(
+    a_mm: Distribution, b_mm: Distribution, c_mm: Distribution, correlation: Correlations | None = None
+) -> MeasurementModel:
+    """Angles alpha, beta, gamma (rad) opposite to the sides a, b, c.
+
+    Parameters
+    ----------
+    correlation : of sides that share a part, such as the cylinder at a corner: pairs of ``a_mm``, ``b_mm``, ``c_mm``.
+
+    Raises
+    ------
+    CmmUqError : the sides do not close to a triangle.
+    """
+    longest, *others = sorted((np.asarray(side.mean) for side in (a_mm, b_mm, c_mm)), key=np.max, reverse=True)
+    if np.any(longest >= others[0] + others[1]):
+        raise CmmUqError(
+            f"sides of {np.max(longest):g} mm and {np.max(others[0]):g} + {np.max(others[1]):g} mm close to no triangle",
+            fix="Check which side is which",
+        )
+
+    def angles(a_mm: Any, b_mm: Any, c_mm: Any) -> dict[str, Any]:
+        def opposite(side: Any, p: Any, q: Any) -> Any:
+            return np.arccos((p * p + q * q - side * side) / (2.0 * p * q))
+
+        return {
+            "alpha": opposite(a_mm, b_mm, c_mm),
+            "beta": opposite(b_mm, c_mm, a_mm),
+            "gamma": opposite(c_mm, a_mm, b_mm),
+        }
+
+    inputs = {"a_mm": a_mm, "b_mm": b_mm, "c_mm": c_mm}
+    return MeasurementModel(angles, inputs, ("alpha", "beta", "gamma"), correlation or {})
+
+
+PARAMETERS = ("x", "y", "z", "radius")
+
+
+def sphere_covariance(directions: Floats, u_point_mm: float) -> Floats:
+    """Covariance (4, 4) of centre and radius from points in the given directions, mm².
+
+    Parameters
+    ----------
+    directions : (n, 3) unit vectors from the centre to the points, n ≥ 4.
+    u_point_mm : standard uncertainty of one point along its direction, mm.
+
+    Raises
+    ------
+    CmmUqError : the points do not determine a sphere (fewer than four, or all on one circle).
+    """
+    jacobian = -np.column_stack([directions, np.ones(len(directions))])
+    singular = np.linalg.svd(jacobian, compute_uv=False)
+    if len(directions) < 4 or singular[-1] < 1e-9 * singular[0]:
+        raise CmmUqError("the points do not determine a sphere", fix="Probe four or more that are not on one circle")
+    _, r = np.linalg.qr(jacobian)
+    inverse = np.linalg.inv(r)
+    return np.asarray(u_point_mm**2 * inverse @ inverse.T)
+
+
+def sphere_budgets(
+    estimate_mm: Sequence[float] | Floats,
+    covariance_mm2: Floats,
+    form_shift_mm: Sequence[float] | Floats,
+    *,
+    dof: float = inf,
+    form_origin: Text = say("certificate of the ball"),
+    further: Sequence[Line] = (),
+) -> dict[str, Budget]:
+    """Budgets of x, y, z and radius.
+
+    Parameters
+    ----------
+    estimate_mm : (4,) centre and radius.
+    covariance_mm2 : (4, 4) of the fit.
+    form_shift_mm : (4,) how far, at most, the form of the ball can move each of them.
+    dof : degrees of freedom of the covariance (points minus four where σ comes from the residuals).
+    further : lines that all four share, such as a probe or a scale.
+    """
+    budgets = {}
+    for k, name in enumerate(PARAMETERS):
+        variance = float(np.asarray(covariance_mm2)[k, k])
+        if not variance > 0:
+            raise CmmUqError(f"a variance of {variance} mm² of {name}", fix="Give the covariance matrix of the fit")
+        lines = [Line(say("scatter of the points"), sqrt(variance), REPEATS, unit=unit("mm"), dof=dof)]
+        shift = float(form_shift_mm[k])
+        if shift:
+            lines.append(Line(say("form of the ball"), shift / sqrt(3), form_origin, 0.0, unit("mm"), "rectangular"))
+        budgets[name] = Budget(Verbatim(name), [*lines, *further], float(estimate_mm[k]), unit("mm"))
+    return budgets
+
+
+UNITS: Mapping[str, str] = {
+    "indicated_mm": "mm",
+    "reference_mm": "mm",
+    "workpiece_c": "degC",
+    "workpiece_cte_per_k": "1/K",
+    "scale_c": "degC",
+    "scale_cte_per_k": "1/K",
+    "length": "mm",
+    "scale_error": "1",
+}
+
+
+def labels(origins: Mapping[str, str] | None = None) -> Labels:
+    """Units of both models' quantities, and the origins given."""
+    return Labels(UNITS, origins or {})
+
+
+def _stretch(cte_per_k: Any, temperature_c: Any) -> Any:
+    return 1.0 + cte_per_k * (temperature_c - REFERENCE_TEMPERATURE)
+
+
+def length_at_20(
+    indicated_mm: Distribution,
+    workpiece_c: Distribution,
+    workpiece_cte_per_k: Distribution,
+    scale_c: Distribution | None = None,
+    scale_cte_per_k: Distribution | None = None,
+    correlation: Correlations | None = None,
+) -> MeasurementModel:
+    """Length at 20 °C (ISO 1) of a workpiece measured warm by a scale that may be warm too.
+
+    Parameters
+    ----------
+    scale_c, scale_cte_per_k : of the scale; left out where the machine compensates its scales.
+    correlation : such as that of the two temperatures, which one thermometer may have measured.
+    """
+    inputs = {
+        "indicated_mm": indicated_mm,
+        "workpiece_c": workpiece_c,
+        "workpiece_cte_per_k": workpiece_cte_per_k,
+        "scale_c": scale_c or constant(REFERENCE_TEMPERATURE),
+        "scale_cte_per_k": scale_cte_per_k or constant(0.0),
+    }
+
+    def length(
+        indicated_mm: Any, workpiece_c: Any, workpiece_cte_per_k: Any, scale_c: Any, scale_cte_per_k: Any
+    ) -> Any:
+        return indicated_mm * _stretch(scale_cte_per_k, scale_c) / _stretch(workpiece_cte_per_k, workpiece_c)
+
+    return MeasurementModel(length, inputs, ("length",), correlation or {})
+
+
+def scale_error(
+    indicated_mm: Distribution,
+    reference_mm: Distribution,
+    workpiece_c: Distribution,
+    workpiece_cte_per_k: Distribution,
+    correlation: Correlations | None = None,
+) -> MeasurementModel:
+    """Relative scale error s, true = indicated · (1 + s), from a reference length calibrated at 20 °C."""
+    inputs = {
+        "indicated_mm": indicated_mm,
+        "reference_mm": reference_mm,
+        "workpiece_c": workpiece_c,
+        "workpiece_cte_per_k": workpiece_cte_per_k,
+    }
+
+    def error(indicated_mm: Any, reference_mm: Any, workpiece_c: Any, workpiece_cte_per_k: Any) -> Any:
+        return reference_mm * _stretch(workpiece_cte_per_k, workpiece_c) / indicated_mm - 1.0
+
+    return MeasurementModel(error, inputs, ("scale_error",), correlation or {})

@@ -1,0 +1,234 @@
+"""Ready measurement models and budgets, called by name in a TOML file.
+
+Ready measurement models of a model file: ``[model] ready = "length_at_20"`` in place of outputs.
+
+The inputs of the file are those of the model, by their names; what is said of each, and of their correlations, stays the
+file's.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from inspect import Parameter, signature
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from pydantic import create_model
+
+from cmm_uq.base.errors import CmmUqError, suggestion
+from cmm_uq.base.files.table import Table
+from cmm_uq.base.files.toml_file import checked
+from cmm_uq.base.messages import Text, Verbatim, number, say
+from cmm_uq.maths.uncertainty.air.interferometer import Interferometer, interferometer_model
+from cmm_uq.maths.uncertainty.air.state import Air
+from cmm_uq.maths.uncertainty.budget import Budget, Labels
+from cmm_uq.maths.uncertainty.budgets.measurements import labels as temperature_labels
+from cmm_uq.maths.uncertainty.budgets.measurements import length_at_20, scale_error, triangle_angles
+from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable
+from cmm_uq.maths.uncertainty.choice import Ways
+from cmm_uq.maths.uncertainty.correlation import Correlations
+from cmm_uq.maths.uncertainty.distributions import Distribution
+from cmm_uq.maths.uncertainty.evaluation import Evaluation, Request, Stated
+from cmm_uq.maths.uncertainty.expression import Expression
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+
+Built = tuple[MeasurementModel, Labels]
+
+
+@dataclass(frozen=True)
+class ReadyModel:
+    """A model by its name.
+
+    Parameters
+    ----------
+    title : what it gives, in words.
+    inputs : names, and whether each is needed.
+    build : of the inputs and the correlations: the model, and units and origins of its quantities.
+    """
+
+    title: Text
+    inputs: Mapping[str, bool]
+    build: Callable[[Mapping[str, Distribution], Correlations], Built]
+
+    def of(self, given: Mapping[str, Distribution], correlation: Correlations) -> Built:
+        """The model of these inputs.
+
+        Raises
+        ------
+        CmmUqError : an input is missing, or not one of its.
+        """
+        for name in given:
+            if name not in self.inputs:
+                raise CmmUqError(f"{name!r} is no input of this model", fix=suggestion(name, self.inputs))
+        for name, needed in self.inputs.items():
+            if needed and name not in given:
+                raise CmmUqError(f"the input {name!r} is missing", fix=f"Describe it in a table [inputs.{name}]")
+        return self.build(given, correlation)
+
+
+def _by(function: Callable[..., MeasurementModel], found: Labels) -> Callable[..., Built]:
+    return lambda given, correlation: (function(**given, correlation=dict(correlation)), found)
+
+
+def _of_signature(function: Callable[..., MeasurementModel]) -> dict[str, bool]:
+    return {
+        name: parameter.default is Parameter.empty
+        for name, parameter in signature(function).parameters.items()
+        if name != "correlation"
+    }
+
+
+def _interferometer(given: Mapping[str, Distribution], correlation: Correlations) -> Built:
+    of_air = {field.name for field in fields(Air)}
+    air = Air(**{name: known for name, known in given.items() if name in of_air})  # type: ignore[arg-type]
+    own = {name: known for name, known in given.items() if name not in of_air}
+    setup = Interferometer(own.pop("vacuum_mm"), air, **own)  # type: ignore[arg-type]
+    model = interferometer_model(setup)
+    return MeasurementModel(model.function, model.inputs, model.outputs, dict(correlation)), setup.labels
+
+
+_INTERFEROMETER = {
+    "vacuum_mm": True, "temperature_c": True, "pressure_pa": False, "humidity_pct": False, "dew_point_c": False,
+    "co2_ppm": False, "wavelength_nm": False, "dead_path_mm": False, "zero_refractivity": False, "angle_rad": False,
+    "material_c": False, "cte_per_k": False,
+}  # fmt: skip
+
+_ANGLES = Labels({"a_mm": "mm", "b_mm": "mm", "c_mm": "mm", "alpha": "rad", "beta": "rad", "gamma": "rad"})
+
+READY: Mapping[str, ReadyModel] = MappingProxyType({
+    "length_at_20": ReadyModel(
+        say("Length at 20 °C"), _of_signature(length_at_20), _by(length_at_20, temperature_labels())
+    ),
+    "scale_error": ReadyModel(
+        say("Relative error of a scale"), _of_signature(scale_error), _by(scale_error, temperature_labels())
+    ),
+    "triangle_angles": ReadyModel(
+        say("Angles of a triangle from its sides"), _of_signature(triangle_angles), _by(triangle_angles, _ANGLES)
+    ),
+    "interferometer": ReadyModel(say("Length by laser interferometer"), _INTERFEROMETER, _interferometer),
+})  # fmt: skip
+"""By name."""
+
+
+def ready_model(
+    model: Mapping[str, Any], inputs: Mapping[str, Distribution], units: Mapping[str, str], correlation: Correlations
+) -> Built:
+    """The ready model that ``[model]`` of a file names.
+
+    Parameters
+    ----------
+    model : ``[model]``.
+    inputs, units : of the file, by name; a unit may be left out.
+    correlation : of the inputs.
+
+    Raises
+    ------
+    CmmUqError : there is no such model, the inputs are not its, or ``[model]`` has outputs as well.
+    """
+    for key in ("outputs", "units"):
+        if key in model:
+            raise CmmUqError(
+                f"{key} is given, and the ready model has its own", where="[model] ready", fix="Leave one of them out"
+            )
+    name = model["ready"]
+    if not isinstance(name, str) or name not in READY:
+        raise CmmUqError(f"there is no ready model {name!r}", where="[model] ready", fix=suggestion(str(name), READY))
+    whole, labels = READY[name].of(inputs, correlation)
+    for key, unit in units.items():
+        if unit and unit != labels.units[key]:
+            raise CmmUqError(
+                f"{key} is taken in {labels.units[key]}", where=f"[inputs.{key}] unit",
+                fix=f"Give it in {labels.units[key]}, or leave the unit out",
+            )  # fmt: skip
+    return whole, labels
+
+
+KEY = "budget"
+
+
+class _BudgetFile(Table):
+    budget: BudgetTable
+
+
+@dataclass(frozen=True, eq=False)
+class ReadyBudget:
+    """What a file with a ready budget says.
+
+    Parameters
+    ----------
+    title : of the page.
+    table : the method and its figures.
+    content : the file's bytes.
+    expressions : none; the method is the model.
+    how : it is evaluated.
+    """
+
+    title: str
+    table: BudgetTable
+    content: bytes
+    expressions: Mapping[str, Expression] = field(default_factory=dict)
+
+    @property
+    def how(self) -> Text:
+        """In words, to follow "Evaluated"."""
+        return say("by the ready budget '{method}'", method=Verbatim(getattr(self.table, "method", "")))
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file's bytes."""
+        return hashlib.sha256(self.content).hexdigest()
+
+    @property
+    def descriptions(self) -> Mapping[str, Text]:
+        """The method, and further figures that it asks for."""
+        told: dict[str, Text] = {say("Method"): self.table.meaning}
+        return told | {Verbatim(name): number(value, ".6g") for name, value in self.table.remarks().items()}
+
+    def evaluate(self, seed: int | None = None) -> Evaluation:
+        """Its budgets as results; nothing in them is random, so a seed changes nothing.
+
+        Raises
+        ------
+        CmmUqError : the method refuses the figures.
+        """
+        budgets = self.table.budgets()
+        stated = {name: _stated(budget) for name, budget in budgets.items()}
+        coverage = {budget.coverage for budget in budgets.values()}
+        return Evaluation(Request("first", max(coverage), seed=seed or 0), stated, self.table.correlation(), Ways())
+
+    def further(self) -> dict[str, Any]:
+        """Keys of results.json beside those of every budget."""
+        return {"ready": getattr(self.table, "method", ""), **self.table.remarks()}
+
+
+def _stated(budget: Budget) -> Stated:
+    value, U = budget.value or 0.0, budget.expanded
+    reason = (
+        say("U = k u with k = 2, which the standard prescribes")
+        if budget.factor is not None
+        else say("U = k u with k from the effective degrees of freedom")
+    )
+    return Stated("first", reason, value, budget.u, budget.dof, (value - U, value + U), budget.k, budget)
+
+
+def read_ready_budget(content: bytes, path: Path) -> ReadyBudget:
+    """Read and check a file with a ready budget.
+
+    Raises
+    ------
+    CmmUqError : an unknown method, or a key that is unknown, missing or of the wrong kind; with its line.
+    """
+    found = checked(content, path, lambda data: _file_of(data, path))
+    return ReadyBudget(found.budget.title or path.stem, found.budget, content)
+
+
+def _file_of(data: dict[str, Any], path: Path) -> type[_BudgetFile]:
+    table = data[KEY]
+    method = str(table.get("method", "")) if isinstance(table, dict) else ""
+    if method not in TABLES:
+        said = f"there is no ready budget {method!r}" if method else "is missing"
+        raise CmmUqError(said, where=f"{path}: [{KEY}] method", fix=suggestion(method, TABLES))
+    return create_model("BudgetFile", __base__=_BudgetFile, budget=(TABLES[method], ...))
