@@ -1,4 +1,11 @@
-"""Concealed effects are found, innocent ones are not blamed, noise is called noise."""
+"""Concealed effects are found, innocent ones are not blamed, noise is called noise.
+
+Squarenesses of hundreds of seconds that a job leaves out are found by themselves: their squares are no further effects.
+
+Figures without noise, and a recording compared with itself, are consistent: their last digits say nothing.
+
+A machine that is out of adjustment, and a job that names nothing of it.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +15,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from benchmarks.told_nothing import case
 from cmm_uq.analysis.diagnosis.comparison.search import model_comparison
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.analysis.diagnosis.held_out import improvement
 from cmm_uq.app.commands.diagnose import diagnose_job
+from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
+from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.observe import Ballbar
+from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Floats, Machine, Points
+from cmm_uq.jobs.earlier import against_earlier
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
+from tests.artefacts.constructions import indicated, plate
 from tests.conftest import ROOT
+from tests.machine.model.test_leaning_axes import LENGTH, recorded
 from tests.recordings import TRAVEL, bar_facts, bars, suggested, with_columns
 
 SIX = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
@@ -202,3 +216,59 @@ def test_a_known_mechanism_of_another_form_is_named_in_part() -> None:
     found = diagnosed(recording({}, Noise(1e-3), error=error))
     assert found.verdict == "partial"
     assert [item.effect for item in found.effects] == ["straightness_x_y"]
+
+
+SCALES = ("scale_x", "scale_y", "scale_z")
+
+
+@pytest.mark.parametrize(
+    ("truth", "named"),
+    [([0, 0, 0, 600, 600, 600], ()), ([0, 0, 0, 1500, -1500, 900], SCALES)],
+    ids=["600 arcsec each", "1500 arcsec and scales named"],
+)
+def test_nothing_but_the_squarenesses_is_found(truth: list[float], named: tuple[str, ...]) -> None:
+    """To first order Z would be 8.5 ppm short at 600″, and bars and guideways would be blamed for products of angles."""
+    points = recorded(np.array(truth, dtype=np.float64), sigma=1e-3, seed=1, count=40)
+    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(named), None)
+    found = diagnose(model, stated_um=1.0, alpha=0.01, seed=0)
+    assert found.verdict == "explained"
+    assert {e.effect for e in found.effects} == {"squareness_xy", "squareness_yz", "squareness_zx"}
+    for effect, angle in zip(("squareness_xy", "squareness_yz", "squareness_zx"), truth[3:], strict=True):
+        quantity = next(e for e in found.effects if e.effect == effect).parameters["angle_arcsec"]
+        assert abs(quantity.value - angle) < 4 * quantity.u
+        assert quantity.u < 1
+
+
+FACTS = artefact_facts(kind="plate")
+PLACES = ((0, 0, 0),)
+
+
+def exact() -> Points:
+    """Nine balls as a perfect machine indicates them."""
+    points = plate(PLACES, side=3)
+    whole = np.round(points.xyz, 5)
+    return points.at(whole)
+
+
+def noisy() -> Points:
+    points = plate(PLACES, side=3)
+    xyz = np.round(indicated(FACTS, points, ["scale_x"], [12.0], sigma=2e-3).xyz, 5)
+    return Points(xyz, points.measurement, points.point, points.repeat, points.machine, {}, points.lines)
+
+
+@pytest.mark.parametrize("points", [exact(), against_earlier(noisy(), noisy(), 0.0, "now.csv")], ids=["exact", "copy"])
+def test_they_are_consistent_without_an_outlier(points: Points) -> None:
+    model, outliers = without_outliers(MeasurementModel(Plate(FACTS, points), effects(("scale_x", "scale_y"))))
+    assert not outliers
+    found = diagnose(model, stated_um=None, alpha=0.01, seed=0)
+    assert found.verdict == "consistent"
+    assert found.p_value > 0.5
+    assert not found.remaining.rivals
+
+
+def test_a_gauge_on_seven_lines_shows_a_machine_out_of_adjustment_and_not_its_own_temperature() -> None:
+    """Drawn by equations written apart from the package: one effect with six coefficients would explain as much."""
+    hidden, named, verdict = case(13, of_gauge=True)
+    assert len(hidden) == 6
+    assert {name for name, _ in named} == set(hidden)
+    assert verdict == "explained"

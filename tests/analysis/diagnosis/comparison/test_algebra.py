@@ -1,4 +1,7 @@
-"""Quick sums, tables and eigenvalues are those of numpy and scipy."""
+"""Quick sums, tables and eigenvalues are those of numpy and scipy.
+
+The precision of what the baseline leaves, against the inverse of its dense covariance.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,11 @@ from cmm_uq.analysis.diagnosis.comparison.algebra import (
     interpolated,
     log_sum,
     log_sum_of_powers,
+    precisions,
     squared,
     woodbury,
 )
+from tests.analysis.diagnosis.dense_noise import covariance, some_kinds
 
 
 def test_a_table_with_equal_steps_is_read_as_numpy_reads_any() -> None:
@@ -88,3 +93,24 @@ def test_what_is_given_and_takes_the_columns_themselves_leaves_no_digits() -> No
 def test_rows_have_their_own_inner_products(r: int) -> None:
     rows = np.random.default_rng(7).standard_normal((4, 30, r, 3))
     np.testing.assert_allclose(squared(rows), np.einsum("kmig,kmjg->kmij", rows, rows), rtol=1e-12, atol=1e-14)
+
+
+ROWS = 14
+
+
+def test_the_precision_is_the_inverse_of_the_covariance_of_what_is_left() -> None:
+    random = np.random.default_rng(2)
+    reached = np.linalg.qr(random.standard_normal((ROWS, 3)))[0]
+    certified = random.standard_normal((ROWS, 2))
+    free = np.linalg.qr(np.hstack([reached, random.standard_normal((ROWS, ROWS - 3))]))[0][:, 3:]
+    columns = random.standard_normal((ROWS, 4))
+    found = []
+    for kind, precision in zip(
+        some_kinds(np.full(ROWS, 1.4)), precisions(some_kinds(np.full(ROWS, 1.4)), reached, certified), strict=True
+    ):
+        inside = free.T @ (covariance(kind) + certified @ certified.T) @ free
+        np.testing.assert_allclose(
+            precision(columns), free @ np.linalg.solve(inside, free.T @ columns), rtol=1e-8, atol=1e-9
+        )
+        found.append(precision.log + 0.5 * np.linalg.slogdet(inside)[1] - np.log(kind.probability) - kind.log_factor)
+    np.testing.assert_allclose(found, 0.0, atol=1e-9)
