@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,7 @@ import pytest
 from benchmarks.coverage import study
 from benchmarks.coverage.cells import Cell
 from benchmarks.coverage.measuring import kept, measured
-from benchmarks.coverage.page import page
-from benchmarks.coverage.power import counts
-from benchmarks.coverage.tally import Count, holds, pooled, tallies, wider
-from tests.conftest import ROOT
+from benchmarks.coverage.tally import Count, holds, pooled, tallies
 
 
 def record(
@@ -32,17 +28,6 @@ def test_an_interval_that_was_never_hit_is_that_of_clopper_and_pearson() -> None
     """Closed form: of 0 of n, the upper end is 1 − (α/2)^(1/n); of n of n, the lower end (α/2)^(1/n)."""
     assert Count(0, 200).interval == pytest.approx((0, 100 * (1 - 0.0005 ** (1 / 200))), rel=1e-12)
     assert Count(200, 200).interval == pytest.approx((100 * 0.0005 ** (1 / 200), 100), rel=1e-12)
-
-
-@pytest.mark.parametrize(("hits", "of"), [(188, 200), (1, 30), (29, 30)])
-def test_the_ends_of_an_interval_leave_a_two_thousandth_of_the_binomial_distribution(hits: int, of: int) -> None:
-    low, high = (end / 100 for end in Count(hits, of).interval)
-
-    def sum_of(p: float, counts: range) -> float:
-        return sum(math.comb(of, k) * p**k * (1 - p) ** (of - k) for k in counts)
-
-    assert sum_of(low, range(hits, of + 1)) == pytest.approx(5e-4, rel=1e-9)
-    assert sum_of(high, range(hits + 1)) == pytest.approx(5e-4, rel=1e-9)
 
 
 def test_a_phase_holds_also_a_turn_further() -> None:
@@ -77,14 +62,6 @@ def test_cells_of_a_kind_are_pooled_and_faults_are_no_hits() -> None:
     assert (total.recordings, total.group("factors"), dict(total.faults)) == (3, Count(2, 2), {"ValueError: no": 1})
 
 
-def test_the_ratio_of_u_is_over_the_same_recordings_and_factors_alone() -> None:
-    held = {"scale_x.ppm": True, "artefact.length_mm": True}
-    one = tallies([record(0, held, u=2.0), record(1, held, u=2.0), record(2, held, u=50.0)])["plate, axis × 2"]
-    other = tallies([record(0, held, u=1.0), record(1, held, u=4.0)])["plate, axis × 2"]
-    assert wider(one, other) == pytest.approx(1.0)
-    assert wider(one, tallies([record(7, held)])["plate, axis × 2"]) is None
-
-
 def test_a_run_is_taken_up_where_it_was_cut_off(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cell = Cell("plate", "axis × 2")
     file = tmp_path / "plate_axis_×_2.jsonl"
@@ -97,14 +74,6 @@ def test_a_run_is_taken_up_where_it_was_cut_off(tmp_path: Path, monkeypatch: pyt
     assert study.waiting([cell], tmp_path, 3, 2) == []
 
 
-def test_packed_records_count_like_others() -> None:
-    """The recorded run: as many recordings as its page says, in a hundred cells."""
-    records = kept(ROOT / "benchmarks" / "coverage" / "recorded")
-    assert len({record["cell"] for record in records}) == 100
-    said = (ROOT / "docs" / "coverage-study.md").read_text(encoding="utf-8")
-    assert f"This run: {len(records)} recordings" in said
-
-
 def test_a_recording_goes_through_the_api_and_comes_back_with_every_truth() -> None:
     found = measured((Cell("gauge blocks", "axis × 2"), 1, 0))
     assert "fault" not in found
@@ -114,23 +83,3 @@ def test_a_recording_goes_through_the_api_and_comes_back_with_every_truth() -> N
     for value, u, low, high, truth in found["intervals"].values():
         assert low < value < high
         assert abs(value - truth) < 8 * u
-
-
-def test_the_page_names_what_is_not_kept() -> None:
-    short = [record(i, {"scale_y.ppm": i % 2 == 0}, verdict="explained" if i < 9 else "consistent") for i in range(60)]
-    told = page(tallies(short), {}, None)
-    assert "- pooled over axis × 2, 50.0 % hold\n" in told
-    assert "- the scale of the noisy axis, axis × 2, 50.0 %\n" in told
-    assert "- 15.0 % cry under axis × 2\n" in told
-    assert "- plate, axis × 2: 50.0 %, interval (" in told
-    assert "Not kept:" not in page(tallies(record(i, {"scale_y.ppm": i % 20 > 0}) for i in range(60)), {}, None)
-
-
-def test_power_is_counted_by_recording_and_strength() -> None:
-    told = [
-        {"task": [1, "step gauge", root, i], "found": root > 5, "named": False, "oracle": True}
-        for root in (4.5, 6.0)
-        for i in range(3)
-    ]
-    assert counts(told) == {"step gauge": {"4.5": {"found": [0, 3], "named": [0, 3], "oracle": [3, 3]},
-                                           "6": {"found": [3, 3], "named": [0, 3], "oracle": [3, 3]}}}  # fmt: skip

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from benchmarks.hostile.invariants import Outcome, lost, problems, refusal_problems, set_problems, snapshot
-from benchmarks.hostile.page import Tally, load, page
 
 TRACE = """Traceback (most recent call last):
   File "/x/cmm_uq/base/points.py", line 12, in f
@@ -91,15 +90,3 @@ def test_a_file_is_lost_unless_a_copy_of_its_bytes_is_kept(tmp_path: Path) -> No
     assert lost(before, snapshot(tmp_path), own=frozenset({"mine.csv"})) == []
     (tmp_path / "mine.csv.previous").write_bytes(b"measured")
     assert lost(before, snapshot(tmp_path)) == []
-
-
-def test_counts_are_kept_and_shown(tmp_path: Path) -> None:
-    tally = Tally("mutations", 1)
-    assert tally.add(7, "job", "a | b", 1, ["exit code 1"], ran="report")
-    assert not tally.add(8, "job", "c", 0, [])
-    tally.save(tmp_path)
-    shown = page(load(tmp_path))
-    assert page([tally]) == shown
-    assert "| Mutated inputs | 2 | 1 | 1 |" in shown
-    assert "| job | 1 | 1 |" in shown
-    assert "| exit code 1 | 1 | 7: a \\| b |" in shown

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.hostile import disk
 from benchmarks.hostile.collisions import collisions, meet
 from benchmarks.hostile.kills import Kill, available, calls, strike
-from benchmarks.hostile.processes import CHEAP, Command, taken_for_a_set
+from benchmarks.hostile.processes import CHEAP
 
 AT_ONCE = 3  # processes side by side: a command here spends its second on imports
 
@@ -54,17 +54,3 @@ def test_a_place_that_cannot_be_written_to_is_told_in_one_line(tmp_path: Path) -
     assert len(bad) == len(wanted)
     runs = [(what, lambda folder, place=place: disk.attempt("simulate", place, folder)) for what, place in bad.items()]
     assert side_by_side(runs, tmp_path) == []
-
-
-def test_two_versions_of_a_job_differ_in_every_file_that_is_compared(tmp_path: Path) -> None:
-    command = Command("compensate", "compensable")
-    first, second = command.prepare(tmp_path / "a"), command.prepare(tmp_path / "b", 1)
-    assert {path.name for path in first.iterdir() if path.read_bytes() != (second / path.name).read_bytes()} == {
-        "job.toml",
-        "ballbar.csv",
-    }
-
-
-def test_a_folder_without_a_manifest_is_no_set(tmp_path: Path) -> None:
-    (tmp_path / "results.json").write_text("{}")
-    assert not taken_for_a_set(tmp_path)

@@ -6,12 +6,8 @@ import tracemalloc
 
 import numpy as np
 
-from benchmarks.hostile.parts import case, outcome, seeds
+from benchmarks.hostile.parts import case, outcome
 from cmm_uq.maths.geometry.repeated import Repeated
-
-
-def test_what_the_study_starts_from_is_sound() -> None:
-    assert [outcome(files) for files in seeds()] == ["evaluated", "evaluated"]
 
 
 def test_a_damaged_job_of_a_part_is_evaluated_or_refused() -> None:

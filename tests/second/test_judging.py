@@ -13,7 +13,6 @@ from benchmarks.second.judging import (
     innocent,
     machine_blamed,
     period_told,
-    proportion,
     recognised,
     same,
     tenths,
@@ -137,13 +136,6 @@ def test_rows_in_another_order_are_the_same_to_a_thousandth_of_u() -> None:
     assert same(one(5.0) | {"in_order": one(5.0005)})
     assert not same(one(5.0) | {"in_order": one(5.01)})
     assert not same(one(5.0) | {"in_order": one(5.0) | {"verdict": "partial"}})
-
-
-def test_the_exact_interval_of_a_proportion_is_that_of_the_tables() -> None:
-    """None of 20: 1 − 0.025^(1/20) = 16.84 %; 5 of 20: 8.66 to 49.10 % (Clopper & Pearson 1934)."""
-    assert proportion(0, 20) == (0.0, pytest.approx(1 - 0.025 ** (1 / 20)))
-    assert proportion(5, 20) == (pytest.approx(0.0866, abs=1e-4), pytest.approx(0.4910, abs=1e-4))
-    assert proportion(20, 20)[1] == 1.0
 
 
 def test_each_tenth_has_its_own_count_mean_and_expected_spread() -> None:

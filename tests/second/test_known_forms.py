@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.second.cases import Case, case, outside
-from benchmarks.second.oracle import DRAWS, EXCEED, known_forms
-from benchmarks.second.page import LEAST_P, _told_the_form
+from benchmarks.second.oracle import DRAWS, known_forms
+from benchmarks.second.page import LEAST_P
 
 
 def without(made: Case) -> Case:
@@ -30,20 +30,3 @@ def test_what_is_nine_times_its_uncertainty_is_seen_and_named_and_without_it_the
     p_without, named_without = known_forms(without(made), seed=number)
     assert p_without > LEAST_P
     assert not named_without
-
-
-def test_the_least_p_value_is_that_of_one_draw_beyond() -> None:
-    assert pytest.approx(0.01) == LEAST_P
-    assert EXCEED == 1
-
-
-def test_the_page_counts_what_the_oracle_sees_and_what_is_recognised_of_it() -> None:
-    out = [
-        ({"name": f"{i}"}, {"verdict": verdict})
-        for i, verdict in enumerate(("partial", "consistent", "explained", "partial"))
-    ]
-    oracles = {"0": {"knows_form": {"p": 0.005, "named": True}}, "1": {"knows_form": {"p": 0.01, "named": False}},
-               "2": {"knows_form": {"p": 0.2, "named": False}}}  # fmt: skip
-    said = _told_the_form(out, oracles)
-    assert "sees 2 of 3, and names it among the whole catalogue in 1; of those that it sees 1 are recognised." in said
-    assert _told_the_form(out, {}) == ""

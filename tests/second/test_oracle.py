@@ -56,10 +56,3 @@ def test_a_stated_noise_holds_the_size_and_a_wrong_one_lets_go() -> None:
     assert held[0] - held[1] > free[0] - free[1]
     wrong = Likelihood(100, 10.0).of(squares)
     assert wrong[0] - wrong[1] == pytest.approx(free[0] - free[1], rel=0.05)
-
-
-def test_alarms_of_both_oracles_without_a_cause_come_as_often_as_they_say() -> None:
-    """One per cent of 20: more than three come once in twenty thousand times (binomial)."""
-    found = [searched(case(22, f"nothing, {noise}", number), knows_noise=knows, seed=number).effects
-             for noise in ("white", "set-up") for number in (0, 4, 8, 12, 16) for knows in (True, False)]  # fmt: skip
-    assert sum(map(bool, found)) <= 3

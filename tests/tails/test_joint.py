@@ -11,7 +11,7 @@ from scipy import stats
 
 from benchmarks.coverage.cells import Cell
 from benchmarks.coverage.recordings import recording
-from benchmarks.tails.joint import DOF, Readings, log_tails, prior
+from benchmarks.tails.joint import DOF, Readings, log_tails
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.machine.model.measurement import MeasurementModel
@@ -64,9 +64,3 @@ def test_readings_of_any_degrees_of_freedom_have_the_same_quartiles() -> None:
         own = stats.norm if np.isinf(dof) else stats.t(dof)
         scale = stats.norm.ppf(0.75) / own.ppf(0.75)
         assert log == pytest.approx(float(np.sum(own.logpdf(z / scale) - np.log(scale))), rel=1e-9)
-
-
-def test_the_prior_weighs_tails_as_it_is_told() -> None:
-    assert np.exp(prior(0.05)).sum() == pytest.approx(1)
-    assert np.exp(prior(0.05))[-1] == pytest.approx(0.95)
-    assert np.isneginf(prior(0.0)[:-1]).all()

@@ -26,7 +26,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.jobs.earlier import against_earlier
+from cmm_uq.jobs.recording.references import against_earlier
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import indicated, plate

@@ -24,7 +24,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import ARCSECOND, unit
-from cmm_uq.jobs.plan import FixtureFacts, PlanFacts
+from cmm_uq.jobs.tables.plan import FixtureFacts, PlanFacts
 from cmm_uq.machine.physics import catalogue
 from cmm_uq.machine.physics.effect import Effect, Parameter
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, MACHINE, TRAVEL, setting
