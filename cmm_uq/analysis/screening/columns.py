@@ -80,13 +80,10 @@ def _impossible(points: Points) -> Iterator[Finding]:
             continue
         values = points.columns[column][rows]
         unit = bounds.unit(values)
-        told = say("{column} = {span}: {why}", column=Verbatim(column), span=span(values), why=bounds.why)
-        if unit is None:
-            yield finding("impossible", points, rows, told, column)
-        else:
-            yield finding(
-                "unit", points, rows, say("{told} It looks like {unit}: convert it", told=told, unit=unit), column
-            )
+        why = say("{column} = {span}: {why}", column=Verbatim(column), span=span(values), why=bounds.why)
+        if unit is not None:
+            why = say("{told} It looks like {unit}: convert it", told=why, unit=unit)
+        yield finding("impossible" if unit is None else "unit", points, rows, why, column)
 
 
 def _fraction(points: Points) -> Iterator[Finding]:
@@ -109,31 +106,21 @@ def _time(points: Points, balls: bool) -> Iterator[Finding]:
     steps = np.abs(np.diff(time))[within]
     usual, every = float(np.median(steps)) if len(steps) else 0.0, np.ones(len(points), dtype=bool)
     if usual > LONGEST_PAUSE:
-        yield finding(
-            "unit",
-            points,
-            every,
-            say(
-                "time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
-                "looks like milliseconds: divide by 1000",
-                usual=usual,
-            ),
-            "time_s",
+        why = say(
+            "time_s: {usual:.3g} s from point to point of one placing is longer than anybody waits; it "
+            "looks like milliseconds: divide by 1000",
+            usual=usual,
         )
     elif balls and 0 < usual < SHORTEST_BALL:
-        yield finding(
-            "unit",
-            points,
-            every,
-            say(
-                "time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
-                "like minutes or hours: give seconds",
-                usual=usual,
-            ),
-            "time_s",
+        why = say(
+            "time_s: {usual:.3g} s from ball to ball is shorter than a machine can probe one; it looks "
+            "like minutes or hours: give seconds",
+            usual=usual,
         )
     else:
         yield from _moments(points, time)
+        return
+    yield finding("unit", points, every, why, "time_s")
 
 
 def _moments(points: Points, time: Floats) -> Iterator[Finding]:
