@@ -168,6 +168,6 @@ def test_turning_parts_the_plates_own_squareness_from_the_machines(monkeypatch: 
     assert plan.reached
     assert len(plan.placings) == 1
     assert any(words in plan.placings[0].title for words in ("turned by 90°", "turned by 270°", "turned over"))
-    monkeypatch.setattr(suggestion, "turned_placings", lambda placings, volume: ())
+    monkeypatch.setattr(suggestion, "turned_set_ups", lambda placings, volume: ())
     without = parted(monkeypatch)
     assert without is None or not without.reached
