@@ -80,7 +80,7 @@ def _too_little(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> Te
 
 
 def withhold_unpredicted(result: SearchResult, unseen: Text) -> tuple[WithheldEffect, ...]:
-    """All that was found, withheld because held-out placings, or points, do not speak for it."""
+    """All that was found, withheld because held-out set-ups, or points, do not speak for it."""
     why = say("it does not predict {unseen} that the fit had not seen better than noise would", unseen=unseen)
     return tuple(replace(_withheld(result, i, why), modes=period_modes(result, i)) for i in sorted(result.chosen))
 

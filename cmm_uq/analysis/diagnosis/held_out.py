@@ -1,4 +1,4 @@
-"""Whether what was found predicts placings, or points, that the fit has not seen."""
+"""Whether what was found predicts set-ups, or points, that the fit has not seen."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SINGULAR = 1e-9  # part of the largest singular value below which another count
 
 @dataclass(frozen=True)
 class Improvement:
-    """Before and after, on the recording itself and on held-out placings.
+    """Before and after, on the recording itself and on held-out set-ups.
 
     ``rms_before_um``, ``rms_after_um`` residual rms of the observations; ``heldout_rms_before_um``,
     ``heldout_rms_after_um`` of predictions of what was left out of the fit; ``elpd_gain``, ``elpd_gain_se`` gain in
@@ -39,7 +39,7 @@ class Improvement:
 
 
 def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
-    """Compare two models of one recording by cross-validation over its placings, or the points of few placings.
+    """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups.
 
     Repeats are left out together. The predictive density is normal, with the noise of each model's own fit.
     """
@@ -57,7 +57,7 @@ def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvemen
 def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
     """Rms of predictions, µm, and log predictive density of each fold.
 
-    What a placing leaves open is taken from its other points, where there are some, and else is no part of the prediction.
+    What a set-up leaves open is taken from its other points, where there are some, and else is no part of the prediction.
     """
     estimate = model.estimate()
     linear = estimate.linear
@@ -93,9 +93,9 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
-    """What is left out together, and what it is: placings; of few placings their points. Each with its repeats.
+    """What is left out together, and what it is: set-ups; of few set-ups their points. Each with its repeats.
 
-    Without one of a few placings the rest would often determine nothing: a gauge on seven lines has one along Y.
+    Without one of a few set-ups the rest would often determine nothing: a gauge on seven lines has one along Y.
     Which of them are in one fold follows from where they are, not from their numbers.
     """
     artefact, used = model.artefact, model.used
@@ -114,9 +114,9 @@ def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
 
 
 def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
-    """What is held out of columns (m, b), less what the placings' other observations tell of it.
+    """What is held out of columns (m, b), less what the set-ups' other observations tell of it.
 
-    Gives (o, b) without what no observation tells of the placings; (o, r) whose products are the covariance of what was
+    Gives (o, b) without what no observation tells of the set-ups; (o, r) whose products are the covariance of what was
     told, in units of the noise; and how many of the o dimensions are lost with what is left open.
     """
     left, known, open_ = every.copy(), np.zeros((len(every), 0)), 0

@@ -1,7 +1,5 @@
 """A few shapes of the noise's components that stand for all that they could be, whether or not something is missing.
 
-A few shapes of the noise's components that stand for all that they could be.
-
 A shape is the noise of sizes in proportion to the reading noise. Many are drawn from their prior, evenly, and where few of
 those matter, from what the recording says of them; those that matter, whether or not something is missing, are kept, each with
 a weight that makes their sum an unbiased estimate of the integral over all.

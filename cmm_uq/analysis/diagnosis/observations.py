@@ -1,7 +1,5 @@
 """Which observations of a large recording the candidates are compared on, by numbers that follow from places alone.
 
-Which observations of a large recording the candidates are compared on.
-
 Thousands of columns stand for what could be missing; with all observations of a large recording they would fill the memory,
 and tell no more that matters: of 1000 observations, what is a fifth of their noise is found. What is found is then estimated
 from all.
@@ -37,13 +35,13 @@ def numbered_by_place(model: MeasurementModel, group: Ints) -> Ints:
 
 
 MOST = 1000  # observations that candidates are compared on
-LEAST_OF_PLACING = 30  # observations that a placing keeps where it has as many: its freedoms cost six of them at most
+LEAST_OF_SET_UP = 30  # observations that a set-up keeps where it has as many: its freedoms cost six of them at most
 
 
 def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = MOST) -> MeasurementModel:
     """The model of at most ``most`` observations, or a few more; as it is with no more than these.
 
-    Whole quantities are drawn, with their repeats, evenly from every placing, and where there are many placings, from some
+    Whole quantities are drawn, with their repeats, evenly from every set-up, and where there are many set-ups, from some
     of them: at random, so that no pattern of the recording is hidden.
     """
     artefact, used = model.artefact, np.flatnonzero(model.used)
@@ -52,8 +50,8 @@ def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = 
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(11,)))
     points, first = artefact.points, artefact.rows[used, 0]
     placing = artefact.measurement[used]
-    # observations of several points stay with all others of their placing, of which they may be differences
-    each = max(most // len(np.unique(placing)), LEAST_OF_PLACING) if artefact.rows.shape[1] == 1 else len(used)
+    # observations of several points stay with all others of their set-up, of which they may be differences
+    each = max(most // len(np.unique(placing)), LEAST_OF_SET_UP) if artefact.rows.shape[1] == 1 else len(used)
     # numbered by their places: another numbering of the recording draws the same ones
     owner = numbered_by_place(model, placing)
     part = numbered_by_place(model, np.column_stack([placing, points.point[first]]))
@@ -62,7 +60,7 @@ def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = 
     chosen = used[within][whole]
     rows = np.zeros(len(points), dtype=bool)
     rows[artefact.rows[chosen]] = True
-    # points that are no observations, such as one ahead of a surface, stay with their placing
+    # points that are no observations, such as one ahead of a surface, stay with their set-up
     bare = ~np.isin(np.arange(len(points)), artefact.rows)
     rows |= bare & np.isin(points.measurement, artefact.measurement[chosen])
     try:

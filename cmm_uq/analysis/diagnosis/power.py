@@ -110,7 +110,7 @@ class DrawnNoise:
 
 
 def without_fault(observe: Observed, model: MeasurementModel, noise: Noise, seed: int) -> MeasurementModel:
-    """The same model of a recording drawn with nothing left out, in the placings of its own."""
+    """The same model of a recording drawn with nothing left out, in the set-ups of its own."""
     artefact = model.artefact
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(8,)))
     sizes = np.array([size.nominal for size in artefact.sizes])

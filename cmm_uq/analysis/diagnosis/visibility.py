@@ -1,7 +1,5 @@
 """What of an effect a recording shows, and from which size on it is detected and named.
 
-With what probability an effect is detected, and named, as a function of its visible length: in closed form.
-
 The length δ is that of what an effect leaves in all observations, the baseline projected out, over the noise. The statistic
 of the lack-of-fit test sees of the noise, nearly, its part z along the effect, and its size besides, which it takes for σ: the
 test rejects when z exceeds its threshold times s/σ, z² having a noncentral χ² distribution with δ² (z over s/σ a

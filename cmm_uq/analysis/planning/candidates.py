@@ -26,7 +26,7 @@ Attitudes = Callable[[Volume], list[tuple[Text, Floats]]]
 
 @dataclass(frozen=True)
 class RelocatedCandidates:
-    """A recorded artefact, that stands by itself in each placing, set up in other places.
+    """A recorded artefact, that stands by itself in each set-up, set up in other places.
 
     ``attitudes`` in which it is set up, beside that of the recording.
     """
@@ -34,7 +34,7 @@ class RelocatedCandidates:
     attitudes: Attitudes
 
     def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
-        """The first recorded placing, once, in many places and attitudes."""
+        """The first recorded set-up, once, in many places and attitudes."""
         first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
         pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
         return self.like(pattern, attitude, volume, count)
@@ -47,9 +47,9 @@ class RelocatedCandidates:
 
 @dataclass(frozen=True)
 class VolumeCandidates:
-    """Candidates of an artefact that stands by itself in each placing.
+    """Candidates of an artefact that stands by itself in each set-up.
 
-    ``attitudes`` in which it is set up; ``shape`` what is measured of it in one placing; ``elsewhere`` of a recorded
+    ``attitudes`` in which it is set up; ``shape`` what is measured of it in one set-up; ``elsewhere`` of a recorded
     one.
     """
 
@@ -67,7 +67,7 @@ class VolumeCandidates:
 
 
 def candidates(setting: Setting, start: Start | None = None) -> tuple[SetUp, ...]:
-    """Placings that the volume and the fixtures allow, at most as many as the plan says."""
+    """Set-ups that the volume and the fixtures allow, at most as many as the plan says."""
     return setting.planning.candidates(setting, start)
 
 
@@ -119,12 +119,12 @@ def everywhere(volume: Volume, ways: Sequence[tuple[Text, Floats]], shape: Patte
                 yield pattern.placed(volume.machine, attitude, middle, title)
 
 
-MIDDLE = (0.5, 0.5, 0.5)  # of the room that a placing has, along each axis
+MIDDLE = (0.5, 0.5, 0.5)  # of the room that a set-up has, along each axis
 ACROSS = " (across it)"  # how a plate stands to the direction by which it is held
 
 
 def ready_plan(setting: Setting) -> tuple[Text, tuple[SetUp, ...]]:
-    """Name and placings of the ready plan that a job asks for, or of the usual one for its kind."""
+    """Name and set-ups of the ready plan that a job asks for, or of the usual one for its kind."""
     ready, kind = setting.planning.ready, setting.artefact.kind
     usual = next(iter(ready))
     name = Verbatim(setting.plan.ready or usual)

@@ -1,6 +1,6 @@
-"""Better plans: placings chosen one after the other, then exchanged as long as that helps.
+"""Better plans: set-ups chosen one after the other, then exchanged as long as that helps.
 
-Greedy choice with exchange (Fedorov 1972, *Theory of Optimal Experiments*) over candidate placings, whose information adds.
+Greedy choice with exchange (Fedorov 1972, *Theory of Optimal Experiments*) over candidate set-ups, whose information adds.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ CRITERIA = ("separation", "D", "A", "worst")
 _FLOOR = 1e-3
 """Square of the sine below which a pair is as good as identical; keeps one such pair from hiding all others."""
 
-_GAIN = 1e-6  # least gain in the score by which a placing is chosen; else the one that tells most of everything
+_GAIN = 1e-6  # least gain in the score by which a set-up is chosen; else the one that tells most of everything
 _BETTER = 1e-9
 _MOST_TRIES = 2000
 Score = Callable[[Floats], Floats]  # what is to become small, (c,), of information (c, k, k)
@@ -83,7 +83,7 @@ def choose(
 ) -> Selection:
     """Take ``count`` candidates, greedily, then exchange them one for one until nothing gains.
 
-    Where no single candidate improves the score (nothing is told apart by one placing alone), the one is taken that shrinks
+    Where no single candidate improves the score (nothing is told apart by one set-up alone), the one is taken that shrinks
     the uncertainty ellipsoid of all effects together most.
 
     ``start`` (k, k) information of what is there already, certificates included.

@@ -1,7 +1,5 @@
 """Expected standard uncertainties of a plan under its noise, and what repeats are worth beside set-ups.
 
-Expected standard uncertainties of a plan under its noise: generalised least squares, for every size of the noise at once.
-
 The weights of least squares are those of the noise, as in the posterior of a recording that shows it. Sums over observations
 are made of columns that are orthonormal under white noise, so that no noise makes them worse than itself.
 """
@@ -35,7 +33,7 @@ _ZERO = 1e-8
 class ExpectedUncertainty:
     """Standard uncertainties (k,) of each parameter, in its unit.
 
-    ``u`` of the least-squares estimate, infinite where the placings leave it free; as :meth:`PlannedNoise.spread`
+    ``u`` of the least-squares estimate, infinite where the set-ups leave it free; as :meth:`PlannedNoise.spread`
     averages; ``with_prior`` the same when what physics allows is used too.
     """
 
@@ -77,7 +75,7 @@ def uncertainties(linear: LinearModel, components: Components, sizes: Sizes) -> 
 
 
 def _there(linear: LinearModel) -> Floats:
-    """(k,) 0 for columns of which the placing leaves nothing but rounding, lest they determine each other; else 1."""
+    """(k,) 0 for columns of which the set-up leaves nothing but rounding, lest they determine each other; else 1."""
     whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
     return np.asarray(np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole, dtype=np.float64)
 
@@ -104,11 +102,11 @@ COMPARED = 10  # repeats that are compared, or one more than the plan has
 
 @dataclass(frozen=True, eq=False)
 class RepeatsRow:
-    """What placings tell with a number of repeats.
+    """What set-ups tell with a number of repeats.
 
-    ``repeats``, ``readings``, ``minutes`` of every point; of all placings together; ``u`` (p,) expected of each
+    ``repeats``, ``readings``, ``minutes`` of every point; of all set-ups together; ``u`` (p,) expected of each
     parameter, in its unit, infinite where it stays free; ``readings_more``, ``minutes_more``, ``u_more`` with one more
-    placing, which tells as much as they do on average.
+    set-up, which tells as much as they do on average.
     """
 
     repeats: int
@@ -122,7 +120,7 @@ class RepeatsRow:
 
 @dataclass(frozen=True, eq=False)
 class RepeatsComparison:
-    """Repeats against placings.
+    """Repeats against set-ups.
 
     ``unknowns`` p parameters, those without a certificate; ``placings`` how many there are; ``rows`` for 1, 2, …
     repeats.
@@ -134,7 +132,7 @@ class RepeatsComparison:
 
     @property
     def enough(self) -> int | None:
-        """Repeats from which on a minute of one more placing lowers every uncertainty more than one of one more repeat.
+        """Repeats from which on a minute of one more set-up lowers every uncertainty more than one of one more repeat.
 
         ``None`` where that is so for no number of them in the table.
         """
@@ -144,7 +142,7 @@ class RepeatsComparison:
 
 
 def _placing_is_better(row: RepeatsRow, following: RepeatsRow) -> bool:
-    """Whether the logarithm of every uncertainty falls more in a minute of one more placing than of the following repeat."""
+    """Whether the logarithm of every uncertainty falls more in a minute of one more set-up than of the following repeat."""
     there = np.isfinite(row.u)
     by_placing = np.log(row.u[there] / row.u_more[there]) * (following.minutes - row.minutes)
     by_repeat = np.log(row.u[there] / following.u[there]) * (row.minutes_more - row.minutes)
@@ -152,7 +150,7 @@ def _placing_is_better(row: RepeatsRow, following: RepeatsRow) -> bool:
 
 
 def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsComparison | None:
-    """Repeats against placings; ``None`` where no parameter is determined or the noise is taken as white."""
+    """Repeats against set-ups; ``None`` where no parameter is determined or the noise is taken as white."""
     noise, n = setting.noise, len(placings)
     if noise is None or not setting.named:
         return None
@@ -161,7 +159,7 @@ def compare_repeats(setting: Setting, placings: Sequence[SetUp]) -> RepeatsCompa
         points = _joined(setting, placings, repeats)
         model, minutes = setting.model(points), _minutes(setting, n, len(points))
         sought = [i for i, unknown in enumerate(model.unknowns) if not unknown.known]
-        # information of n + 1 placings is to that of n as if variances were n / (n + 1) of what they are
+        # information of n + 1 set-ups is to that of n as if variances were n / (n + 1) of what they are
         now, more = (
             expected_uncertainty(model, each).u[sought] for each in (noise, noise.times(float(np.sqrt(n / (n + 1)))))
         )

@@ -1,7 +1,7 @@
-"""What placings determine of the effects that a job names, from singular values of the whitened design.
+"""What set-ups determine of the effects that a job names, from singular values of the whitened design.
 
 Least squares on a design needs no readings: which unknowns it determines, with what uncertainty, and which combinations it
-leaves free follow from the placings alone. Beside it stands what is left of the prior standard deviation that physics allows.
+leaves free follow from the set-ups alone. Beside it stands what is left of the prior standard deviation that physics allows.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Determination:
     """What to expect of one parameter.
 
     ``unknown`` the parameter; ``u`` standard uncertainty of its least-squares estimate, in its unit; ``None`` where the
-    placings leave it free; ``u_with_prior`` the same when what physics allows is used too; ``u_white`` like ``u``, if
+    set-ups leave it free; ``u_with_prior`` the same when what physics allows is used too; ``u_white`` like ``u``, if
     the noise were white; ``status`` ``determined``, ``weak`` (the prior says almost as much) or ``free``.
     """
 
@@ -50,7 +50,7 @@ class Determination:
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """What placings determine.
+    """What set-ups determine.
 
     ``parameters`` of the effects named, and the sizes of the artefact that no certificate gives; ``free`` combinations,
     each by the keys of its parameters and their parts, that leave every observation as it is; ``singular_values`` of
@@ -75,7 +75,7 @@ class Identifiability:
 def identifiability(
     model: MeasurementModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
 ) -> Identifiability:
-    """What the placings of a model's artefact determine of its effects, and how rivals would show besides.
+    """What the set-ups of a model's artefact determine of its effects, and how rivals would show besides.
 
     ``noise`` of the recording to be; ``None`` for the white noise that the model states.
     """
@@ -96,9 +96,9 @@ def identifiability(
 
 
 def _enough(linear: LinearModel) -> LinearModel:
-    """The same with observations that say nothing, so that few placings are a finding and no error.
+    """The same with observations that say nothing, so that few set-ups are a finding and no error.
 
-    Columns of which the placing leaves nothing but rounding become zero, lest they determine each other.
+    Columns of which the set-up leaves nothing but rounding become zero, lest they determine each other.
     """
     k, free = len(linear.unknowns), linear.freedoms.dense()
     whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)

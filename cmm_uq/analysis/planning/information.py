@@ -1,12 +1,8 @@
 """How much each set-up tells of every unknown, and how well effects are told apart by it.
 
-How much each placing tells of every unknown.
-
-The placing's own freedoms are projected out, the noise of placings is independent, and so their information adds (JCGM 101
+The set-up's own freedoms are projected out, the noise of set-ups is independent, and so their information adds (JCGM 101
 has no word for it; Atkinson, Donev & Tobias 2007, *Optimum Experimental Designs*, 5.1). Unknowns are in units of their prior
 standard deviation, a size of the artefact in units of a tenth of a millimetre.
-
-How well effects are told apart, from the information on them and on all that must be fitted besides.
 
 Two effects whose columns are parallel after everything else has been projected out cannot be told apart by any method; the
 sine of the angle between them is the part of one that the other cannot imitate. (Baarda 1968; Teunissen 2018, *Distributional
@@ -36,10 +32,10 @@ _HELD = 1e12
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """Information of placings, one matrix each.
+    """Information of set-ups, one matrix each.
 
-    ``unknowns`` k of them, effects first; ``each`` (c, k, k) of every placing; there may be more rows than unknowns, of
-    freedoms that all placings share; ``prior`` (k, k) of the certificates, without that of the effects.
+    ``unknowns`` k of them, effects first; ``each`` (c, k, k) of every set-up; there may be more rows than unknowns, of
+    freedoms that all set-ups share; ``prior`` (k, k) of the certificates, without that of the effects.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -52,13 +48,13 @@ class Information:
 
     @property
     def nuisance(self) -> list[int]:
-        """Rows of the artefact's sizes and of what all placings share."""
+        """Rows of the artefact's sizes and of what all set-ups share."""
         effects = [i for i, unknown in enumerate(self.unknowns) if unknown.key[0] != ARTEFACT]
         return [i for i in range(len(self.prior)) if i not in effects]
 
 
 def set_up_information(setting: Setting, placings: Sequence[SetUp], also: tuple[Effect, ...] = ()) -> Information:
-    """What each placing tells of the effects that the job names, and of some others."""
+    """What each set-up tells of the effects that the job names, and of some others."""
     plan = setting.plan
     points = join(
         placings, seconds_per_point=plan.seconds_per_point, minutes_per_placing=plan.minutes_per_placing,
@@ -97,7 +93,7 @@ def by_measurement(model: MeasurementModel, values: Floats) -> Floats:
 
 
 def _white(model: MeasurementModel, values: Floats, noise: PlannedNoise | None) -> Floats:
-    """Design (m, k) over the noise, the placing projected out, in the units of :func:`scales`."""
+    """Design (m, k) over the noise, the set-up projected out, in the units of :func:`scales`."""
     linear = uncorrelated(model, values, noise)
     return np.asarray(linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise))
 
@@ -117,7 +113,7 @@ def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
 
 
 def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Information:
-    """Information of each measurement of a recording whose placing's freedoms are common to all of them: a swept bar."""
+    """Information of each measurement of a recording whose set-up's freedoms are common to all of them: a swept bar."""
     values = np.array([u.prior_mean for u in model.unknowns])
     linear = uncorrelated(model, values, noise)
     rows = np.hstack([linear.design * scales(linear.unknowns), linear.freedoms.dense()])

@@ -1,6 +1,6 @@
 """The noise that a plan reckons with: that of an earlier recording, what the job states, and the prior for the rest.
 
-Readings are independent; each point of each placing has an offset that its repeats share; and noise may grow with the length
+Readings are independent; each point of each set-up has an offset that its repeats share; and noise may grow with the length
 (``noise``). What nobody knows of the latter two is averaged over what the estimate takes for possible
 beforehand. A half-Cauchy distribution has no mean, so that it is the logarithm of an expected uncertainty that is averaged:
 one recording in twenty with a huge offset then does not decide what is expected of all.

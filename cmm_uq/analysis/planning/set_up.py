@@ -1,9 +1,7 @@
 """A set-up: the artefact in one place, and all points that are then measured; its pattern, and directions in words.
 
-A placing: the artefact set up once, and all points that are then measured; and the shape of what is measured there.
-
 A pattern holds the points about the artefact's own middle and along its own axes. Set up somewhere, some way, it becomes a
-placing in the machine's scale readings.
+set-up in the machine's scale readings.
 """
 
 from __future__ import annotations
@@ -54,7 +52,7 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """What is measured of an artefact in one placing.
+    """What is measured of an artefact in one set-up.
 
     ``body`` (n, 3) along the artefact's axes about its middle, mm; a bar or gauge lies along the first; ``point``,
     ``repeat`` (n,) as in a recording; ``columns`` further columns, each (n,); ``vectors`` vectors (n, 3) along the
@@ -69,7 +67,7 @@ class Pattern:
 
     @classmethod
     def of_recording(cls, points: Points) -> tuple[Pattern, Floats, Floats]:
-        """The pattern of one recorded placing, with its attitude (3, 3) and its middle (3,) in scale readings."""
+        """The pattern of one recorded set-up, with its attitude (3, 3) and its middle (3,) in scale readings."""
         xyz = points.machine_xyz
         middle = np.asarray(xyz.mean(axis=0))
         about = xyz - middle
@@ -132,7 +130,7 @@ def join(
     placings: Sequence[SetUp], *, seconds_per_point: float = 10.0, minutes_per_placing: float = 5.0,
     columns: Mapping[str, float] | None = None, first: int = 1,
 ) -> Points:  # fmt: skip
-    """All placings as one recording, numbered from ``first``, in the order and at the times at which they are measured."""
+    """All set-ups as one recording, numbered from ``first``, in the order and at the times at which they are measured."""
     if not placings:
         raise CmmUqError("a plan without placings", fix="Ask for at least one")
     parts, clock = [], 0.0
@@ -147,7 +145,7 @@ def join(
 
 
 def append(recorded: Points, placings: Sequence[SetUp]) -> Points:
-    """A recording and further placings after it, columns as recorded; the placings must have them."""
+    """A recording and further set-ups after it, columns as recorded; the set-ups must have them."""
     numbers = range(int(recorded.measurement.max()) + 1, int(recorded.measurement.max()) + 1 + len(placings))
     later = [
         replace(placing.points, measurement=np.full(len(placing.points), number))
@@ -171,7 +169,7 @@ def _measurement(number: int) -> Message:
 
 
 def split(points: Points, title: Callable[[int], Message] = _measurement) -> tuple[SetUp, ...]:
-    """The placings of a recording, in ascending order of their numbers."""
+    """The set-ups of a recording, in ascending order of their numbers."""
     return tuple(
         SetUp(title(number), points.select(points.measurement == number))
         for number in np.unique(points.measurement).tolist()

@@ -27,9 +27,9 @@ ASSUMED_NOISE_UM = 1.0  # standard uncertainty of a coordinate where the job sta
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What there is before better placings are searched for.
+    """What there is before better set-ups are searched for.
 
-    ``artefact`` at the placings of a recording or of a ready plan; ``again`` the first placing of the recording, to be
+    ``artefact`` at the set-ups of a recording or of a ready plan; ``again`` the first set-up of the recording, to be
     set up elsewhere; ``None`` without a recording.
     """
 
@@ -41,11 +41,11 @@ class Start:
 class Planning:
     """What a kind of measurement offers to planning.
 
-    ``ready`` plans by name, the usual one first; ``candidates`` placings that volume and fixtures allow, at most as
+    ``ready`` plans by name, the usual one first; ``candidates`` set-ups that volume and fixtures allow, at most as
     many as the plan says; ``elsewhere`` a recorded artefact in other places and attitudes, once in each, at most so
-    many; ``shared`` whether the freedoms of its placing are common to all measurements, so that their information does
+    many; ``shared`` whether the freedoms of its set-up are common to all measurements, so that their information does
     not add; ``sought`` whether it is sizes of the artefact that are sought, so that no effect need be named; ``free``
-    what placings leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
+    what set-ups leave open, in words, of a kind that names no effects; ``(setting, points, where)``.
     """
 
     ready: Mapping[str, Callable[[Setting], tuple[SetUp, ...]]]
@@ -99,7 +99,7 @@ class Setting:
     def sized(self, points: Points) -> Setting:
         """The same with the artefact's length as these points show it, where its certified figures stand in the recording.
 
-        Without it each placing would take the longest distance of its own for the one that the certificate speaks of.
+        Without it each set-up would take the longest distance of its own for the one that the certificate speaks of.
         """
         if not self.artefact.with_references or self.artefact.length_mm is not None:
             return self

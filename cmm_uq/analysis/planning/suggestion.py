@@ -104,7 +104,7 @@ def next_plan(
     after = diagnosis.after
     names = sorted({name for group in groups for name in group.names} | {one.effect for one in goals})
     model = _with_all(after, names)
-    if facts.with_references:  # one placing alone does not show how long the artefact is
+    if facts.with_references:  # one set-up alone does not show how long the artefact is
         facts = facts.model_copy(update={"length_mm": after.artefact.sizes[0].nominal})
     try:
         points = after.artefact.points

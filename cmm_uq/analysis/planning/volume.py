@@ -1,7 +1,5 @@
 """Where an artefact may stand: the machine's volume, a margin, what the fixtures allow; and turned about its own axes.
 
-An artefact turned about its own axes where it stands: what turns with it is its own, what does not is the machine's.
-
 A bar or gauge changes ends; a plate is turned by quarters about its normal, and over. (Reversal: Evans, Hocken & Estler 1996,
 *Self-calibration: reversal, redundancy, error separation, and absolute testing*.)
 """
@@ -25,7 +23,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """Room for placings.
+    """Room for set-ups.
 
     ``machine`` whose readings they are; ``box`` (3, 2) lowest and highest reading of each axis that points may have,
     mm; ``heights`` of the artefact's middle, z readings, mm; ``directions`` (d, 3) unit vectors that fixtures allow;
@@ -125,7 +123,7 @@ _FLAT = 1e-3  # extent across an artefact, over its length, below which it has n
 
 
 def turned_set_ups(placings: Sequence[SetUp], volume: Volume) -> Iterator[SetUp]:
-    """Each placing with the artefact turned about its own axes, where it then fits."""
+    """Each set-up with the artefact turned about its own axes, where it then fits."""
     for placing in placings:
         pattern, attitude, _ = Pattern.of_recording(placing.points)
         for words, turn in _turns(pattern.body):

@@ -17,7 +17,7 @@ SCALES = tuple(f"temp_{a}_c" for a in AXES)
 TEMPERATURES = (*SCALES, "temp_artefact_c", "temp_table_top_c", "temp_table_bottom_c", "temp_air_c")
 
 LONGEST_PAUSE, SHORTEST_BALL = 6 * 3600.0, 0.6
-"""s between points of one placing that no operator waits, and that no machine probes a ball in."""
+"""s between points of one set-up that no operator waits, and that no machine probes a ball in."""
 
 _STUCK_ROWS, _STUCK_PART, _MOVING = 8, 0.15, 0.9
 
@@ -98,7 +98,7 @@ def _fraction(points: Points) -> Iterator[Finding]:
 
 
 def _time(points: Points, balls: bool) -> Iterator[Finding]:
-    """A clock in other units, seen by the time from point to point of one placing; single moments out of their order."""
+    """A clock in other units, seen by the time from point to point of one set-up; single moments out of their order."""
     if "time_s" not in points.columns:
         return
     time = points.columns["time_s"]
@@ -150,7 +150,7 @@ def _moments(points: Points, time: Floats) -> Iterator[Finding]:
 
 
 def _stuck(points: Points) -> Iterator[Finding]:
-    """A column that changed from placing to placing, and then stood still to the last digit for many of them."""
+    """A column that changed from set-up to set-up, and then stood still to the last digit for many of them."""
     for column, values in _measured(points):
         firsts = _firsts(points.group) if _constant_in_groups(points.group, values) else np.arange(len(values))
         sequence = values[firsts]
@@ -172,7 +172,7 @@ def _stuck(points: Points) -> Iterator[Finding]:
 
 
 def _slipped(points: Points) -> Iterator[Finding]:
-    """A column that belongs to whole placings and changes in the middle of each: moved by a row against the others."""
+    """A column that belongs to whole set-ups and changes in the middle of each: moved by a row against the others."""
     firsts = _firsts(points.group)
     sizes = np.diff([*firsts, len(points)])
     if len(firsts) < _STUCK_ROWS or sizes.min() < 2 or not _in_blocks(points.group):
@@ -194,7 +194,7 @@ def _slipped(points: Points) -> Iterator[Finding]:
 
 
 def _of_placings(values: Floats, firsts: Ints, sizes: Ints) -> bool:
-    """Whether a column is the same for all points of each placing, but for one at the edge, and changes between them."""
+    """Whether a column is the same for all points of each set-up, but for one at the edge, and changes between them."""
     constant = [np.ptp(values[a : a + k]) == 0 for a, k in zip(firsts, sizes, strict=True)]
     return bool(np.sum(constant) >= len(firsts) - 1 and np.mean(np.diff(values[firsts]) != 0) >= _MOVING)
 

@@ -1,8 +1,6 @@
 """Which coordinates of a recording are damaged, and how: found against the artefact's own shape, before anything is fitted.
 
-Which coordinates of a recording are damaged, and how: found against the artefact's own shape, before anything is fitted.
-
-What makes the whole recording wrong is refused. Single rows, bars or placings are reported with what undoes the damage, and
+What makes the whole recording wrong is refused. Single rows, bars or set-ups are reported with what undoes the damage, and
 left out; nothing is repaired in silence.
 """
 
@@ -91,7 +89,7 @@ class DamageSearch:
         return np.asarray(missed | astray if astray.mean() <= MOST else missed)
 
     def _settle(self, cause: Damage) -> None:
-        """Take rows whose damage is known out of the search, and look again at those that stand in their placings."""
+        """Take rows whose damage is known out of the search, and look again at those that stand in their set-ups."""
         self._settled[self._lost_with(cause.rows)] = True
         if cause.mended is not None:
             self._xyz, self._reference = cause.mended
@@ -238,7 +236,7 @@ class DamageSearch:
         return near
 
     def _numbered_otherwise(self, rows: Ints) -> bool:
-        """Whether a placing that does not fit by itself has the artefact's distances, in another order."""
+        """Whether a set-up that does not fit by itself has the artefact's distances, in another order."""
         if not self.shape.names[2:] or self.shape.names[0] == "nx" or len(rows) > _MOST_BALLS:
             return False
         xyz, reference = self.points.xyz[rows], self.shape.reference[rows]

@@ -1,7 +1,5 @@
 """Screening of a recording: damaged coordinates, wrong units, slipped or stuck columns, copies, gross outliers.
 
-Screening of a recording: damaged coordinates, wrong units, slipped or stuck columns, copies, gross outliers.
-
 What is found is reported as what it is, never silently dropped or mended. Damage of a whole column, and of a column that the
 model uses, is refused; single damaged rows and columns that nothing needs are left out; the rest is used as it stands. Each
 finding says which.

@@ -1,6 +1,6 @@
 """How far each point lies from where its artefact would have it, however damaged some of the others are.
 
-Every placing is fitted robustly (medians, least median of squares: Rousseeuw 1984), so that a few exchanged or mistaken rows
+Every set-up is fitted robustly (medians, least median of squares: Rousseeuw 1984), so that a few exchanged or mistaken rows
 stand out by millimetres instead of bending the fit. Errors of a machine stay far below the tolerance: half a millimetre and
 five parts in a thousand of the artefact's size.
 """
@@ -27,11 +27,11 @@ Misfit = Callable[[Floats, Floats, float], Floats]
 
 @dataclass(frozen=True, eq=False)
 class ArtefactShape:
-    """What one kind of artefact asks of the points of each of its placings.
+    """What one kind of artefact asks of the points of each of its set-ups.
 
-    ``rows`` points of each placing, as rows of the recording; ``misfit_of`` misfit (k,), mm, of a placing's points (k,
-    3) and references (k, j) for the size common to all placings; ``size`` that size by the certificate, mm; not finite
-    without one; ``extent`` of the artefact, mm, for the tolerance; ``together`` whether a placing is lost with one of
+    ``rows`` points of each set-up, as rows of the recording; ``misfit_of`` misfit (k,), mm, of a set-up's points (k,
+    3) and references (k, j) for the size common to all set-ups; ``size`` that size by the certificate, mm; not finite
+    without one; ``extent`` of the artefact, mm, for the tolerance; ``together`` whether a set-up is lost with one of
     its points; ``names`` columns of the references; ``reference`` (n, j) what the recording says of each point.
     """
 
@@ -45,7 +45,7 @@ class ArtefactShape:
 
     @property
     def is_bar(self) -> bool:
-        """Whether its placings are lengths or positions of a bar, without references."""
+        """Whether its set-ups are lengths or positions of a bar, without references."""
         return self.misfit_of in (bar_misfit, ball_misfit) and not self.reference.shape[1]
 
     @property
@@ -54,7 +54,7 @@ class ArtefactShape:
         return TOLERANCE_MM + TOLERANCE_RATIO * self.extent
 
     def misfit(self, xyz: Floats, reference: Floats, placings: Iterable[int] | None = None) -> Floats:
-        """Distance (n,), mm, of every point from where the artefact would have it; zero outside the placings asked for."""
+        """Distance (n,), mm, of every point from where the artefact would have it; zero outside the set-ups asked for."""
         found = np.zeros(len(xyz))
         one_length = self.misfit_of is bar_misfit and not np.isfinite(self.size)
         size = common_length(xyz, self.rows) if one_length else self.size
@@ -194,7 +194,7 @@ def _some(count: int) -> Ints:
 
 
 def common_length(xyz: Floats, rows: tuple[Ints, ...]) -> float:
-    """Median distance, mm, of the first two points of each placing."""
+    """Median distance, mm, of the first two points of each set-up."""
     ends = np.array(rows)
     return float(np.median(np.linalg.norm(xyz[ends[:, 1]] - xyz[ends[:, 0]], axis=1)))
 

@@ -1,6 +1,6 @@
 """A process that diagnoses sealed cases: ``python -m cmm_uq.app.commands.prove_case``.
 
-It is begun by ``running``. What it says of a case is what the diagnosis says of a recording, screening
+It is begun by ``answers``. What it says of a case is what the diagnosis says of a recording, screening
 included, and nothing of the truth.
 """
 

@@ -1,7 +1,4 @@
-"""What a proof says of itself: purpose and method, what it does not cover, how to check it.
-
-A proof of the diagnosis as a document: a laboratory's validation of the method (ISO/IEC 17025:2017, 7.2.2).
-"""
+"""A proof of the diagnosis as a document: a laboratory's validation of the method (ISO/IEC 17025:2017, 7.2.2)."""
 
 from __future__ import annotations
 

@@ -1,11 +1,7 @@
 """What is true of a case: what it hides, how large, in which noise; written down and hashed before it is diagnosed.
 
-What is true of a case: what it hides, how large, in which noise.
-
 Kinds of cases follow each other in a fixed cycle: of every ten three hide nothing, three one effect, two two effects, one a
 function that no effect has, one a fault of the artefact.
-
-The truth of all cases, written down and hashed before the first of them is diagnosed.
 
 The file is JSON in one canonical form, so that its SHA-256 is that of what it says: ``sha256sum truth.json`` gives it
 again.

@@ -1,7 +1,5 @@
 """What diagnoses of sealed cases said, against what was true, and the figures that a laboratory accepts the method by.
 
-What diagnoses of sealed cases said, against what was true.
-
 *Found*: an effect that is hidden is asserted, alone or as one of a group that is said not to be told apart. *Wrongly
 named*: an effect is asserted that does not act, and no group with one that does is named with it; of a fault of the
 artefact, any effect of the machine. The *verdict is right* when it says *consistent* of nothing, *explained* of effects

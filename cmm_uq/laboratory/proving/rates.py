@@ -1,7 +1,5 @@
 """Rates that were counted, with their exact intervals, and from which strength on an effect is found.
 
-From which strength on an effect is found in nine of ten recordings.
-
 A hidden effect of strength s is found with the probability 1/(1 + exp(−b·(s − m))). Both numbers are averaged over, on
 a grid, with flat priors for m and ln b: that has an answer where every effect is found, or none, and an interval that
 says how little was measured. Effects are taken together, for their strength is what the noise lets anyone see of them.

@@ -21,7 +21,7 @@ from cmm_uq.machine.physics.effect import Effect, Parameter
 FUNCTIONS = ("step", "cubic", "bump", "wave", "jump", "load")
 FAULTS = ("length", "nodes", "warm", "warming")
 _SAME_MM = 0.05  # up to which nodes of two set-ups are the same node
-_FLAT = 1e-4  # second over first extent of a placing from which on its nodes do not lie along one line
+_FLAT = 1e-4  # second over first extent of a set-up from which on its nodes do not lie along one line
 _NO_RATE = 11.5e-6  # 1/K, expansion of steel, for an artefact whose own is not stated
 
 

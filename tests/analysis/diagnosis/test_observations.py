@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.diagnosis.held_out import improvement
-from cmm_uq.analysis.diagnosis.observations import LEAST_OF_PLACING, MOST, thin_out
+from cmm_uq.analysis.diagnosis.observations import LEAST_OF_SET_UP, MOST, thin_out
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
@@ -84,7 +84,7 @@ def test_a_point_ahead_of_a_surface_stays_with_its_placing() -> None:
     observe = partial(kind_of(job).observing("diagnosed"), job.facts.artefact)
     found = thin_out(MeasurementModel(observe(job.points), ()), observe, 0, most=40).artefact
     assert sorted(found.points.measurement[found.points.point == 0].tolist()) == [1, 2]
-    assert len(found.measurement) == 2 * LEAST_OF_PLACING
+    assert len(found.measurement) == 2 * LEAST_OF_SET_UP
 
 
 def test_what_is_not_used_is_not_drawn() -> None:
@@ -95,7 +95,7 @@ def test_what_is_not_used_is_not_drawn() -> None:
     assert not np.isin(found.artefact.measurement, model.artefact.measurement[aside]).any()
 
 
-@pytest.mark.parametrize(("placings", "count", "each"), [(3, 900, MOST // 3), (50, 40, LEAST_OF_PLACING)])
+@pytest.mark.parametrize(("placings", "count", "each"), [(3, 900, MOST // 3), (50, 40, LEAST_OF_SET_UP)])
 def test_points_are_drawn_evenly_from_every_placing_and_where_these_are_many_from_some(
     placings: int, count: int, each: int
 ) -> None:
@@ -105,7 +105,7 @@ def test_points_are_drawn_evenly_from_every_placing_and_where_these_are_many_fro
     counts = np.unique(found.artefact.measurement, return_counts=True)[1]
     assert counts.max() == each
     assert len(found.artefact.measurement) < MOST + each
-    assert len(counts) == min(placings, -(-MOST // LEAST_OF_PLACING))
+    assert len(counts) == min(placings, -(-MOST // LEAST_OF_SET_UP))
 
 
 def test_the_estimate_from_some_agrees_with_that_from_all_within_its_uncertainty() -> None:

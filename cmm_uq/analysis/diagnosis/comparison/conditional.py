@@ -1,7 +1,5 @@
 """Columns of all candidates side by side, and data conditional on some of them under each kind of noise.
 
-Data beside explanations that the evidence is conditional on, under each kind of noise.
-
 A search gives the same few members again and again, in other company and at other sizes. What follows from a member alone is
 therefore kept: its columns weighed by each kind of noise, and their inner products with the columns of all candidates.
 """

@@ -4,7 +4,7 @@ Everything enters linearly with a normal prior whose standard deviation is a mul
 explanations depends on the data through one quadratic form; its integral over the noise is tabulated once, and the multiples
 are summed over a grid. What the job's model could absorb is projected out.
 
-Explanations that the evidence is conditional on, the *given* ones, join the covariance of the noise, each at a fixed size. So
+Explanations that the evidence is conditional on join the covariance of the noise, each at a fixed size. So
 the evidence of one more explanation beside them needs nothing but the inner products of all columns, which are computed once.
 """
 

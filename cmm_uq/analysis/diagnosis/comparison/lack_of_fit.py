@@ -1,7 +1,5 @@
 """Whether anything is missing: the evidence of something over nothing, and how often nothing shows as much.
 
-Log odds under noise that may have heavy tails, of many data, each with tails of its own.
-
 Under Student's t an outlier counts little, and no explanation gains by bending towards one. Where tails are probable, draws of
 "nothing is missing" have outliers; odds under a normal distribution rise with these, and a test by them loses power. With one
 part of the probability the noise of each data is therefore the kind that is most probable for them, its independent part of
