@@ -73,7 +73,7 @@ class OmittedEffect:
 
 
 @dataclass(frozen=True)
-class NoiseEstimate:
+class NoiseDiagnosis:
     """What the noise is like once everything found is modelled; lengths in µm."""
 
     coordinate: Quantity
@@ -104,7 +104,7 @@ class Diagnosis:
     effects: tuple[OmittedEffect, ...]
     indistinguishable: tuple[tuple[str, ...], ...]
     rivals: tuple[tuple[Text, float], ...]
-    noise: NoiseEstimate
+    noise: NoiseDiagnosis
     improvement: Improvement
     before: MeasurementModel
     after: MeasurementModel
@@ -281,14 +281,14 @@ def _rivals(compared: ModelComparison) -> tuple[tuple[Text, float], ...]:
     return tuple((compared.explanations[i].name, float(compared.probability[i])) for i in order[:12])
 
 
-def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseEstimate:
+def _noise(result: SearchResult, joint: JointPosterior, stated: float | None) -> NoiseDiagnosis:
     """The noise, given what is modelled; a kind is named when it has nine parts of ten."""
     sizes, weight = joint.posterior.sizes, result.last.noise_posterior().sum(axis=1)
     estimate = result.model.estimate()
     residuals = studentised(estimate.linear, joint.components, sizes.typical, estimate.least_squares.residuals)
     likeliest = int(weight.argmax())  # quick noise is no other noise than a reading's for who states that
     squares = result.last.squares[likeliest] * result.last.kinds[likeliest].scatter ** 2
-    return NoiseEstimate(
+    return NoiseDiagnosis(
         Quantity.of_draws(sizes.coordinate / MICROMETRE, unit("µm")),
         Quantity.of_draws(sizes.placing / MICROMETRE, unit("µm")),
         float(np.mean(sizes.slow > 0)) > _NOISE_KIND,

@@ -32,7 +32,7 @@ from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.laboratory.proving.answers import RECORDS, AnswersFolder, Record, answer_tasks
 from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file
 from cmm_uq.laboratory.proving.design import Design
-from cmm_uq.laboratory.proving.judgement import ANSWER, REFUSED, Judgement, judge
+from cmm_uq.laboratory.proving.judgement import ANSWER, REFUSED, ProofJudgement, judge
 from cmm_uq.laboratory.schedule.processes import check_workers
 from cmm_uq.machine.model import MeasurementModel, Noise
 from cmm_uq.machine.model.noise import noise_of
@@ -100,7 +100,7 @@ def prove_job(
     of_artefact = {name for name, effect in every().items() if effect.mechanism == _OF_ARTEFACT}
     judged = tuple(judge(case, records[case.number], named, of_artefact.__contains__) for case in cases)
     ordered = tuple(records[case.number] for case in cases)
-    return DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, Judgement(judged)), kept
+    return DiagnosisProof(job, design, options.seed, options.alpha, truth, ordered, ProofJudgement(judged)), kept
 
 
 def _records(

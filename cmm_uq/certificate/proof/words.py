@@ -13,7 +13,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.proving import cases, judgement
 from cmm_uq.laboratory.proving.cases import canonical_json, sha256_of
 from cmm_uq.laboratory.proving.design import Design
-from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, AcceptanceFigure, Judgement, acceptance_figures
+from cmm_uq.laboratory.proving.judgement import MISSED, OPEN, AcceptanceFigure, ProofJudgement, acceptance_figures
 from cmm_uq.laboratory.proving.rates import Rate
 from cmm_uq.laboratory.proving.reach import FaultReach, Reach, fault_reaches, reaches
 
@@ -119,7 +119,7 @@ class DiagnosisProof:
     alpha: float
     truth: bytes
     records: tuple[Mapping[str, Any], ...]
-    judgement: Judgement
+    judgement: ProofJudgement
 
     @property
     def sha256(self) -> str:

@@ -129,7 +129,7 @@ def _inside(said: Mapping[str, Sequence[float | None]], true: Mapping[str, float
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class ProofJudgement:
     """All cases together.
 
     ``cases`` each of them.
@@ -236,7 +236,7 @@ class Judgement:
 
     def by_noise(self, kind: str) -> tuple[Rate, Rate, Rate]:
         """False alarms, effects found, and intervals that hold, under one kind of noise."""
-        own = Judgement(tuple(one for one in self.cases if one.case.noise_kind == kind))
+        own = ProofJudgement(tuple(one for one in self.cases if one.case.noise_kind == kind))
         return own.false_alarms, own.found, own.coverage
 
     def verdicts(self, kind: str) -> Mapping[str, int]:
@@ -285,7 +285,7 @@ class AcceptanceFigure:
         return cases_to_decide(self.high) if self.low == 0 < self.high < 1 else None
 
 
-def acceptance_figures(judgement: Judgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
+def acceptance_figures(judgement: ProofJudgement, facts: ProveFacts) -> tuple[AcceptanceFigure, ...]:
     low, high = (each / 100 for each in facts.coverage_pct)
     found = [
         AcceptanceFigure(

@@ -18,7 +18,7 @@ from cmm_uq.laboratory.proving.judgement import (
     OPEN,
     STATED,
     JudgedCase,
-    Judgement,
+    ProofJudgement,
     acceptance_figures,
     judge,
 )
@@ -98,9 +98,9 @@ def test_an_interval_without_an_end_is_not_counted() -> None:
     assert judged(case(NOTHING), answer).intervals == ((NAMED, 0, 0),)
 
 
-def whole() -> Judgement:
+def whole() -> ProofJudgement:
     """Ten cases with known counts."""
-    return Judgement(tuple(judged(one, answer) for one, answer in (
+    return ProofJudgement(tuple(judged(one, answer) for one, answer in (
         (case(NOTHING), said("consistent")),
         (case(NOTHING, noise="white"), said("consistent", named=FAILS)),
         (case(NOTHING), said("unexplained")),
@@ -144,9 +144,9 @@ def test_probabilities_of_all_assertions_but_of_a_faulty_artefact() -> None:
     assert tenths == {0.6: (0, 2), 0.9: (2, 2)}
 
 
-def alarms(count: int, of: int) -> Judgement:
+def alarms(count: int, of: int) -> ProofJudgement:
     told = [said("unexplained")] * count + [said("consistent")] * (of - count)
-    return Judgement(tuple(judged(case(NOTHING), answer) for answer in told))
+    return ProofJudgement(tuple(judged(case(NOTHING), answer) for answer in told))
 
 
 @pytest.mark.parametrize(("count", "of", "standing", "kept"), [

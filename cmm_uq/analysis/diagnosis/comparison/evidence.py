@@ -17,16 +17,8 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg, special
 
-from cmm_uq.analysis.diagnosis.comparison.algebra import (
-    Precision,
-    SigmaIntegral,
-    eigen,
-    log_sum,
-    log_sum_in,
-    precisions,
-    squared,
-    woodbury,
-)
+from cmm_uq.analysis.diagnosis.comparison import algebra
+from cmm_uq.analysis.diagnosis.comparison.algebra import Precision, SigmaIntegral
 from cmm_uq.analysis.diagnosis.comparison.conditional import (
     AMPLITUDES,
     ConditionedData,
@@ -42,8 +34,9 @@ from cmm_uq.machine.model.recorded import Display
 
 _KEPT = 8_000_000  # numbers that are kept of what follows from what was given last
 
-_CORRECTED = 3
-"""Columns of a member, over those of what is given, from which on its own principal axes are corrected for that."""
+_CORRECTED = (
+    3  # columns of a member over those of what is given, from which on its principal axes are corrected for that
+)
 
 _BLOCK, _COLUMNS = 150_000, 500  # numbers of a block that a processor's cache holds; columns weighed at a time
 
@@ -117,8 +110,12 @@ class CandidateComparison:
         return frozenset(i for i, _ in self._where)
 
     @cached_property
-    def _noises(self) -> list[Precision]:
-        return precisions(self.kinds, self.reached, self.certified)
+    def precisions(self) -> list[Precision]:
+        return algebra.precisions(self.kinds, self.reached, self.certified)
+
+    @property
+    def _logs(self) -> Floats:
+        return np.array([noise.log for noise in self.precisions])
 
     @cached_property
     def _blocks(self) -> list[Floats]:
@@ -128,8 +125,8 @@ class CandidateComparison:
         for group in groups:
             columns = group.columns(stack)
             each = columns.T.reshape(-1, group.r, len(stack))
-            blocks = np.empty((len(self._noises), len(each), group.r, group.r))
-            for block, noise in zip(blocks, self._noises, strict=True):
+            blocks = np.empty((len(self.precisions), len(each), group.r, group.r))
+            for block, noise in zip(blocks, self.precisions, strict=True):
                 parts = np.array_split(columns, max(1, columns.shape[1] // _COLUMNS), axis=1)
                 other = np.hstack([noise(part) for part in parts]).T.reshape(each.shape)
                 block[:] = each @ other.transpose(0, 2, 1)
@@ -143,7 +140,7 @@ class CandidateComparison:
 
     def _by_noise(self, columns: Floats) -> Floats:
         """Precision times columns (m, b), by kind of noise (k, m, b)."""
-        return np.stack([noise(columns) for noise in self._noises])
+        return np.stack([noise(columns) for noise in self.precisions])
 
     @cached_property
     def squares(self) -> Floats:
@@ -159,13 +156,10 @@ class CandidateComparison:
         known = self._weigh(data, ())
         return np.asarray(self._integral(known.squares.copy()) + known.log[:, None], dtype=np.float64)
 
-    def precision(self, kind: int) -> Precision:
-        return self._noises[kind]
-
     def only(self, kinds: Sequence[int]) -> CandidateComparison:
         found = self.under([self.kinds[k] for k in kinds], self.left)
         index = list(kinds)
-        found.__dict__["_noises"] = [self._noises[k] for k in index]
+        found.__dict__["precisions"] = [self.precisions[k] for k in index]
         found.__dict__["_blocks"] = [blocks[index] for blocks in self._blocks]
         return found
 
@@ -182,11 +176,8 @@ class CandidateComparison:
         ``left`` (m,) of the observations, by default what the baseline leaves of them.
         """
         every = self.squares if left is None else self._by_noise(left[:, None])[:, :, 0] @ left
-        log = np.stack([
-            noise.log + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
-            - 0.5 * squares / self.sigma**2
-            for noise, squares in zip(self._noises, every, strict=True)
-        ])  # fmt: skip
+        log = self._logs[:, None] + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
+        log -= 0.5 * every[:, None] / self.sigma**2
         return np.asarray(np.exp(log - special.logsumexp(log)), dtype=np.float64)
 
     def log_evidence(
@@ -254,7 +245,7 @@ class CandidateComparison:
         most, best = total.copy(), {}
         for group, cube in self.each(None, conditions, among):
             each = cube[:, :, 0]
-            gains = log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
+            gains = algebra.log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
             chosen = group.explanation[group.first]
             total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
             largest = each.max(axis=1) + group.weight
@@ -265,20 +256,6 @@ class CandidateComparison:
                 most[i] = largest[m]
                 best[i] = Version(i, int(group.member[m]), float(group.amplitudes[m, a]))
         return {i: (float(total[i]), version) for i, version in best.items()}
-
-    def best(self, left: Floats, explanations: Sequence[int]) -> list[Version]:
-        """Version with most evidence among some visible explanations, for each column of data (m, b)."""
-        found = [Version(0, 0, 0.0)] * left.shape[1]
-        most = np.full(left.shape[1], -np.inf)
-        for group, each in self.each(left, (), explanations):
-            weight = np.where(np.isin(group.explanation, explanations), group.weight, -np.inf)
-            flat = (each + weight[:, None, None]).reshape(-1, left.shape[1])
-            at = flat.argmax(axis=0)
-            for column in np.flatnonzero(flat.max(axis=0) > most):
-                m, a = divmod(int(at[column]), AMPLITUDES)
-                found[column] = Version(int(group.explanation[m]), int(group.member[m]), float(group.amplitudes[m, a]))
-                most[column] = flat[at[column], column]
-        return found
 
     def left_of(self, version: Version, conditions: Sequence[Version]) -> float:
         """Part of the squared visible length of a version that is left beside what is given."""
@@ -293,7 +270,7 @@ class CandidateComparison:
 
     def _of_given(self, known: ConditionedData) -> Floats:
         """Log evidence (b,) of what data are beside."""
-        return log_sum(self._integral(known.squares.copy()) + known.log[:, None], 0)
+        return algebra.log_sum(self._integral(known.squares.copy()) + known.log[:, None], 0)
 
     def noise_probability(self, conditions: Sequence[Version]) -> Floats:
         """Probability (kinds,) of each kind of noise, conditional on explanations at their sizes."""
@@ -358,17 +335,17 @@ class CandidateComparison:
         if known.squares.shape[1] > 1 or not given or group.r < _CORRECTED * given:
             return None
         if group.r not in self._axes:
-            self._axes[group.r] = eigen(blocks)
+            self._axes[group.r] = algebra.eigen(blocks)
         strengths, turn = (axes[:, part] for axes in self._axes[group.r])
         variance = (group.amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
-        gains = woodbury(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
+        gains = algebra.woodbury(variance / (1 + ratio), turn.swapaxes(2, 3) @ seen)
         if gains is None:
             return None
         explained, log = gains
         found = self._integral(known.squares[:, None, None, 0] - explained)
         found += known.log[:, None, None] - 0.5 * np.log1p(ratio).sum(axis=3) - log
-        return log_sum_in(found, 0)[..., None]
+        return algebra.log_sum_in(found, 0)[..., None]
 
     def _under(self, known: ConditionedData, amplitudes: Floats, blocks: Floats, seen: Floats, sizes: bool) -> Floats:
         """Log evidence (M, a, b) of members with r columns, summed over the kinds of noise, or (M, 1, b) over the sizes too.
@@ -379,11 +356,11 @@ class CandidateComparison:
         b = known.squares.shape[1]
         shown, hidden = seen[..., :b], seen[..., b:]
         if hidden.shape[3]:
-            blocks = blocks - squared(hidden)
+            blocks = blocks - algebra.squared(hidden)
         if blocks.shape[3] == 1:
             strengths = blocks[..., 0]
         else:
-            strengths, turn = eigen(blocks)
+            strengths, turn = algebra.eigen(blocks)
             shown = turn.swapaxes(2, 3) @ shown
         variance = (amplitudes**2)[:, :, None]
         ratio = variance * np.maximum(strengths, 1e-300)[:, :, None, :]  # (k, M, a, r)
@@ -408,8 +385,7 @@ class CandidateComparison:
     def _weigh(self, data: Floats | None, conditions: Sequence[Version]) -> ConditionedData:
         own = data is None
         plain, weighed = (self.left[:, None], self._left_weighed) if data is None else (data, self._by_noise(data))
-        log = np.array([noise.log for noise in self._noises])
-        return self._given.beside(conditions, plain, weighed, log, own=own)
+        return self._given.beside(conditions, plain, weighed, self._logs, own=own)
 
     @cached_property
     def _given(self) -> Conditioning:

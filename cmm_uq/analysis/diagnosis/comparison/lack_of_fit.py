@@ -15,7 +15,7 @@ from math import comb
 import numpy as np
 from scipy import special
 
-from cmm_uq.analysis.diagnosis.comparison.conditional import Version
+from cmm_uq.analysis.diagnosis.comparison.conditional import AMPLITUDES, Version
 from cmm_uq.analysis.diagnosis.comparison.draws import draw_nothing
 from cmm_uq.analysis.diagnosis.comparison.evidence import CandidateComparison
 from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, SEVERAL, UNKNOWN, Explanation
@@ -52,7 +52,7 @@ def _residuals(normal: CandidateComparison, g: int, data: Floats) -> Floats:
 
     Each step is least squares of pseudo-values, which never overshoots (Huber 1981, Robust Statistics, section 7.8).
     """
-    noise, count = normal.precision(g), max(normal.degrees_of_freedom, 1)
+    noise, count = normal.precisions[g], max(normal.degrees_of_freedom, 1)
     white = noise.whitening @ data
     fit, most = noise.explained(white), float(tail_precision(np.zeros(1))[0])
     size = np.sqrt(np.sum((white - fit) ** 2, axis=0) / count)
@@ -176,7 +176,7 @@ class _Evidence:
         ]
         alone, both = np.zeros_like(nothing), np.full_like(something, -np.inf)
         if len(single) > 1:
-            lead = comparison.best(data, single) if lead is None else lead
+            lead = best_versions(comparison, data, single) if lead is None else lead
             for version, columns in _together(lead).items():
                 alone[columns], both[:, columns] = comparison.log_evidence(data[:, columns], [version], single)
         return cls(comparison.explanations, nothing, something, single, lead, alone, both)
@@ -208,6 +208,21 @@ class _Evidence:
             gain = special.logsumexp(beside, axis=0) - self.alone[columns]
             log_odds[columns] = np.logaddexp(log_odds[columns], pair + (gain + odds[first, columns]))
         return np.asarray(log_odds, dtype=np.float64)
+
+
+def best_versions(comparison: CandidateComparison, data: Floats, explanations: Sequence[int]) -> list[Version]:
+    """Version with most evidence among some visible explanations, for each column of data (m, b)."""
+    found = [Version(0, 0, 0.0)] * data.shape[1]
+    most = np.full(data.shape[1], -np.inf)
+    for group, each in comparison.each(data, (), explanations):
+        weight = np.where(np.isin(group.explanation, explanations), group.weight, -np.inf)
+        flat = (each + weight[:, None, None]).reshape(-1, data.shape[1])
+        at = flat.argmax(axis=0)
+        for column in np.flatnonzero(flat.max(axis=0) > most):
+            m, a = divmod(int(at[column]), AMPLITUDES)
+            found[column] = Version(int(group.explanation[m]), int(group.member[m]), float(group.amplitudes[m, a]))
+            most[column] = flat[at[column], column]
+    return found
 
 
 def _together(versions: Sequence[Version]) -> dict[Version, list[int]]:
