@@ -16,8 +16,6 @@ from tests.app.serve.laboratory import TODAY, opened_in
 
 
 class Looked:
-    """The site, asked without a network."""
-
     def __init__(self, place: Path) -> None:
         self.place, self.site = place, Site(place, today=lambda: TODAY)
 
@@ -30,7 +28,6 @@ class Looked:
 
 @pytest.fixture(scope="package")
 def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The file of the records, to be read only."""
     return opened_in(tmp_path_factory.mktemp("laboratory"))
 
 

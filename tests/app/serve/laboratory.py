@@ -35,7 +35,6 @@ PAGE = b'<!doctype html><p class="identity"><span class="number">No. <bdi>%s</bd
 
 
 def files(number: str) -> dict[str, bytes]:
-    """Of a certificate, by name."""
     return {
         "certificate.html": PAGE % number.encode(),
         "certificate.pdf": b"%%PDF-1.7 <pdf:Keywords>%s</pdf:Keywords>" % number.encode(),
@@ -45,12 +44,10 @@ def files(number: str) -> dict[str, bytes]:
 
 
 def hashes(of: dict[str, bytes]) -> dict[str, str]:
-    """SHA-256 by name."""
     return {name: sha256(content).hexdigest() for name, content in of.items()}
 
 
 def values(*figures: tuple[str, str, str, float, float, float | None]) -> list[list[Any]]:
-    """Name, quantity, unit, value, u and limit of each; the interval is two standard uncertainties to each side."""
     return [
         [name, what, unit, value, u, value - 2 * u, value + 2 * u, 0.4 * u, limit]
         for name, what, unit, value, u, limit in figures
@@ -58,7 +55,6 @@ def values(*figures: tuple[str, str, str, float, float, float | None]) -> list[l
 
 
 def opened_in(folder: Path) -> Path:
-    """The file of the records of a laboratory, made in a folder."""
     place = folder / "records.db"
     with made(place, 4, 3, released=True) as records:
 
@@ -103,6 +99,5 @@ def opened_in(folder: Path) -> Path:
 
 
 def entry_of(place: Path, number: str) -> int:
-    """Of the certificate of a number."""
     with open_records(place, read_only=True) as records:
         return records.named(number)[0].entry

@@ -40,7 +40,6 @@ def marks(svg: str) -> list[tuple[float, float]]:
 
 
 def joined(svg: str) -> list[int]:
-    """How many points each piece of the line has."""
     found = re.search(r'class="line" d="M([^"]*)"', svg)
     assert found is not None
     return [piece.count("L") + 1 for piece in found[1].split("M")]

@@ -24,8 +24,6 @@ FIXED = ["", "certificates", "certificates?decision=fail", "certificates?text=no
 
 
 class Tab:
-    """A tab of a browser without scripts, with all that it asked for and complained of."""
-
     def __init__(self, page: Page, url: str) -> None:
         self.page, self.url = page, url
         self.requests: list[str] = []
@@ -124,7 +122,6 @@ def pressed(tab: Tab, *keys: str) -> None:
 
 
 def tabbed_to(tab: Tab, text: str, most: int = 60) -> None:
-    """Press Tab until something with this text, or of this name, has the focus and shows it."""
     for _ in range(most):
         pressed(tab, "Tab")
         found = tab.page.evaluate(

@@ -24,7 +24,6 @@ Host = tuple[str, int]
 
 
 def spoken(host: Host, request: bytes, *, wait: float = 10.0) -> bytes:
-    """All that the server says to these bytes, until it closes."""
     with closing(socket.create_connection(host, timeout=wait)) as line:
         line.sendall(request)
         found = b""
@@ -145,7 +144,6 @@ def test_a_huge_file_is_refused_at_once(host: Host) -> None:
 
 @pytest.fixture
 def hasty(monkeypatch: pytest.MonkeyPatch) -> Iterator[Host]:
-    """A server with little patience and room for two."""
     import threading
 
     for name, value in {"HEAD_S": 0.4, "BODY_S": 0.4, "ANSWER_S": 0.4, "AT_ONCE": 2}.items():
@@ -166,7 +164,6 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> Iterator[Host]:
 
 
 def closed_after(line: socket.socket, drip: bytes = b"") -> float:
-    """Seconds until the server closes a line on which now and then a byte comes."""
     began = time.monotonic()
     line.settimeout(0.05)
     while time.monotonic() - began < 5:

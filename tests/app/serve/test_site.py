@@ -35,8 +35,6 @@ ADDRESSES = ["/", "/?state=overdue", "/?text=K1", "/machine?serial=K1", "/machin
 
 
 class Shown(HTMLParser):
-    """What a browser would see: the texts, the addresses, and every element's name."""
-
     def __init__(self, text: str) -> None:
         super().__init__()
         self.texts: list[str] = []
@@ -56,7 +54,6 @@ class Shown(HTMLParser):
 
 
 def every_address(looked: Looked) -> list[str]:
-    """Of a page each, with that of every certificate and of a hostile serial."""
     entries = [f"/certificate?entry={entry_of(looked.place, number)}" for number in ("k-1", "k-4", "sim-1", "h-1")]
     hostile = next(link for link in Shown(looked.text("/")).links if link.startswith("/machine?serial=%3Cscript"))
     return [*ADDRESSES, *entries, hostile]
@@ -362,7 +359,7 @@ def texts_of(value: Any) -> Iterator[str]:
 
 def test_every_text_of_every_page_is_a_message_or_of_the_records(
     looked: Looked, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     """As in documents: what stands in none of both could not be said in another language."""
     from cmm_uq.app.serve import site
 

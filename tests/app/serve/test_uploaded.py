@@ -16,7 +16,6 @@ BOUNDARY = "----WebKitFormBoundary7MA4YWxk"
 
 
 def form(content: bytes, name: str = "certificate.pdf", boundary: str = BOUNDARY) -> bytes:
-    """As RFC 7578 has it, and as Chromium sends it."""
     told = f'form-data; name="file"; filename="{name}"\r\nContent-Type: application/pdf'
     return (
         f"--{boundary}\r\nContent-Disposition: {told}\r\n\r\n".encode() + content + f"\r\n--{boundary}--\r\n".encode()

@@ -21,7 +21,6 @@ def machine(
     artefacts: str = "",
     adjusted: list[float] | None = None,
 ) -> DriftHistory:
-    """A history: times in years, a letter an artefact, times of the last adjustment in years."""
     n = len(years)
     since = np.full(n, np.nan) if adjusted is None else FIRST + YEAR * np.array(adjusted)
     return DriftHistory(
@@ -31,7 +30,6 @@ def machine(
 
 
 def one_node(**of: float) -> DriftPrior:
-    """A prior of one node."""
     usual = {
         "rate": 0.0,
         "rate_sd": 1.0,
@@ -46,11 +44,6 @@ def one_node(**of: float) -> DriftPrior:
 
 
 def dense(of: DriftHistory, prior: DriftPrior) -> tuple[float, Floats, Floats]:
-    """Log evidence, mean and covariance of (level at the last certificate, rate): every tale, one normal distribution each.
-
-    All is a linear map of independent normal variables: first level, rate, levels as left, increments of the walk, steps,
-    artefacts' errors, readings' errors.
-    """
     n, p = len(of.day), {name: float(getattr(prior, name)[0]) for name in (
         "rate", "rate_sd", "walk", "first_sd", "as_left_sd", "steps_per_year", "step_sd")}  # fmt: skip
     t = (of.day - FIRST) / YEAR

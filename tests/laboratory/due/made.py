@@ -17,12 +17,10 @@ MACHINE = RecordedMachine("1102", "Iota", "DEA", "Iota 1102", "Hall 1")
 def value(
     number: float, *, name: str = "scale_x.ppm", u: float = 0.5, u_artefact: float = 0.0, limit: float | None = 8.0
 ) -> RecordedValue:
-    """A value with its usual 95 % interval."""
     return RecordedValue(name, f"quantity {name}", "ppm", number, u, number - 2 * u, number + 2 * u, u_artefact, limit)
 
 
 def certificate(day: dt.date, *values: RecordedValue, entry: int = 1, **further: Any) -> RecordedCertificate:
-    """A certificate of a day; one value of 1 ppm where none is given."""
     usual: dict[str, Any] = {
         "job": f"job-{day}", "machine": "1102", "artefact": "BB-7", "kind": "some kind", "origin": "measured",
         "recorded": dt.datetime.combine(day, dt.time(12), dt.UTC), "adjusted_since": None, "state": "released",
@@ -41,7 +39,6 @@ def series(
     adjusted_since: Sequence[int] | int = 0,
     limit: float | None = 8.0,
 ) -> Series:
-    """A series; days count from :data:`FIRST`."""
     n, start = len(days), FIRST.toordinal()
     since = np.broadcast_to(np.asarray(adjusted_since), n)
     return Series(

@@ -17,7 +17,6 @@ U = 0.18**0.5
 
 
 def check(month: int, ratio: float, **further: object) -> RecordedCertificate:
-    """An interim check, so many standard uncertainties from the calibration."""
     day = FIRST + dt.timedelta(days=30 * month)
     return certificate(day, value(1.0 + ratio * U, u=0.5, u_artefact=0.4), interim=True, **further)
 

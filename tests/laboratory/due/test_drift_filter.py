@@ -60,10 +60,7 @@ def test_the_likeliest_tales_carry_nearly_all_of_the_evidence() -> None:
 
 
 def test_a_shared_artefact_leaves_the_rate_and_blurs_the_level() -> None:
-    """An error common to both certificates cancels in their difference; with nothing known before, variances just add.
-
-    One certificate in a hundred is wrong by five times u, which two certificates cannot show.
-    """
+    """An error common to both certificates cancels in their difference; with nothing known before, variances just add."""
     prior = one_node(rate_sd=100.0, first_sd=1000.0, walk=1e-6, steps_per_year=1e-12)
     own, common = (found(machine([0, 1], [0.0, 1.0], 0.5, part), prior)[2] for part in (0.0, 0.4))
     wrong = 0.01 * 24 * 0.25

@@ -17,7 +17,6 @@ ODD, NEW, MODELS = 7, 10, ("slow", "fast")
 
 
 def members() -> list[FleetMember]:
-    """Ten machines of two models that drift at 0.2 and 1.2 a year, one slow one at 3; an eleventh, fast, seen once."""
     random = np.random.default_rng(5)
     found = []
     for i in range(10):

@@ -26,7 +26,6 @@ THETA = np.log(MEDIANS) + np.array([[0.0] * 8, [0.3, -0.2, 0.5, 0.1, 0.2, -0.3, 
 
 @pytest.fixture(autouse=True)
 def _gaussian(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No steps, no wrong certificates, one size of walk: what is left is exactly normal."""
     monkeypatch.setattr(drift_filter, "_ODDS", np.array([0.0, -np.inf]))
     monkeypatch.setattr(drift_filter, "_log_steps", lambda years, prior: (
         np.zeros((len(years), len(prior))), np.full((len(years), len(prior)), -np.inf)))  # fmt: skip
@@ -34,7 +33,6 @@ def _gaussian(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def dense(theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """All values, their covariance, and the covariance of all rates with themselves and with the values."""
     of = {
         name: np.exp(value) * (1 if name == "steps_per_year" else UNIT)
         for name, value in zip(NAMES, theta, strict=True)
@@ -45,7 +43,6 @@ def dense(theta: Floats) -> tuple[Floats, Floats, Floats, Floats]:
                        for j in range(4)] for i in range(4)])  # fmt: skip
 
     def begun(i: int, k: int) -> tuple[float, float]:
-        """When the level was last set, and its standard deviation then."""
         since = MACHINES[i].adjusted_since[k]
         return (MACHINES[i].day[0], of["first_sd"]) if np.isnan(since) else (float(since), of["as_left_sd"])
 

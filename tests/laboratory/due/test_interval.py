@@ -17,7 +17,6 @@ from tests.laboratory.due.made import FIRST, certificate, value
 
 
 def yearly(*numbers: float, adjusted: int | None = None) -> list[RecordedCertificate]:
-    """A certificate every 365 days; before the one of this number the machine was adjusted."""
     found = []
     for i, number in enumerate(numbers):
         since = None if adjusted is None or i < adjusted else FIRST + dt.timedelta(days=365 * adjusted - 3)

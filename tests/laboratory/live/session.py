@@ -49,8 +49,6 @@ measurement,point,repeat,x_mm,y_mm,z_mm,time_s
 
 @dataclass
 class FakeClock:
-    """Both clocks, in ns, as a test sets them."""
-
     utc: int = 1_700_000_000_000_000_000
     monotonic: int = 5_000_000_000
 
@@ -86,7 +84,6 @@ def said(conductor: Conductor) -> list[str]:
 
 
 def type_in(acquisition: Acquisition, clock: FakeClock, *lines: str) -> list[str]:
-    """Lines, five seconds apart, and what the screen says to them."""
     told = []
     for line in lines:
         clock.go(5)

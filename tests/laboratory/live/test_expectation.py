@@ -18,7 +18,6 @@ from tests.recordings import bar_facts
 
 
 def left_out(model: MeasurementModel, row: int, sigma: float) -> tuple[float, float]:
-    """One observation less what a fit of all others predicts, and its standard deviation, µm: a fit without it."""
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     place = linear.freedoms.dense()
     whole = np.hstack([linear.design, place]) / linear.noise_scale[:, None]
@@ -51,7 +50,6 @@ def test_it_is_what_a_fit_without_the_observation_leaves(name: str) -> None:
 
 
 def repeated(errors_um: Floats, machine: Machine) -> MeasurementModel:
-    """Bars of 400 mm along x, (measurements, repeats) of them, each too long by an error."""
     count, repeats = errors_um.shape
     m, r = (a.ravel() for a in np.meshgrid(np.arange(1, count + 1), np.arange(1, repeats + 1), indexing="ij"))
     first = np.column_stack([100.0 + 0 * m, 100.0 + 10 * m, -300.0 + 0 * m])

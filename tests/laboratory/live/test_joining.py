@@ -14,7 +14,6 @@ S = 1_000_000_000
 
 
 def fed(times: list[float], value, latency_s: float = 0.0, max_gap_s: float = 10.0) -> Stream:  # type: ignore[no-untyped-def]
-    """A stream of what was there ``latency_s`` before each reading arrived."""
     stream = Stream("temp_c", "t", latency_s=latency_s, max_gap_s=max_gap_s)
     for time in times:
         stream.add(round((time + latency_s) * S), value(time))

@@ -33,7 +33,6 @@ def certificate(
     values: Sequence[Sequence[Any]] = (("scale_x.ppm", "Scale error of x", "ppm", 2.0, 0.5, 1.0, 3.0, 0.2, 8.0),),
     **further: Any,
 ) -> dict[str, Any]:
-    """Content of one report: each value is name, quantity, unit, value, u, lower, upper, u_artefact, limit."""
     content = {
         "command": "report", "job": f"{serial}-{day}", "number": f"K-{serial}-{day}",
         "machine": {"serial": serial, "name": f"Machine {serial}", "manufacturer": "DEA", "model": "Iota", "place": "Hall 1"},
@@ -48,22 +47,12 @@ def certificate(
 
 
 def moment(day: dt.date) -> dt.datetime:
-    """Of recording, in the afternoon of the day."""
     return dt.datetime.combine(day, dt.time(15), dt.UTC)
 
 
 def history(
     machines: int, each: int, *, seed: int = 0, models: int = 5, places: int = 7, artefacts: int = 20, released: bool = False
 ) -> Iterator[New]:  # fmt: skip
-    """Reports in the order of their days: linear drift with scatter, every tenth machine adjusted in the middle of its years.
-
-    Parameters
-    ----------
-    machines, each : how many machines, and certificates of each, a year apart.
-    seed : of everything random.
-    models, places, artefacts : how many different ones.
-    released : whether every certificate but the newest of each machine is released.
-    """
     random = np.random.default_rng(seed)
     count = len(VALUES)
     limits = np.array([limit for *_, limit in VALUES])
@@ -105,7 +94,6 @@ def history(
 
 
 def made(place: Path | str, machines: int, each: int, **how: Any) -> Records:
-    """Records with such a history, open."""
     records = open_records(place, create=True)
     records.append_all(history(machines, each, **how))
     return records

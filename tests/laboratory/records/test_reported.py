@@ -38,7 +38,6 @@ four_eyes = true
 
 @pytest.fixture(scope="module")
 def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The twenty bars reported into records in French, with a serial number and two keys for them."""
     folder = tmp_path_factory.mktemp("reported")
     job = Path(shutil.copytree(ROOT / "examples" / "iota-1102-20C", folder / "job"))
     toml = (job / "job.toml").read_text(encoding="utf-8")
@@ -56,7 +55,6 @@ def reported(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def records(reported: Path, tmp_path: Path) -> Iterator[Records]:
-    """A copy of them to sign in."""
     with open_records(Path(shutil.copytree(reported, tmp_path / "reports")) / "records.db") as opened:
         yield opened
 
@@ -209,7 +207,7 @@ def test_the_inputs_in_a_pdf_are_those_of_the_job(reported: Path) -> None:
 
 def test_a_correction_is_found_computed_again_and_replaced_by_a_draft(
     records: Records, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+) -> None:
     """A certificate of an older version whose scale was 3 ppm less; the version after it corrected scales of ball bars."""
     old = next(records.entries()).data
     old["version"], old["results_sha256"] = "0.4.0", "0" * 64
@@ -277,7 +275,7 @@ def test_corrections_stand_in_the_changelog_under_their_version_and_name_what_th
 )
 def test_a_correction_touches_a_certificate_unless_its_inputs_rule_it_out(
     correction: Correction, touched: bool, reported: Path, records: Records
-) -> None:  # fmt: skip
+) -> None:
     (found,) = records.certificates()
     assert correction.concerns(found.command, found.kind, JobInputs.of(inputs_of(reported / "iota"))) is touched
     assert correction.concerns(found.command, found.kind, None) is (

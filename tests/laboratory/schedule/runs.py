@@ -23,7 +23,6 @@ JOB = '[job]\nid = "{id}"\n[recording]\nfile = "points.csv"\n'
 
 
 def made(root: Path, name: str, recording: str = "1,2\n", id: str = "") -> Path:  # noqa: A002
-    """A job folder; its recording says what comes of it, see :meth:`Jobs.report`."""
     folder = root / name
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "job.toml").write_text(JOB.format(id=id or name))
@@ -33,11 +32,6 @@ def made(root: Path, name: str, recording: str = "1,2\n", id: str = "") -> Path:
 
 @dataclass(eq=False)
 class Jobs:
-    """Runs over a folder, one after another.
-
-    A recording that says ``fail`` is decided so; whatever else happens, ``before`` decides: it is asked of each job.
-    """
-
     root: Path
     channel: Kept = field(default_factory=Kept)
     before: Callable[[JobFolder], None] = lambda job: None
@@ -87,5 +81,4 @@ class Jobs:
         self.asleep()
 
     def states(self) -> dict[str, str]:
-        """Of each job of the last run, by id or name of the folder."""
         return {line["job"] or Path(line["folder"]).name: line["state"] for line in self.lines if "state" in line}

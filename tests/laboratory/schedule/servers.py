@@ -23,7 +23,6 @@ HOST = "localhost"
 
 
 def certificate(folder: Path) -> tuple[Path, Path]:
-    """A certificate for this computer and its key, made by OpenSSL; skipped without one."""
     openssl = shutil.which("openssl")
     if openssl is None:
         pytest.skip("no openssl is installed")
@@ -44,8 +43,6 @@ def serving(pair: tuple[Path, Path]) -> ssl.SSLContext:
 
 @dataclass(eq=False)
 class Post:
-    """A mail server's box."""
-
     letters: list[Letter] = field(default_factory=list)
     refused: frozenset[str] = frozenset()
     logins: list[tuple[str, str]] = field(default_factory=list)
@@ -70,7 +67,6 @@ class Post:
 
 @contextlib.contextmanager
 def mail_server(post: Post, security: str = "none", pair: tuple[Path, Path] | None = None) -> Iterator[int]:
-    """A mail server; gives its port."""
     controller = pytest.importorskip("aiosmtpd.controller")
     further: dict[str, Any] = {}
     if security == "starttls":
@@ -93,8 +89,6 @@ def mail_server(post: Post, security: str = "none", pair: tuple[Path, Path] | No
 
 @dataclass(eq=False)
 class Taken:
-    """What a web address was sent."""
-
     requests: list[tuple[dict[str, str], bytes]] = field(default_factory=list)
     answer: int = 204
     headers: dict[str, str] = field(default_factory=dict)
@@ -102,7 +96,6 @@ class Taken:
 
 @contextlib.contextmanager
 def web_server(taken: Taken, pair: tuple[Path, Path] | None = None) -> Iterator[int]:
-    """A web server; gives its port."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
@@ -136,7 +129,6 @@ def web_server(taken: Taken, pair: tuple[Path, Path] | None = None) -> Iterator[
 
 @contextlib.contextmanager
 def hanging_server(greeting: bytes = b"") -> Iterator[int]:
-    """A server that takes connections and then says nothing; gives its port."""
     held: list[socket.socket] = []
     server = socket.create_server(("127.0.0.1", 0))
 

@@ -11,15 +11,6 @@ EXAMPLE = ROOT / "examples" / "plane-simulated"
 
 
 def small_job(folder: Path, name: str, remarks: str = "", *, shift_um: float = 0.0) -> Path:
-    """A job that is analysed in half a second.
-
-    Parameters
-    ----------
-    folder : that it is made in.
-    name : of its own folder, and its id.
-    remarks : of the job.
-    shift_um : of its middle point, so that jobs differ.
-    """
     job = folder / name
     job.mkdir(parents=True)
     toml = (EXAMPLE / "job.toml").read_text(encoding="utf-8")

@@ -34,7 +34,6 @@ class Cluster:
 
 @pytest.fixture(scope="module")
 def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """A scheduler and two workers, a process each, as a laboratory starts them."""
     folder = tmp_path_factory.mktemp("cluster")
     said, begun = folder / "scheduler.json", []
 

@@ -88,8 +88,6 @@ def _crash(self: Path, target: Path) -> Path:
 
 @dataclass(eq=False)
 class Locked:
-    """State that cannot be written for a while."""
-
     failures: int
     keys: set[str] = field(default_factory=set)
 

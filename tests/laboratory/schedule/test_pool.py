@@ -124,7 +124,6 @@ def test_a_process_whose_asker_is_killed_does_not_go_on_with_its_task() -> None:
 
 
 def _runs(process: int) -> bool:
-    """Whether it is there and no mere entry whose parent has not asked how it ended."""
     try:
         return "\nState:\tZ" not in Path(f"/proc/{process}/status").read_text()
     except OSError:

@@ -58,7 +58,6 @@ def test_cron_knows_the_days_by_their_names(tmp_path: Path) -> None:
 
 
 def exec_words(setting: str) -> list[str]:
-    """A command line as systemd.service(5) has it: quotes, backslashes, ``%%`` and ``$$``."""
     words = re.findall(r'"((?:[^"\\]|\\.)*)"|(\S+)', setting)
     return [re.sub(r"\\(.)", r"\1", a or b).replace("%%", "%").replace("$$", "$") for a, b in words]
 

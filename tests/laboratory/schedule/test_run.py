@@ -60,9 +60,9 @@ def test_a_dry_run_says_what_would_happen_and_leaves_nothing_behind(jobs: Jobs) 
 
 
 @pytest.mark.parametrize(
-    ("word", "events", "code"), [("1,2", [], 0), ("fail", ["fail"], 1), ("incomplete", ["incomplete"], 1),
-                                 ("mismatch", ["mismatch"], 1)],
-)  # fmt: skip
+    ("word", "events", "code"),
+    [("1,2", [], 0), ("fail", ["fail"], 1), ("incomplete", ["incomplete"], 1), ("mismatch", ["mismatch"], 1)],
+)
 def test_what_needs_a_person_is_told_once_and_is_in_the_exit_code(
     jobs: Jobs, word: str, events: list[str], code: int
 ) -> None:
@@ -162,10 +162,7 @@ def test_a_folder_that_is_still_being_copied_is_left_for_the_next_run(jobs: Jobs
 
 @pytest.mark.parametrize(("named", "state"), [("b", "reported"), ("C", "waiting")])
 def test_a_job_that_was_read_before_it_was_whole_is_read_again(
-    jobs: Jobs,
-    named: str,
-    state: str,
-    monkeypatch: pytest.MonkeyPatch,
+    jobs: Jobs, named: str, state: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its last byte comes between the first look into job.toml and the one at the folder; then it may have another's id."""
     path = jobs.root / "b" / "job.toml"

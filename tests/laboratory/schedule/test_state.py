@@ -29,7 +29,6 @@ def records(tmp_path: Path) -> Iterator[Records]:
 
 
 def report(out: Path, job: str = "a", inputs: dict[str, str] = INPUTS, command: str = "report") -> str:
-    """Files of a report; the hash of its results."""
     results = json.dumps({"job": {"id": job, "inputs_sha256": inputs}}).encode()
     with staged(out / job, Owner(command, job)) as place:
         place.write({"results.json": results, "certificate.pdf": b"%PDF"})

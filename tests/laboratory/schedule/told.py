@@ -13,8 +13,6 @@ NOW = "2026-11-22T06:15:00Z"
 
 @dataclass(eq=False)
 class Kept:
-    """Fails as often as it is told to, before it takes messages."""
-
     name: str = "kept"
     events: frozenset[str] = frozenset(EVENTS)
     failures: int = 0

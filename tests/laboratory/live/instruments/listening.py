@@ -19,8 +19,6 @@ PATIENCE_S = 30.0
 
 
 class Listener:
-    """Takes every event of a source in a thread of its own, with the time at which it was given."""
-
     def __init__(self, source: LiveSource) -> None:
         self.source, self.events, self.times = source, [], []
         self._stop = threading.Event()
@@ -33,7 +31,6 @@ class Listener:
             self.events.append(event)
 
     def until(self, enough: Callable[[Self], bool]) -> None:
-        """Wait until it has heard enough."""
         end = time.monotonic() + PATIENCE_S
         while not enough(self):
             assert time.monotonic() < end, self.events[-5:]
@@ -43,7 +40,6 @@ class Listener:
         return [event for event in self.events[since:] if isinstance(event, sort)]
 
     def good(self, since: int = 0) -> list[Reading]:
-        """Readings with values and nothing wrong."""
         return [
             event for event in self.events[since:] if isinstance(event, Reading) and event.values and not event.status
         ]
@@ -65,7 +61,6 @@ def listening(source: LiveSource) -> Iterator[Listener]:
 
 
 def hasty(name: str, **send: object) -> ProfileFile:
-    """A ready profile that asks more often."""
     profile = profile_named(name)
     faster = profile.send.model_copy(update={"every_s": 0.05, **send})
     return profile.model_copy(update={"send": faster})

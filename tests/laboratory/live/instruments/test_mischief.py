@@ -21,7 +21,6 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="no pseudo-terminals her
 
 
 def returned(heard: Listener, since: int, at: float) -> float:
-    """Time from a moment until the source said that it was back."""
     heard.until(lambda one: one.of(Returned, since) and one.good(since))
     place = next(i for i, event in enumerate(heard.events) if i >= since and isinstance(event, Returned))
     return heard.times[place] - at
@@ -74,9 +73,9 @@ def test_one_that_was_switched_off_is_told_again_what_it_forgot(tmp_path: Path) 
         assert returned(heard, since, time.monotonic()) < WITHIN_S
 
 
-@pytest.mark.parametrize(("keys", "told"), [
-    ({"halves": True}, ""), ({"noise": b"\x00\xff#"}, "not understood"), ({"garbled": True}, ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("keys", "told"), [({"halves": True}, ""), ({"noise": b"\x00\xff#"}, "not understood"), ({"garbled": True}, "")]
+)
 def test_half_lines_noise_and_a_wrong_baud_rate_give_words_and_no_value(
     keys: dict[str, object], told: str, tmp_path: Path
 ) -> None:
@@ -108,8 +107,6 @@ def test_bytes_one_at_a_time_make_the_same_readings(tmp_path: Path) -> None:
 
 
 class Counting(Speaker):
-    """Counts what it sends, a hundred a second."""
-
     every_s = 0.01
 
     def says(self) -> bytes:
@@ -131,8 +128,6 @@ def test_another_instrument_than_the_declared_one_is_refused(tmp_path: Path) -> 
 
 
 class Other(Readout1502):
-    """One of the same model."""
-
     def answer(self, command: str) -> bytes:
         return super().answer(command).replace(b"A24680", b"A99999")
 

@@ -14,8 +14,6 @@ from cmm_uq.laboratory.live.instruments.source import Gap, Reading
 
 
 class FastClock:
-    """Time that passes when somebody waits."""
-
     def __init__(self) -> None:
         self.now = 0
 
