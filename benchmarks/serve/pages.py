@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 from cmm_uq.app.cli import NEW_OBJECTS
-from cmm_uq.app.serve.exchange import Request, read_address
+from cmm_uq.app.serve.exchange import WebRequest, read_address
 from cmm_uq.app.serve.site import Site
 from tests.laboratory.records.histories import made
 
@@ -37,7 +37,7 @@ ADDRESSES = {
 
 def timed(site: Site, target: str, *, anew: bool = False) -> tuple[float, float, int]:
     """Median of wall time and of the processor's, ms, and bytes of the page."""
-    asked, wall, processor, size = Request("GET", *read_address(target)), [], [], 0
+    asked, wall, processor, size = WebRequest("GET", *read_address(target)), [], [], 0
     for _ in range(TIMES):
         if anew:
             site.forget()

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.laboratory.due.crossing import DAYS, Crossings
 from cmm_uq.laboratory.due.fleet import Estimates, FleetMember, FleetResult, FleetValue, UsualRate, fit_fleet, judged
-from tests.laboratory.due.drifting import FIRST, machine
+from tests.laboratory.due.histories import FIRST, machine
 
 LIMIT = 4.0
 BEYOND, CROSSING, ODD, MODELS = 20, 2000, 40, 30

@@ -19,7 +19,7 @@ from cmm_uq.laboratory.due.history import MachineHistory, machine_history
 from cmm_uq.laboratory.due.rule import Rule
 from cmm_uq.laboratory.records.facts import ArtefactRow
 from tests.certificate.saying import strangers
-from tests.laboratory.due.made import FIRST, MACHINE, certificate, series, value
+from tests.laboratory.due.histories import MACHINE, FIRST_of_made, certificate, series, value
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -31,7 +31,7 @@ OWN = "Iota DEA 1102 Hall scale_x.ppm Scale error of x quantity BB-7 PTB ballbar
 def history(*numbers: float, limit: float | None = 8.0) -> MachineHistory:
     """A recording a year; an interim check among them."""
     days = [300 * i for i in range(len(numbers))]
-    made = [certificate(FIRST + dt.timedelta(days=day), value(number), interim=i == 1, entry=i + 1)
+    made = [certificate(FIRST_of_made + dt.timedelta(days=day), value(number), interim=i == 1, entry=i + 1)
             for i, (day, number) in enumerate(zip(days, numbers, strict=True))]  # fmt: skip
     return machine_history(MACHINE, made, {"scale_x.ppm": series(days, numbers, 0.5, limit=limit)}, ON)
 
@@ -39,8 +39,8 @@ def history(*numbers: float, limit: float | None = 8.0) -> MachineHistory:
 def items() -> list[DueItem]:
     artefact = ArtefactRow("BB-7", "ballbar", "PTB 1", "PTB", None, dt.date(2026, 1, 1))
     rules = (None, {"every_months": 6}, {"method": "A3"}, {"method": "staircase"}, {"method": "control chart"})
-    known = [CalibrationRecord(MACHINE, Rule.of(rule), [certificate(FIRST)], False, ON) for rule in rules]
-    checked = [certificate(FIRST), certificate(FIRST + dt.timedelta(days=30), value(9.0), interim=True)]
+    known = [CalibrationRecord(MACHINE, Rule.of(rule), [certificate(FIRST_of_made)], False, ON) for rule in rules]
+    checked = [certificate(FIRST_of_made), certificate(FIRST_of_made + dt.timedelta(days=30), value(9.0), interim=True)]
     made = [
         machine_due(one, {"BB-7": artefact}, ON, list) for one in [*known, CalibrationRecord(MACHINE, Rule(), checked)]
     ]
@@ -82,7 +82,7 @@ def test_when_a_limit_is_crossed_in_words() -> None:
     alone = meets(history(1.0).values[0], ON)  # one certificate has no line, and the model a wide guess
     assert alone.startswith("about 20")
     assert alone.endswith("perhaps never")
-    unknown = machine_history(MACHINE, [certificate(FIRST)], {"scale_x.ppm": series([0], [1.0], 0.0)}, ON)
+    unknown = machine_history(MACHINE, [certificate(FIRST_of_made)], {"scale_x.ppm": series([0], [1.0], 0.0)}, ON)
     assert meets(unknown.values[0], ON) == "cannot be foreseen"  # stated without an uncertainty
 
 

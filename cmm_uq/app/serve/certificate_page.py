@@ -7,7 +7,7 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from cmm_uq.app.serve.exchange import RefusedRequest, Request, Response
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse
 from cmm_uq.app.serve.page import (
     DECISIONS,
     NOT_MEASURED,
@@ -45,7 +45,7 @@ from cmm_uq.laboratory.records.listing import entry_of
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
-def certificate_page(view: SiteView, asked: Request) -> WebPage:
+def certificate_page(view: SiteView, asked: WebRequest) -> WebPage:
     """The certificate whose entry the address names."""
     asked.only(("entry",))
     one, entry = _named(view, asked)
@@ -80,7 +80,7 @@ def _lead(one: RecordedCertificate) -> Text:
                origin=ORIGINS.get(one.origin, Verbatim(one.origin)))  # fmt: skip
 
 
-def recorded_file(view: SiteView, asked: Request) -> Response:
+def recorded_file(view: SiteView, asked: WebRequest) -> WebResponse:
     """A file of a certificate, as it was recorded."""
     asked.only(("entry", "name", "keep"))
     keep, name = asked.one_of("keep", ("yes",)) == "yes", asked.text("name")
@@ -93,7 +93,7 @@ def recorded_file(view: SiteView, asked: Request) -> Response:
     )
 
 
-def _named(view: SiteView, asked: Request) -> tuple[RecordedCertificate, Entry]:
+def _named(view: SiteView, asked: WebRequest) -> tuple[RecordedCertificate, Entry]:
     number_of = asked.count("entry", 0)
     if not number_of:
         raise RefusedRequest(HTTPStatus.NOT_FOUND, say("the address names no entry of the records"))

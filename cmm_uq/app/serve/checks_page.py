@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from cmm_uq.app.serve.exchange import LARGEST, Request, UploadedFile, read_dropped
+from cmm_uq.app.serve.exchange import LARGEST, UploadedFile, WebRequest, read_dropped
 from cmm_uq.app.serve.page import (
     NOT_MEASURED,
     Block,
@@ -111,14 +111,14 @@ _SCOPE = say(
 )
 
 
-def file_page(view: SiteView, asked: Request) -> WebPage:
+def file_page(view: SiteView, asked: WebRequest) -> WebPage:
     """The form."""
     asked.only(())
     return WebPage(say("Check a file"), "/file",
                 lead=say("Is this certificate the one that was issued, and does it still hold?"), blocks=_form())  # fmt: skip
 
 
-def dropped_page(view: SiteView, asked: Request) -> WebPage:
+def dropped_page(view: SiteView, asked: WebRequest) -> WebPage:
     """What the records know of the file in the request."""
     asked.only(())
     dropped = read_dropped(asked)
@@ -198,7 +198,7 @@ _WHAT = say(
 )
 
 
-def integrity_page(view: SiteView, asked: Request) -> WebPage:
+def integrity_page(view: SiteView, asked: WebRequest) -> WebPage:
     """The head of the records, and what the last comparison found."""
     asked.only(())
     count, head = view.records.head()

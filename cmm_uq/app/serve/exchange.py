@@ -40,7 +40,7 @@ class RefusedRequest(Exception):  # noqa: N818 - what it is, in the words of the
 
 
 @dataclass(frozen=True)
-class Request:
+class WebRequest:
     """Its path as it was sent, each name of the query once, headers by name in small letters, ``length`` bytes of body."""
 
     method: str
@@ -146,7 +146,7 @@ RECORDED = (
 
 
 @dataclass(frozen=True)
-class Response:
+class WebResponse:
     """What is sent.
 
     ``body``: its bytes; ``policy``: what a browser may do with it; ``referrer``: whom a browser tells where it comes
@@ -194,7 +194,7 @@ class UploadedFile:
     content: bytes | None
 
 
-def read_dropped(asked: Request) -> UploadedFile:
+def read_dropped(asked: WebRequest) -> UploadedFile:
     """The file in the body of a form."""
     found = _BOUNDARY.fullmatch(asked.headers.get("content-type", "").strip())
     if found is None or asked.body is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Mapping
 
-from cmm_uq.app.serve.exchange import Request, bad
+from cmm_uq.app.serve.exchange import WebRequest, bad
 from cmm_uq.app.serve.overview import SOON
 from cmm_uq.app.serve.page import (
     DECISIONS,
@@ -38,7 +38,7 @@ ANY = ("", say("Any"))
 _KEYS = ("text", "machine", "artefact", "origin", "state", "decision", "since", "until", "page")
 
 
-def certificates_page(view: SiteView, asked: Request) -> WebPage:
+def certificates_page(view: SiteView, asked: WebRequest) -> WebPage:
     """Certificates and interim checks."""
     asked.only(_KEYS)
     choice = CertificateFilter(
@@ -75,7 +75,7 @@ def certificates_page(view: SiteView, asked: Request) -> WebPage:
     )  # fmt: skip
 
 
-def diagnoses_page(view: SiteView, asked: Request) -> WebPage:
+def diagnoses_page(view: SiteView, asked: WebRequest) -> WebPage:
     """Verdicts of certificates and of diagnoses on whether a recording agrees with its model."""
     asked.only(("text", "verdict", "since", "until", "page"))
     verdict = asked.one_of("verdict", (*VERDICTS, "all"))
@@ -149,7 +149,7 @@ ARTEFACT_COLUMNS = columns(
 )
 
 
-def artefacts_page(view: SiteView, asked: Request) -> WebPage:
+def artefacts_page(view: SiteView, asked: WebRequest) -> WebPage:
     """All artefacts."""
     asked.only(("text", "page"))
     text, page = asked.text("text"), asked.count("page")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from http import HTTPStatus
 
-from cmm_uq.app.serve.exchange import RefusedRequest, Request
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest
 from cmm_uq.app.serve.overview import GROUPS, MachineStanding
 from cmm_uq.app.serve.page import (
     DECISIONS,
@@ -59,7 +59,7 @@ COLUMNS = columns(
 )
 
 
-def machines_page(view: SiteView, asked: Request) -> WebPage:
+def machines_page(view: SiteView, asked: WebRequest) -> WebPage:
     """All machines, or those that were chosen."""
     asked.only(("text", "state", "place", "page"))
     text, state, place = asked.text("text"), asked.one_of("state", tuple(GROUPS)), asked.text("place")
@@ -161,7 +161,7 @@ LISTED = 10
 """Certificates that are listed here; a list of its own has all."""
 
 
-def machine_page(view: SiteView, asked: Request) -> WebPage:
+def machine_page(view: SiteView, asked: WebRequest) -> WebPage:
     """The machine that the address names, by serial or by name."""
     asked.only(("serial",))
     serial = asked.text("serial")

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any
 from urllib.parse import quote
 
-from cmm_uq.app.serve.exchange import OWN, RECORDED, RefusedRequest, Response
+from cmm_uq.app.serve.exchange import OWN, RECORDED, RefusedRequest, WebResponse
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.output.manifest import plain_name, read_manifest
 from cmm_uq.laboratory.records.entries import Entry
@@ -114,10 +114,10 @@ def results_of(files: tuple[RecordedFile, ...], folder: Path) -> dict[str, Any]:
     return {}
 
 
-def sent(file: RecordedFile, content: bytes, *, keep: bool) -> Response:
+def sent(file: RecordedFile, content: bytes, *, keep: bool) -> WebResponse:
     """A recorded file as an answer."""
     media, policy = MEDIA.get(Path(file.name).suffix.lower(), ("application/octet-stream", OWN))
     how = "attachment" if keep or not file.shown else "inline"
     name = quote(file.name.rpartition("/")[2], safe="")
     headers = {"Content-Disposition": f"{how}; filename*=UTF-8''{name}"}
-    return Response(content, media, policy=policy, headers=headers)
+    return WebResponse(content, media, policy=policy, headers=headers)

@@ -19,7 +19,7 @@ from socketserver import TCPServer
 from typing import Any, BinaryIO, cast
 
 from cmm_uq import __version__
-from cmm_uq.app.serve.exchange import RefusedRequest, Request, Response, bad, read_address
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse, bad, read_address
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.messages import Verbatim, say
 
@@ -31,7 +31,7 @@ AT_ONCE = 32
 
 LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
 
-Answering = Callable[[Request | RefusedRequest], Response]
+Answering = Callable[[WebRequest | RefusedRequest], WebResponse]
 """Given a request, or why it is none; never raises."""
 
 
@@ -167,14 +167,14 @@ class _Handler(BaseHTTPRequestHandler):
         """A form of this site."""
         self._answer(self._posted)
 
-    def _answer(self, ask: Callable[[], Request]) -> None:
+    def _answer(self, ask: Callable[[], WebRequest]) -> None:
         try:
-            asked: Request | RefusedRequest = ask()
+            asked: WebRequest | RefusedRequest = ask()
         except RefusedRequest as refused:
             asked = refused
         self._send(self.server.answer(asked))
 
-    def _asked(self) -> Request:
+    def _asked(self) -> WebRequest:
         hosts = self.headers.get_all("Host", [])
         if len(hosts) != 1 or not self.server.answers_to(hosts[0].strip()):
             raise RefusedRequest(
@@ -183,9 +183,9 @@ class _Handler(BaseHTTPRequestHandler):
             )  # fmt: skip
         path, query = read_address(self.path)
         headers = {name.lower(): value for name, value in self.headers.items()}
-        return Request(self.command, path, query, headers)
+        return WebRequest(self.command, path, query, headers)
 
-    def _posted(self) -> Request:
+    def _posted(self) -> WebRequest:
         asked = self._asked()
         origin = asked.headers.get("origin")
         host = f"http://{asked.headers['host'].strip().lower()}"
@@ -199,9 +199,9 @@ class _Handler(BaseHTTPRequestHandler):
             raise bad(say("the request says that it is longer than anything"))
         self._timed.allow(BODY_S)
         body = cast("BinaryIO", self.rfile)
-        return Request(asked.method, asked.path, asked.query, asked.headers, body, int(given[0]))
+        return WebRequest(asked.method, asked.path, asked.query, asked.headers, body, int(given[0]))
 
-    def _send(self, answer: Response) -> None:
+    def _send(self, answer: WebResponse) -> None:
         """All of it within its time; then the connection is closed, after what still comes has been let go."""
         self.close_connection = True
         self.connection.settimeout(ANSWER_S)

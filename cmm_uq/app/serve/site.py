@@ -21,7 +21,7 @@ from cmm_uq import __version__
 from cmm_uq.app.serve import trends as drawing
 from cmm_uq.app.serve.certificate_page import certificate_page, recorded_file
 from cmm_uq.app.serve.checks_page import dropped_page, file_page, integrity_page
-from cmm_uq.app.serve.exchange import RefusedRequest, Request, Response
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest, WebResponse
 from cmm_uq.app.serve.lists import artefacts_page, certificates_page, diagnoses_page
 from cmm_uq.app.serve.machines_page import machine_page, machines_page
 from cmm_uq.app.serve.overview import DueDates, MachineStanding, by_rule, overview
@@ -96,7 +96,7 @@ def _picture(chart: Chart) -> Markup:
     return Markup(f'<svg viewBox="{size}" role="img" aria-label="{label}">{chart.svg}</svg>')  # noqa: S704 - nothing in it is from elsewhere
 
 
-Made = Callable[[SiteView, Request], WebPage | Response]
+Made = Callable[[SiteView, WebRequest], WebPage | WebResponse]
 
 PAGES: Mapping[str, Made] = {
     "/": machines_page, "/machine": machine_page, "/certificates": certificates_page, "/certificate": certificate_page,
@@ -140,7 +140,7 @@ class Site:
         with contextlib.suppress(CmmUqError):  # whoever looks is told
             self.machines()
 
-    def answer(self, asked: Request | RefusedRequest) -> Response:
+    def answer(self, asked: WebRequest | RefusedRequest) -> WebResponse:
         """The answer to a request, whatever happens."""
         try:
             if isinstance(asked, RefusedRequest):
@@ -165,24 +165,24 @@ class Site:
                 _refusal(RefusedRequest(HTTPStatus.INTERNAL_SERVER_ERROR, told, say("Please report it")))
             )
 
-    def _answer(self, asked: Request) -> Response:
+    def _answer(self, asked: WebRequest) -> WebResponse:
         if asked.method == "POST":
             return self._posted(asked)
         if asked.path in ("/style.css", "/icon.svg"):
             css = asked.path.endswith("css")
-            return Response(style() if css else icon(), "text/css; charset=utf-8" if css else "image/svg+xml")
+            return WebResponse(style() if css else icon(), "text/css; charset=utf-8" if css else "image/svg+xml")
         make = PAGES.get(asked.path)
         if make is None:
             raise RefusedRequest(HTTPStatus.NOT_FOUND, say("there is no page of that address"))
         with self.opened() as records:
             made = make(self._view(records), asked)
-        return made if isinstance(made, Response) else self._shown(made)
+        return made if isinstance(made, WebResponse) else self._shown(made)
 
-    def _posted(self, asked: Request) -> Response:
+    def _posted(self, asked: WebRequest) -> WebResponse:
         if asked.path in ("/integrity/chain", "/integrity/files"):
             asked.only(())
             self.checking.begin(files=asked.path.endswith("files"))
-            return Response(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": "/integrity"})
+            return WebResponse(b"", status=HTTPStatus.SEE_OTHER, headers={"Location": "/integrity"})
         if asked.path != "/file":
             raise RefusedRequest(HTTPStatus.METHOD_NOT_ALLOWED, say("this page can only be looked at"))
         with self.opened() as records:
@@ -209,13 +209,13 @@ class Site:
         with self._lock:
             self._kept = None
 
-    def _shown(self, page: WebPage) -> Response:
+    def _shown(self, page: WebPage) -> WebResponse:
         foot = (
             say("Records: {place}. To be looked at only: nothing here can be changed.", place=Verbatim(self.place)),
             say("cmm-uq {version}", version=Verbatim(__version__)),
         )
         referrer = "same-origin" if page.place in WITH_FORM else "no-referrer"
-        return Response(render_page(page, foot), status=page.status, referrer=referrer)
+        return WebResponse(render_page(page, foot), status=page.status, referrer=referrer)
 
 
 def _refusal(refused: RefusedRequest, title: Text | None = None) -> WebPage:

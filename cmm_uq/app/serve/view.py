@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from cmm_uq.app.serve.exchange import Request
+from cmm_uq.app.serve.exchange import WebRequest
 from cmm_uq.app.serve.overview import MachineStanding
 from cmm_uq.app.serve.page import (
     DECISIONS,
@@ -169,7 +169,7 @@ def paged(records: Records, choice: CertificateFilter, page: int) -> tuple[list[
     return chosen(records, choice, PER_PAGE, (page - 1) * PER_PAGE)
 
 
-def pager(asked: Request, count: int, page: int, what: Text) -> tuple[Pager, ...]:
+def pager(asked: WebRequest, count: int, page: int, what: Text) -> tuple[Pager, ...]:
     """Where in the list the reader is; nothing where there is only one page."""
     if count <= PER_PAGE and page == 1:
         return ()

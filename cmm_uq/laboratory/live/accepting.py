@@ -8,7 +8,7 @@ from typing import Any
 from cmm_uq.base.errors import OutputError
 from cmm_uq.base.messages import Text, Verbatim, commas, say, signed
 from cmm_uq.laboratory.live.journal import Moment
-from cmm_uq.laboratory.live.judging import Judge, Judgement
+from cmm_uq.laboratory.live.judging import Judge, PointJudgement
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder
 from cmm_uq.laboratory.live.story import Story
@@ -36,7 +36,7 @@ class Accepting:
         self._due: list[Run] = []
         self._waiting: list[PlannedPoint] = []
         self._written = -1
-        self.judged = Judgement()
+        self.judged = PointJudgement()
 
     @property
     def story(self) -> Story:
@@ -97,13 +97,13 @@ class Accepting:
         for run in [run for run in self._due if run in there]:
             self._due.remove(run)
             judged = self._judge.run(run, rows, repeats_most=self._repeats_most)
-            self.judged = Judgement((*self.judged.shown, *judged.shown), (), judged.again)
+            self.judged = PointJudgement((*self.judged.shown, *judged.shown), (), judged.again)
             for text in judged.shown:
                 self._tell(text)
             self._warn(judged)
             if judged.again is not None:
                 self._tell(say("REPEAT? {why} (repeat does)", why=judged.again))
 
-    def _warn(self, judged: Judgement) -> None:
+    def _warn(self, judged: PointJudgement) -> None:
         for warning in judged.warnings:
             self._tell(say("WARNING: {why}", why=warning))

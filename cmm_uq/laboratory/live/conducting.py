@@ -20,7 +20,7 @@ from cmm_uq.jobs.tables.plan import AcquireFacts
 from cmm_uq.laboratory.live.accepting import Accepting
 from cmm_uq.laboratory.live.instruments.source import Event, Reading
 from cmm_uq.laboratory.live.journal import Moment
-from cmm_uq.laboratory.live.judging import Judge, Judgement
+from cmm_uq.laboratory.live.judging import Judge, PointJudgement
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder
 from cmm_uq.laboratory.live.screen import WORDS, OperatorInput, SessionView, coming, picture, understood
@@ -229,7 +229,7 @@ class Conductor:
         last = list(self.story.points.values())[-1]
         self.recorder.undo([last], reason)
         self._after_word()
-        self._accepting.judged, self._wanted = Judgement(), (last.place[0], last.place[2])
+        self._accepting.judged, self._wanted = PointJudgement(), (last.place[0], last.place[2])
         self.tell(say("taken back: measurement {m}, point {p}, repeat {r}: {why}", m=last.place[0], p=last.place[1],
                        r=last.place[2], why=Verbatim(reason)))  # fmt: skip
 
@@ -240,7 +240,7 @@ class Conductor:
         run = self.lead.more((last[0], last[2]), self.story)
         self.recorder.say("repeat", measurement=run[0], repeat=run[1])
         self._after_word()
-        self._wanted, self._accepting.judged = run, Judgement()
+        self._wanted, self._accepting.judged = run, PointJudgement()
 
     def _skip(self, reason: str) -> None:
         step = self.step

@@ -30,7 +30,7 @@ and by less than this part of that (squares) once they change places."""
 
 
 @dataclass(frozen=True)
-class Judgement:
+class PointJudgement:
     """What is said.
 
     ``again``: why the set-up should be measured once more; ``None``: nothing asks for it.
@@ -58,7 +58,7 @@ class Judge:
     sigma: float | None
     where: str
 
-    def point(self, step: PlannedPoint, story: Story, lead: Lead) -> Judgement:
+    def point(self, step: PlannedPoint, story: Story, lead: Lead) -> PointJudgement:
         """Of a point that was just accepted."""
         place, taken = step.place, story.by_place
         own = taken[place]
@@ -72,12 +72,12 @@ class Judge:
         steps = lead.steps((place[0], place[2]))
         if (other := _exchanged(step, steps, taken)) is not None:
             warnings.append(say("points {own} and {other} seem exchanged against the plan", own=place[1], other=other))
-        return Judgement(self._live(step, steps, story), tuple(warnings))
+        return PointJudgement(self._live(step, steps, story), tuple(warnings))
 
-    def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> Judgement:
+    def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> PointJudgement:
         """Of a set-up that is complete, with all that are."""
         if self.observe is None or not rows:
-            return Judgement()
+            return PointJudgement()
         points = self.points(rows)
         needed = {column for effect in self.effects for column in effect.columns}
         try:
@@ -88,8 +88,8 @@ class Judge:
             warnings = [one.why for one in found.findings if run[0] in one.measurements]
             shown, again = self._expected(run, found.points, repeats_most)
         except CmmUqError as error:
-            return Judgement((), (Verbatim(f"{error.problem}. {error.fix or ''}".rstrip()),))
-        return Judgement(shown, tuple(warnings), again)
+            return PointJudgement((), (Verbatim(f"{error.problem}. {error.fix or ''}".rstrip()),))
+        return PointJudgement(shown, tuple(warnings), again)
 
     def points(self, rows: Sequence[Row]) -> Points:
         """Rows as points, with the columns that all of them have."""

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from cmm_uq.app.serve.exchange import Request, Response, read_address
+from cmm_uq.app.serve.exchange import WebRequest, WebResponse, read_address
 from cmm_uq.app.serve.server import RecordsServer
 from cmm_uq.app.serve.site import Site
 from tests.app.serve.laboratory import TODAY, opened_in
@@ -19,8 +19,8 @@ class Looked:
     def __init__(self, place: Path) -> None:
         self.place, self.site = place, Site(place, today=lambda: TODAY)
 
-    def get(self, target: str) -> Response:
-        return self.site.answer(Request("GET", *read_address(target)))
+    def get(self, target: str) -> WebResponse:
+        return self.site.answer(WebRequest("GET", *read_address(target)))
 
     def text(self, target: str) -> str:
         return self.get(target).body.decode()

@@ -14,11 +14,11 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.app.serve import server
-from cmm_uq.app.serve.exchange import Response
+from cmm_uq.app.serve.exchange import WebResponse
 from cmm_uq.app.serve.server import RecordsServer
 from cmm_uq.base.errors import CmmUqError, OutputError
 from tests.app.serve.laboratory import files
-from tests.app.serve.test_uploaded import BOUNDARY, form
+from tests.app.serve.test_exchange import BOUNDARY, form
 
 Host = tuple[str, int]
 
@@ -149,12 +149,12 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> Iterator[Host]:
     for name, value in {"HEAD_S": 0.4, "BODY_S": 0.4, "ANSWER_S": 0.4, "AT_ONCE": 2}.items():
         monkeypatch.setattr(server, name, value)
 
-    def answer(asked: object) -> Response:
+    def answer(asked: object) -> WebResponse:
         body = getattr(asked, "body", None)
         try:
-            return Response(body.read(5) if body is not None else b"x" * 50_000_000)
+            return WebResponse(body.read(5) if body is not None else b"x" * 50_000_000)
         except TimeoutError:
-            return Response(b"too slow")
+            return WebResponse(b"too slow")
 
     with RecordsServer(answer, port=0) as made:
         thread = threading.Thread(target=made.serve_forever, kwargs={"poll_interval": 0.01}, daemon=True)
@@ -209,17 +209,17 @@ def test_more_than_it_has_room_for_are_turned_away(hasty: Host) -> None:
 
 def test_a_port_that_is_taken_is_said_so(host: Host) -> None:
     with pytest.raises(OutputError, match=rf"--port {host[1]}: cannot be listened on.*Name another port"):
-        RecordsServer(lambda asked: Response(b""), port=host[1])
+        RecordsServer(lambda asked: WebResponse(b""), port=host[1])
 
 
 def test_an_address_must_be_one() -> None:
     with pytest.raises(CmmUqError, match="--bind lab-pc: is no address of a network card"):
-        RecordsServer(lambda asked: Response(b""), bind="lab-pc", port=0)
+        RecordsServer(lambda asked: WebResponse(b""), bind="lab-pc", port=0)
 
 
 def test_beyond_this_machine_it_answers_to_numbers_and_to_names_that_it_was_told() -> None:
     """A number cannot be rebound; any other name could be."""
-    with RecordsServer(lambda asked: Response(b""), bind="0.0.0.0", port=0, names=["Lab.example"]) as made:
+    with RecordsServer(lambda asked: WebResponse(b""), bind="0.0.0.0", port=0, names=["Lab.example"]) as made:
         port = made.server_port
         assert not made.alone
         assert made.answers_to(f"192.0.2.7:{port}")

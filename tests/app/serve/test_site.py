@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from cmm_uq.app.commands.laboratory.due import due_in
-from cmm_uq.app.serve.exchange import Request, read_address
+from cmm_uq.app.serve.exchange import WebRequest, read_address
 from cmm_uq.app.serve.overview import DueDate
 from cmm_uq.app.serve.page import WebPage
 from cmm_uq.app.serve.site import PAGES, Site
@@ -186,11 +186,11 @@ def test_due_dates_are_asked_of_who_serves(laboratory: Path) -> None:
         }
 
     site = Site(laboratory, due=due, today=lambda: TODAY)
-    machine = site.answer(Request("GET", *read_address("/machine?serial=K1"))).body.decode()
+    machine = site.answer(WebRequest("GET", *read_address("/machine?serial=K1"))).body.decode()
     assert "Due soon, on 2026-12-24" in machine
     assert "it drifts" in machine
-    assert "nothing is known of it" in site.answer(Request("GET", *read_address("/machine?serial=K3"))).body.decode()
-    site.answer(Request("GET", "/"))
+    assert "nothing is known of it" in site.answer(WebRequest("GET", *read_address("/machine?serial=K3"))).body.decode()
+    site.answer(WebRequest("GET", "/"))
     assert len(asked) == 1, "worked out again although the records are the same"
 
 
@@ -209,7 +209,7 @@ def test_a_machine_is_due_by_its_own_rule_as_the_command_says(tmp_path: Path) ->
     assert {serial: one and one.day for serial, one in found.items()} == {
         "H": dt.date(2026, 9, 2), "Y": dt.date(2027, 3, 2),
     }  # fmt: skip
-    machine = site.answer(Request("GET", *read_address("/machine?serial=H"))).body.decode()
+    machine = site.answer(WebRequest("GET", *read_address("/machine?serial=H"))).body.decode()
     assert "Overdue since 2026-09-02" in machine
     assert "fixed interval of 6 months" in machine
 
@@ -302,7 +302,7 @@ def test_the_comparison_finds_what_the_records_find(tmp_path: Path) -> None:
     place = opened_in(tmp_path)
     looked = Looked(place)
     assert "Not compared since" in looked.text("/integrity")
-    looked.site.answer(Request("POST", "/integrity/chain"))
+    looked.site.answer(WebRequest("POST", "/integrity/chain"))
     looked.site.checking.wait(20)
     assert "The records agree with their chain" in looked.text("/integrity")
     with open_records(place, read_only=True) as records:
@@ -315,7 +315,7 @@ def test_the_comparison_finds_what_the_records_find(tmp_path: Path) -> None:
     connection.close()
     with open_records(place, read_only=True) as records:
         findings = records.verify(files=False)
-    looked.site.answer(Request("POST", "/integrity/chain"))
+    looked.site.answer(WebRequest("POST", "/integrity/chain"))
     looked.site.checking.wait(20)
     page = Shown(looked.text("/integrity")).texts
     assert findings

@@ -9,15 +9,15 @@ from scipy.stats import multivariate_normal, norm
 
 from cmm_uq.laboratory.due.checks import check_standings, limit_for
 from cmm_uq.laboratory.records.facts import RecordedCertificate
-from tests.laboratory.due.made import FIRST, certificate, value
+from tests.laboratory.due.histories import FIRST_of_made, certificate, value
 
-CALIBRATION = certificate(FIRST, value(1.0, u=0.5, u_artefact=0.4))
+CALIBRATION = certificate(FIRST_of_made, value(1.0, u=0.5, u_artefact=0.4))
 U = 0.18**0.5
 """Of a difference from it: 0.25 + 0.25 − 2·0.4·0.4, with the same artefact."""
 
 
 def check(month: int, ratio: float, **further: object) -> RecordedCertificate:
-    day = FIRST + dt.timedelta(days=30 * month)
+    day = FIRST_of_made + dt.timedelta(days=30 * month)
     return certificate(day, value(1.0 + ratio * U, u=0.5, u_artefact=0.4), interim=True, **further)
 
 
@@ -46,8 +46,8 @@ def test_with_another_artefact_the_whole_uncertainty_counts() -> None:
 
 
 def test_beyond_a_limit_of_tolerance_is_action_however_uncertain() -> None:
-    wide = certificate(FIRST, value(7.5, u=5.0))
-    beyond = certificate(FIRST + dt.timedelta(days=30), value(8.1, u=5.0), interim=True)
+    wide = certificate(FIRST_of_made, value(7.5, u=5.0))
+    beyond = certificate(FIRST_of_made + dt.timedelta(days=30), value(8.1, u=5.0), interim=True)
     assert check_standings(wide, [beyond])[0].standing == "action"
 
 
@@ -68,6 +68,6 @@ def test_how_often_two_checks_warn_on_one_side_by_chance(count: int, percent: fl
 
 
 def test_what_the_calibration_does_not_state_is_not_compared() -> None:
-    other = certificate(FIRST + dt.timedelta(days=30), value(100.0, name="new", limit=None), interim=True)
+    other = certificate(FIRST_of_made + dt.timedelta(days=30), value(100.0, name="new", limit=None), interim=True)
     found = check_standings(CALIBRATION, [other])[0]
     assert (found.worst, found.standing) == ("", "nothing compared")

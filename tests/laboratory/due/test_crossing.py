@@ -12,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.due.crossing import DAYS, Crossing, crossing, crossings
 from cmm_uq.laboratory.due.drift import HORIZON, YEAR, history, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
-from tests.laboratory.due.drifting import machine, one_node
+from tests.laboratory.due.histories import machine, one_node
 
 EXACT = 1e-4
 """u of a certificate, sd of a rate: as good as nothing beside the walk."""

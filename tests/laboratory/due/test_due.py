@@ -14,7 +14,7 @@ from cmm_uq.laboratory.due.history import machine_history
 from cmm_uq.laboratory.due.methods import series_from
 from cmm_uq.laboratory.due.rule import Rule
 from cmm_uq.laboratory.records.facts import ArtefactRow, RecordedCertificate, RecordedMachine
-from tests.laboratory.due.made import FIRST, MACHINE, certificate, value
+from tests.laboratory.due.histories import MACHINE, FIRST_of_made, certificate, value
 
 ON = dt.date(2025, 1, 1)
 BALLBAR = ArtefactRow("BB-7", "ballbar", "PTB 1", "PTB", dt.date(2024, 1, 1), dt.date(2026, 1, 1))
@@ -50,22 +50,22 @@ def test_months_end_on_the_same_day_or_the_months_last(start: str, months: int, 
 
 
 def test_without_a_rule_a_year_and_it_says_so() -> None:
-    found = due(certificate(FIRST))
+    found = due(certificate(FIRST_of_made))
     assert (found.due, found.last, found.why) == (
         dt.date(2025, 3, 1),
-        FIRST,
+        FIRST_of_made,
         "12 months, as its job does not say otherwise",
     )
     assert found.remarks == ()
 
 
 def test_the_rule_of_the_job() -> None:
-    found = due(certificate(FIRST), rule={"every_months": 6})
+    found = due(certificate(FIRST_of_made), rule={"every_months": 6})
     assert (found.due, found.why) == (dt.date(2024, 9, 1), "fixed interval of 6 months")
 
 
 def test_states_about_the_day() -> None:
-    found = due(certificate(FIRST))
+    found = due(certificate(FIRST_of_made))
     week = dt.timedelta(days=7)
     assert [found.state(dt.date(2025, 3, 1) + dt.timedelta(days=i), week) for i in (-8, -7, 0, 1)] == [
         "later", "due", "due", "overdue",
@@ -90,85 +90,89 @@ def test_a_machine_that_was_never_calibrated_has_no_date() -> None:
 def test_what_is_dated_later_is_said() -> None:
     assert (
         "A recording of 2031-05-06 is dated after 2025-01-01"
-        in due(certificate(FIRST), late=dt.date(2031, 5, 6)).remarks[0]
+        in due(certificate(FIRST_of_made), late=dt.date(2031, 5, 6)).remarks[0]
     )
 
 
 def test_what_is_to_be_known_is_said() -> None:
-    assert "a draft that nobody has released" in due(certificate(FIRST, state="draft")).remarks[0]
-    assert "has no limits" in due(certificate(FIRST), limited=False).remarks[0]
+    assert "a draft that nobody has released" in due(certificate(FIRST_of_made, state="draft")).remarks[0]
+    assert "has no limits" in due(certificate(FIRST_of_made), limited=False).remarks[0]
 
 
 def test_a_machine_by_name_is_said_to_be_one() -> None:
-    assert "no serial number" in due(certificate(FIRST), machine=replace(MACHINE, by_name=True)).remarks[0]
+    assert "no serial number" in due(certificate(FIRST_of_made), machine=replace(MACHINE, by_name=True)).remarks[0]
 
 
 def test_an_adjustment_ends_the_interval_but_for_one_that_is_still_to_come() -> None:
     day = dt.date(2024, 8, 1)
-    assert due(certificate(FIRST), machine=replace(MACHINE, adjusted=(day,))).due == day
-    assert due(certificate(FIRST), machine=replace(MACHINE, adjusted=(FIRST,))).due == dt.date(2025, 3, 1)
-    assert due(certificate(FIRST), machine=replace(MACHINE, adjusted=(dt.date(2025, 2, 1),))).due == dt.date(2025, 3, 1)
+    assert due(certificate(FIRST_of_made), machine=replace(MACHINE, adjusted=(day,))).due == day
+    assert due(certificate(FIRST_of_made), machine=replace(MACHINE, adjusted=(FIRST_of_made,))).due == dt.date(
+        2025, 3, 1
+    )
+    assert due(certificate(FIRST_of_made), machine=replace(MACHINE, adjusted=(dt.date(2025, 2, 1),))).due == dt.date(
+        2025, 3, 1
+    )
 
 
 def test_a_certificate_that_does_not_conform_begins_no_interval() -> None:
-    found = due(certificate(FIRST, decision="fail"))
-    assert (found.due, found.why) == (FIRST, "its last certificate finds it beyond its limits")
+    found = due(certificate(FIRST_of_made, decision="fail"))
+    assert (found.due, found.why) == (FIRST_of_made, "its last certificate finds it beyond its limits")
 
 
 def test_an_artefact_out_of_date_blocks() -> None:
-    found = due(certificate(FIRST), artefacts=[replace(BALLBAR, due=dt.date(2024, 12, 31))])
+    found = due(certificate(FIRST_of_made), artefacts=[replace(BALLBAR, due=dt.date(2024, 12, 31))])
     assert found.blocked == "its artefact BB-7 is out of date since 2024-12-31: no certificate can be made with it"
-    assert due(certificate(FIRST), artefacts=[replace(BALLBAR, due=ON)]).blocked is None
+    assert due(certificate(FIRST_of_made), artefacts=[replace(BALLBAR, due=ON)]).blocked is None
 
 
 def test_an_artefact_that_is_due_first_is_said() -> None:
-    found = due(certificate(FIRST), artefacts=[replace(BALLBAR, due=dt.date(2025, 2, 28))])
+    found = due(certificate(FIRST_of_made), artefacts=[replace(BALLBAR, due=dt.date(2025, 2, 28))])
     assert (found.blocked, found.remarks) == (None, ("Its artefact BB-7 is itself due on 2025-02-28, before that.",))
 
 
 def test_a_check_out_of_control_makes_the_machine_due_at_once() -> None:
     """3.1·√0.5 from the calibration, u = √0.5."""
     day = dt.date(2024, 6, 1)
-    found = due(certificate(FIRST), check(day, 1 + 3.1 * 0.5**0.5))
+    found = due(certificate(FIRST_of_made), check(day, 1 + 3.1 * 0.5**0.5))
     assert found.due == day
     assert "quantity scale_x.ppm: 3.1 standard uncertainties" in found.why
 
 
 def test_a_check_that_warns_is_to_be_repeated() -> None:
-    found = due(certificate(FIRST), check(dt.date(2024, 6, 1), 1 + 2.1 * 0.5**0.5))
+    found = due(certificate(FIRST_of_made), check(dt.date(2024, 6, 1), 1 + 2.1 * 0.5**0.5))
     assert found.due == dt.date(2025, 3, 1)
     assert found.why.endswith("repeat it")
 
 
 def test_checks_in_control_lengthen_only_where_the_rule_lets_them() -> None:
     """From the check on another interval of 12 months, 365 days here, but no more than 18 months after the calibration."""
-    checked = certificate(FIRST), check(dt.date(2024, 6, 1), 1.2)
+    checked = certificate(FIRST_of_made), check(dt.date(2024, 6, 1), 1.2)
     assert due(*checked, rule={"every_months": 12}).due == dt.date(2025, 3, 1)
     assert due(*checked, rule={"every_months": 12, "longest_months": 24}).due == dt.date(2025, 6, 1)
-    late = certificate(FIRST), check(dt.date(2024, 12, 1), 1.2)
+    late = certificate(FIRST_of_made), check(dt.date(2024, 12, 1), 1.2)
     assert due(*late, rule={"every_months": 12, "longest_months": 18}).due == dt.date(2025, 9, 1)
 
 
 def test_a_check_of_other_values_lengthens_nothing() -> None:
     other = certificate(dt.date(2024, 6, 1), value(1.0, name="scale_y.ppm"), interim=True)
-    found = due(certificate(FIRST), other, rule={"every_months": 12, "longest_months": 24})
+    found = due(certificate(FIRST_of_made), other, rule={"every_months": 12, "longest_months": 24})
     assert found.due == dt.date(2025, 3, 1)
     assert found.why.endswith("has no value in common with the calibration")
 
 
 def test_what_a_method_came_to_is_not_lengthened() -> None:
-    checked = certificate(FIRST), check(dt.date(2024, 6, 1), 1.2)
+    checked = certificate(FIRST_of_made), check(dt.date(2024, 6, 1), 1.2)
     rule = {"method": "staircase", "every_months": 12, "longest_months": 24}
     assert due(*checked, rule=rule).due == dt.date(2025, 3, 1)
 
 
 def test_a_check_before_the_calibration_does_not_count() -> None:
-    assert due(check(dt.date(2024, 2, 1), 7.0), certificate(FIRST)).due == dt.date(2025, 3, 1)
+    assert due(check(dt.date(2024, 2, 1), 7.0), certificate(FIRST_of_made)).due == dt.date(2025, 3, 1)
 
 
 @pytest.mark.parametrize("method", ["A3", "S2", "staircase", "control chart"])
 def test_a_method_without_a_history_says_so_and_takes_the_interval_it_begins_with(method: str) -> None:
-    found = due(certificate(FIRST), rule={"method": method, "every_months": 9})
+    found = due(certificate(FIRST_of_made), rule={"method": method, "every_months": 9})
     assert found.due == dt.date(2024, 12, 1)
     assert found.why.startswith(f"9 months, as method {method} cannot say: ")
 
@@ -185,14 +189,19 @@ def test_an_artefact_is_due_as_its_certificate_says() -> None:
 
 
 def test_the_first_comes_first_and_what_has_no_date_last() -> None:
-    first, later, never = due(certificate(FIRST)), artefact_due(BALLBAR), due()
+    first, later, never = due(certificate(FIRST_of_made)), artefact_due(BALLBAR), due()
     assert in_order([never, later, first]) == [first, later, never]
 
 
 def test_by_the_drift_model_a_machine_is_due_when_its_history_says_that_its_limit_may_be_crossed() -> None:
     """The same day by both ways to it, to which an interim check after the calibration counts; a size in mm to neither."""
     numbers = ((0.0, 1.0), (1.5, 1.1), (3.2, 0.9), (3.9, 1.0))
-    days = (FIRST - dt.timedelta(days=700), FIRST - dt.timedelta(days=350), FIRST, FIRST + dt.timedelta(days=120))
+    days = (
+        FIRST_of_made - dt.timedelta(days=700),
+        FIRST_of_made - dt.timedelta(days=350),
+        FIRST_of_made,
+        FIRST_of_made + dt.timedelta(days=120),
+    )
     done = [
         certificate(
             day, value(a), value(b, name="scale_y.ppm"),

@@ -11,7 +11,7 @@ from cmm_uq.laboratory.due import drift as drift_prior
 from cmm_uq.laboratory.due import drift_filter, fleet_model
 from cmm_uq.laboratory.due.drift import MEDIANS, NAMES, USUAL_RATE_SD, YEAR, learnt_prior, side_by_side
 from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
-from tests.laboratory.due.drifting import machine
+from tests.laboratory.due.histories import machine
 
 UNIT = 10.0
 MACHINES = [

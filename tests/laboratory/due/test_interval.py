@@ -13,14 +13,16 @@ from cmm_uq.laboratory.due.observed import CompletedInterval, ended_intervals
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, Rule
 from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability
 from cmm_uq.laboratory.records.facts import RecordedCertificate
-from tests.laboratory.due.made import FIRST, certificate, value
+from tests.laboratory.due.histories import FIRST_of_made, certificate, value
 
 
 def yearly(*numbers: float, adjusted: int | None = None) -> list[RecordedCertificate]:
     found = []
     for i, number in enumerate(numbers):
-        since = None if adjusted is None or i < adjusted else FIRST + dt.timedelta(days=365 * adjusted - 3)
-        found.append(certificate(FIRST + dt.timedelta(days=365 * i), value(number), entry=i + 1, adjusted_since=since))
+        since = None if adjusted is None or i < adjusted else FIRST_of_made + dt.timedelta(days=365 * adjusted - 3)
+        found.append(
+            certificate(FIRST_of_made + dt.timedelta(days=365 * i), value(number), entry=i + 1, adjusted_since=since)
+        )
     return found
 
 
@@ -37,9 +39,9 @@ def test_after_an_adjustment_nobody_knows_what_would_have_been_found() -> None:
 
 
 def test_as_found_ends_an_interval_and_as_left_begins_the_next() -> None:
-    day = FIRST + dt.timedelta(days=365)
+    day = FIRST_of_made + dt.timedelta(days=365)
     both = [
-        certificate(FIRST, value(0.0)), certificate(day, value(9.0), entry=2),
+        certificate(FIRST_of_made, value(0.0)), certificate(day, value(9.0), entry=2),
         certificate(day, value(0.0), entry=3, adjusted_since=day),
         certificate(day + dt.timedelta(days=365), value(1.0), entry=4, adjusted_since=day),
     ]  # fmt: skip
@@ -47,14 +49,14 @@ def test_as_found_ends_an_interval_and_as_left_begins_the_next() -> None:
 
 
 def test_without_limits_the_decision_counts_and_without_either_nothing() -> None:
-    decided = [certificate(FIRST + dt.timedelta(days=100 * i), value(1.0, limit=None), decision=word)
+    decided = [certificate(FIRST_of_made + dt.timedelta(days=100 * i), value(1.0, limit=None), decision=word)
                for i, word in enumerate(["pass", "pass", "fail", "undecided"])]  # fmt: skip
     assert [one.in_tolerance for one in ended_intervals(decided)] == [True, False]
 
 
 def test_interim_checks_end_no_interval() -> None:
     done = yearly(0.0, 4.0)
-    between = certificate(FIRST + dt.timedelta(days=100), value(7.0), interim=True)
+    between = certificate(FIRST_of_made + dt.timedelta(days=100), value(7.0), interim=True)
     assert ended_intervals([done[0], between, done[1]]) == [CompletedInterval(365, 0.5)]
 
 
@@ -77,7 +79,9 @@ def test_the_staircase_climbs_over_its_own_history() -> None:
 def test_the_control_chart_takes_the_first_value_to_leave_its_limit() -> None:
     rows = [(0.0, 0.0), (1.0, 0.3), (2.4, 0.5), (3.5, 0.9)]
     done = [
-        certificate(FIRST + dt.timedelta(days=360 * i + 5 * i * i), value(a), value(b, name="scale_y.ppm"), entry=i + 1)
+        certificate(
+            FIRST_of_made + dt.timedelta(days=360 * i + 5 * i * i), value(a), value(b, name="scale_y.ppm"), entry=i + 1
+        )
         for i, (a, b) in enumerate(rows)
     ]
     days = np.diff([one.day.toordinal() for one in done]).astype(float)
@@ -107,7 +111,7 @@ def test_s2_asks_all_machines_of_the_model() -> None:
 @pytest.mark.parametrize(("longest", "wanted"), [(None, 60), (24, 24)])
 def test_no_interval_is_longer_than_its_longest(longest: int | None, wanted: int) -> None:
     rule = Rule.of({"method": "control chart", "longest_months": longest})
-    steady = [certificate(FIRST + dt.timedelta(days=360 * i + i), value(0.0), entry=i + 1) for i in range(4)]
+    steady = [certificate(FIRST_of_made + dt.timedelta(days=360 * i + i), value(0.0), entry=i + 1) for i in range(4)]
     assert interval_by(rule, steady, list).days == pytest.approx(wanted * DAYS_A_MONTH)
 
 

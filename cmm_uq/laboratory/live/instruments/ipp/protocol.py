@@ -54,7 +54,7 @@ Argument = float | str | Term
 
 
 @dataclass(frozen=True)
-class Response:
+class ServerLine:
     """A line of the server."""
 
     tag: str
@@ -84,14 +84,14 @@ class Fault:
         return f"error {self.number:04d} of {self.cause}, severity {self.severity}: {self.text}"
 
 
-def response_of(line: bytes) -> Response:
+def response_of(line: bytes) -> ServerLine:
     """A line without its end."""
     if any(not 32 <= byte <= 126 for byte in line):
         raise BadLineError("a character outside ASCII 32 to 126")
     found = _RESPONSE.fullmatch(line.decode("ascii"))
     if found is None or found["tag"] == "00000":
         raise BadLineError("no tag of five characters with a blank and one of & # ! % behind it")
-    return Response(found["tag"], cast("Sign", found["sign"]), found["rest"] or "")
+    return ServerLine(found["tag"], cast("Sign", found["sign"]), found["rest"] or "")
 
 
 def arguments_of(text: str) -> tuple[Argument, ...]:
@@ -204,7 +204,7 @@ class HeardLine:
     """
 
     raw: bytes
-    response: Response | None
+    response: ServerLine | None
     utc_ns: int
     monotonic_ns: int
 
@@ -295,7 +295,7 @@ class Transactions:
         return f"E{self._event:04d}"
 
 
-def _fault(response: Response) -> Fault:
+def _fault(response: ServerLine) -> Fault:
     try:
         return fault_of(response.rest)
     except BadLineError as error:

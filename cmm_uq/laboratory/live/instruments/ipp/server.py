@@ -42,7 +42,7 @@ LIMIT_MM = 1000.0
 
 
 @dataclass
-class MachineState:
+class SimulatedState:
     """Of the machine; kept from session to session (section 6.3.1.2)."""
 
     position: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
@@ -70,7 +70,7 @@ class Methods:
     tools = ("RefTool", "NoTool", "Probe1", "Probe2")
 
     def __init__(self, *, part_c: float | None, version: str | None) -> None:
-        self.state, self.part_c, self.version = MachineState(), part_c, version
+        self.state, self.part_c, self.version = SimulatedState(), part_c, version
         self.radial = 0.0
         """How far the surface lies from where it is expected, along the normal, mm."""
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.laboratory.due.history import YEAR, epochs, trend
-from tests.laboratory.due.made import series
+from tests.laboratory.due.histories import series
 
 DAYS, VALUES = [0, 360, 740, 1100], [1.0, 1.9, 3.4, 3.8]
 U, COMMON, WITH = [0.5, 0.4, 0.6, 0.5], [0.3, 0.2, 0.4, 0.3], ["A", "A", "B", "A"]

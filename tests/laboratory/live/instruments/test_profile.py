@@ -1,4 +1,6 @@
-"""Every ready profile understands an instrument that speaks as its manual says, at a real pseudo-terminal or socket.
+"""Bytes are written as manuals write them, and read back the same.
+
+Every ready profile understands an instrument that speaks as its manual says, at a real pseudo-terminal or socket.
 
 The simulated instruments are written from the manuals and not from the profiles.
 """
@@ -10,12 +12,33 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
+from cmm_uq.laboratory.live.instruments.profile import bytes_of, shown
 from cmm_uq.laboratory.live.instruments.simulated_line import Way, simulated
 from cmm_uq.laboratory.live.instruments.source import Reading
 from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS
 from tests.laboratory.live.instruments.listening import hasty, listening, opened
+
+
+def test_names_are_those_of_iso_646() -> None:
+    assert bytes_of("<ESC>A0200<CR><LF>") == b"\x1bA0200\r\n"
+    assert bytes_of("<STX><ETX><NAK><0xAA><DEL>") == b"\x02\x03\x15\xaa\x7f"
+    assert bytes_of("a<b>") == b"a<b>"
+
+
+@given(st.binary(max_size=30).filter(lambda data: b"<" not in data and b"\\" not in data))
+def test_what_is_shown_is_read_back(data: bytes) -> None:
+    assert bytes_of(shown(data)) == data
+    assert shown(data).isprintable()
+
+
+def test_what_is_no_byte_is_refused() -> None:
+    with pytest.raises(ValueError, match="no single byte"):
+        bytes_of("20 €")
+
 
 WAYS: list[Way] = ["pty", "socket", "rfc2217"]
 EACH = [(name, way) for name, way in zip(SPEAKERS, itertools.cycle(WAYS), strict=False)] + [("fluke-1529", "pty")]
