@@ -16,8 +16,7 @@ from sqlalchemy import ColumnElement, Connection, func, or_, select
 from cmm_uq.jobs.verdicts import Verdicts, gravest
 from cmm_uq.laboratory.records.entries import Entry
 from cmm_uq.laboratory.records.facts import BY_NAME, PERFORMANCE, STANDING, RecordedMachine, spelled
-from cmm_uq.laboratory.records.place import told
-from cmm_uq.laboratory.records.queries import adjusted_before, blocks
+from cmm_uq.laboratory.records.queries import adjusted_before, blocks, newest_of_machine
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, figures, machines, quantities
 
@@ -99,21 +98,14 @@ _JOINED = certificates.join(machines).outerjoin(artefacts, artefacts.c.id == _C.
 
 def standing_of_all(records: Records) -> list[Newest]:
     """Every machine with its newest certificate, in the order in which they were first recorded."""
-    newest = certificates.alias()
-    of_machine = (
-        select(newest.c.entry)
-        .where(newest.c.machine == machines.c.id, newest.c.command == "report", newest.c.origin == "measured",
-               newest.c.state.in_(STANDING), newest.c.interim.is_(False))
-        .order_by(newest.c.day.desc(), newest.c.entry.desc()).limit(1).correlate(machines).scalar_subquery()
-    )  # fmt: skip
     m = machines.c
     query = (
         select(m.called, m.name.label("of_name"), m.manufacturer, m.model, m.place, m.recognised, *_COLUMNS)
-        .select_from(machines.outerjoin(certificates, _C.entry == of_machine)
+        .select_from(machines.outerjoin(certificates, _C.entry == newest_of_machine())
                      .outerjoin(artefacts, artefacts.c.id == _C.artefact))
         .order_by(m.id)
     )  # fmt: skip
-    with told(records.place), records.engine.connect() as connection:
+    with records.reading() as connection:
         rows = connection.execute(query).all()
     return [
         Newest(
@@ -127,7 +119,7 @@ def chosen(
     records: Records, choice: CertificateFilter, most: int, left_out: int = 0
 ) -> tuple[list[ListedCertificate], int]:
     """Certificates, newest first, and how many there are."""
-    with told(records.place), records.engine.connect() as connection:
+    with records.reading() as connection:
         where = _conditions(connection, choice)
         count = connection.execute(select(func.count()).select_from(certificates).where(*where)).scalar_one()
         wanted = select(_C.entry).where(*where).order_by(_C.day.desc(), _C.entry.desc()).limit(most).offset(left_out)
@@ -236,7 +228,7 @@ def courses(records: Records, machine: RecordedMachine, most: int) -> list[Cours
     )
     found: dict[tuple[str, str], Course] = {}
     adjusted = [day.isoformat() for day in machine.adjusted]
-    with told(records.place), records.engine.connect() as connection:
+    with records.reading() as connection:
         rows = connection.execute(query).all()
     for row in rows:
         course = found.setdefault((row.name, row.unit), Course(row.name, row.quantity, row.unit, []))
@@ -265,7 +257,7 @@ def _outcomes(verdicts: Verdicts) -> dict[str, str]:
 def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[str, str]]:
     """What certificates state of each of their values, by entry; nothing of entries of versions that did not keep it."""
     found = {}
-    with told(records.place), records.engine.connect() as connection:
+    with records.reading() as connection:
         for block in blocks(sorted(numbers)):
             query = select(entries.c.number, entries.c.content).where(entries.c.number.in_(block))
             for number, content in connection.execute(query):
@@ -275,6 +267,6 @@ def outcomes_of(records: Records, numbers: Collection[int]) -> dict[int, dict[st
 
 def entry_of(records: Records, number: int) -> Entry | None:
     """One entry; ``None`` where there is none of that number."""
-    with told(records.place), records.engine.connect() as connection:
+    with records.reading() as connection:
         row = connection.execute(select(entries).where(entries.c.number == number)).first()
     return None if row is None else Entry(*row)

@@ -103,8 +103,8 @@ def test_who_stops_listening_leaves_no_process_behind() -> None:
 def test_a_process_whose_asker_is_killed_does_not_go_on_with_its_task() -> None:
     script = f"""if 1:
         import threading
-        from cmm_uq.laboratory.schedule.talking import Talk, Work
-        talk = Talk(Work({PROGRAM!r}, 0.0))
+        from cmm_uq.laboratory.schedule.processes import WorkerProcess, WorkerTask
+        talk = WorkerProcess(WorkerTask({PROGRAM!r}, 0.0))
         talk.ask(0, None)
         threading.Thread(target=talk.ask, args=(1, "hang"), daemon=True).start()
         print(talk._process.pid, flush=True)

@@ -43,7 +43,7 @@ def test_a_duration_is_told_in_its_two_largest_units(seconds: float, said: str) 
 WRITE = """
 import sys
 from pathlib import Path
-from cmm_uq.laboratory.schedule.log import Log
+from cmm_uq.laboratory.schedule.progress import Log
 log = Log(Path(sys.argv[1]), 500, 100)
 for i in range(150):
     log.write(f"{sys.argv[2]} {i}")
