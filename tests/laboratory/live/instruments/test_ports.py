@@ -13,7 +13,7 @@ import pytest
 import serial
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.acquire import DeclaredSource
+from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.instruments import ports
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.library import profile_named
