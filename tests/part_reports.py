@@ -16,8 +16,8 @@ from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
 from cmm_uq.analysis.parts.ways import Way, spread
 from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, evaluate
-from cmm_uq.app.commands.parts.part import evaluate_part
+from cmm_uq.app.commands.parts.documents import contents_of
+from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.verify.pdf_file import PdfFile
@@ -37,7 +37,7 @@ def plate_found() -> PartMeasurement:
     """Its bore measured 20 µm off along x."""
     off = np.zeros((60, 3))
     off[-8:, 0] = 0.02
-    return evaluate_part(plate_of(by_certificate(), off), trials=TRIALS)
+    return evaluate_part(plate_of(by_certificate(), off), PartOptions(trials=TRIALS))
 
 
 @cache
@@ -91,7 +91,7 @@ def found_again_once(job: PartJob, asked: PartOptions, stage: Stage = silent) ->
     """
     key = (asked, job.facts.model_dump_json(), *sorted(job.inputs.items()))
     if key not in _AGAIN:
-        _AGAIN[key] = evaluate(job, asked, stage)
+        _AGAIN[key] = evaluate_part(job, asked, stage)
     return _AGAIN[key]
 
 

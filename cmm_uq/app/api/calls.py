@@ -219,13 +219,13 @@ def part(
     <Part of part-plate-simulated: 5 characteristics, pass>
     """
     from cmm_uq.app.api.outcomes import Part
-    from cmm_uq.app.commands.parts.documents import PartOptions, evaluate
     from cmm_uq.app.commands.parts.documents import in_language as told_in
+    from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
     from cmm_uq.jobs.part.job import PartJob, read_part
 
     read = told_in(job if isinstance(job, PartJob) else read_part(Path(job)), language)
     trusted = None if trust is None else tuple(map(Path, trust))
-    return Part(evaluate(read, PartOptions(seed, trials, digits, rerun, trusted, records)))
+    return Part(evaluate_part(read, PartOptions(seed, trials, digits, rerun, trusted, records)))
 
 
 def prove(

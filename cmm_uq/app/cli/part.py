@@ -69,8 +69,9 @@ def command(
     """Verify the machine's certificate, measure the part virtually, and write part.html, part.pdf and results.json."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.files import silent
-        from cmm_uq.app.commands.parts.documents import PartOptions, write_part
+        from cmm_uq.app.commands.parts.documents import write_part
+        from cmm_uq.app.commands.parts.part import PartOptions
 
-        asked = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
-        written = write_part(job, out, asked=asked, force=force, stage=stage or silent, language=language)
+        options = PartOptions(seed, trials, digits, rerun, None if trust is None else tuple(trust), records)
+        written = write_part(job, out, options=options, force=force, stage=stage or silent, language=language)
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)

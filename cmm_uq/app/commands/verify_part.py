@@ -201,8 +201,9 @@ def part_again(
     ------
     CmmUqError : they give nothing.
     """
-    from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, evaluate
+    from cmm_uq.app.commands.parts.documents import contents_of
     from cmm_uq.app.commands.parts.drift import FILE as HISTORY
+    from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 
     said, simulation = data["machine"], data["simulation"]
     held = bool(said["signatures_held_to_trusted"])
@@ -218,7 +219,7 @@ def part_again(
         _whole(simulation["seed"], "seed"), _whole(simulation["asked"], "asked"), simulation["digits"],
         _asked_again(said), tuple(trust or ()) if held else None, None, history,
     )  # fmt: skip
-    found = evaluate(job, asked, stage)
+    found = evaluate_part(job, asked, stage)
     return contents_of(found, stage, finished=finished), tuple(found.files)
 
 

@@ -14,7 +14,7 @@ from scipy import stats
 from cmm_uq.analysis.conformity.limits import Limits
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
-from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, deviations_of, stated
+from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, deviations_of, stated, within_bounds
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
 from tests.parts_drawn import UP, block, circle, plane, spot
 
@@ -149,3 +149,18 @@ def test_features_that_their_points_just_determine_have_none() -> None:
     found = deviations_of(plan, plan.points)
     assert np.isnan(found[:4]).all()
     np.testing.assert_allclose(found[4:], 0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("together", "each", "told"),
+    [
+        (0.90, (0.99, 0.98), 0.97),  # no less than what both leave: 1 − 0.01 − 0.02
+        (0.99, (0.99, 0.98), 0.98),  # no more than the least
+        (0.975, (0.99, 0.98), 0.975),
+        (-0.1, (0.3, 0.4), 0.0),  # both together leave nothing: a probability all the same
+    ],
+)
+def test_a_joint_probability_lies_between_the_bounds_of_frechet(
+    together: float, each: tuple[float, ...], told: float
+) -> None:
+    assert within_bounds(together, np.array(each)) == pytest.approx(told, abs=1e-12)

@@ -16,9 +16,9 @@ import pytest
 from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
-from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, write_part, written
+from cmm_uq.app.commands.parts.documents import contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import state_machine
-from cmm_uq.app.commands.parts.part import evaluate_part
+from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.app.commands.verify import Verification, verify
 from cmm_uq.app.commands.verify_part import _asked_again
 from cmm_uq.base.errors import CmmUqError
@@ -50,7 +50,7 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests whose report was made by :func:`plate_found`, that computing again has no part in."""
-    monkeypatch.setattr("cmm_uq.app.commands.parts.documents.evaluate", found_again_once)
+    monkeypatch.setattr("cmm_uq.app.commands.parts.part.evaluate_part", found_again_once)
 
 
 def found_in(folder: Path, files: Mapping[str, bytes], *names: str, rerun: bool = False) -> Verification:
@@ -177,14 +177,14 @@ def test_the_machines_own_job_goes_with_the_report(tmp_path: Path, monkeypatch: 
     (tmp_path / "machine").symlink_to(ROOT / "examples" / MACHINE)
     files = plate_files({}, np.zeros((60, 3)), machine_state={"job": "../machine"})
     put(tmp_path / "plate", files)
-    write_part(tmp_path / "plate", tmp_path / "out", asked=PartOptions(trials=TRIALS))
+    write_part(tmp_path / "plate", tmp_path / "out", options=PartOptions(trials=TRIALS))
     found = verify([tmp_path / "out" / PDF])
     assert found.inquiry.word == "VERIFIED", told(found)
     assert any("was analysed, and is inside" in note for note in found.inquiry.notes)
 
 
 def test_nothing_measured_is_verified_too(tmp_path: Path) -> None:
-    files = contents_of(evaluate_part(plate_of(by_results(), **THERE), trials=1000))
+    files = contents_of(evaluate_part(plate_of(by_results(), **THERE), PartOptions(trials=1000)))
     found = found_in(tmp_path, files)
     assert not found.inquiry.findings, told(found)
 

@@ -13,7 +13,7 @@ import pytest
 
 from cmm_uq.app.commands.parts.documents import contents_of
 from cmm_uq.app.commands.parts.drift import FILE
-from cmm_uq.app.commands.parts.part import evaluate_part
+from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.app.commands.verify import verify
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
@@ -48,7 +48,7 @@ def aged(folder: Path) -> PartMeasurement:
     """Its bore measured 20 µm off along x, with the history of the machine."""
     off = np.zeros((60, 3))
     off[-8:, 0] = 0.02
-    return evaluate_part(plate_of(by_certificate(), off), trials=TRIALS, records=records(folder))
+    return evaluate_part(plate_of(by_certificate(), off), PartOptions(trials=TRIALS, records=records(folder)))
 
 
 @pytest.fixture(scope="module")
@@ -91,8 +91,8 @@ def test_a_machine_held_to_trusted_signers_is_held_to_them_again(tmp_path: Path)
     machine = {MACHINE_PDF: sign_pdf(by_certificate()[MACHINE_PDF], signer, seal=None, at=SIGNED)}
     for nobody, content in ((others, machine), (trusted, by_certificate())):
         with pytest.raises(CmmUqError, match="the machine's certificate does not verify"):
-            evaluate_part(plate_of(content), trials=TRIALS, trust=nobody)
-    files = contents_of(evaluate_part(plate_of(machine), trials=TRIALS, trust=trusted))
+            evaluate_part(plate_of(content), PartOptions(trials=TRIALS, trust=nobody))
+    files = contents_of(evaluate_part(plate_of(machine), PartOptions(trials=TRIALS, trust=trusted)))
     assert json.loads(files["results.json"])["machine"]["signatures_held_to_trusted"] is True
     put(tmp_path, {PDF: sign_pdf(files[PDF], signer, seal=None, at=SIGNED)})
     alone = verify([tmp_path / PDF], rerun=True)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from cmm_uq.app.commands.files import REPORTS, RESULTS, Finished, Stage, silent, unchanged
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.output import Owner, staged
-from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
@@ -21,27 +20,13 @@ from cmm_uq.jobs.part.job import PartJob, read_part
 from cmm_uq.jobs.tables.origin import SIMULATED
 
 if TYPE_CHECKING:
+    from cmm_uq.app.commands.parts.part import PartOptions
     from cmm_uq.certificate.document import Document
     from cmm_uq.certificate.part.measurement import PartMeasurement
     from cmm_uq.certificate.wording import Summary
 
 DOCUMENTS = ("part.html", "part.pdf")
 COMMAND = "part"
-
-
-@dataclass(frozen=True)
-class PartOptions:
-    """How a part is evaluated."""
-
-    seed: int = 0  # of everything random
-    trials: int | None = None  # number of virtual measurements; ``None`` for as many as is usual
-    # of u that are to be known: then so many are made as that needs, ``trials`` at least; ``None`` for ``trials``
-    digits: int | None = None
-    rerun: bool = False  # whether the machine's certificate is computed again from its inputs
-    # files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed
-    trust: tuple[Path, ...] | None = None
-    records: str | Path | None = None  # of the machine's history, that its drift is read from; ``None`` for none
-    history: bytes | None = None  # of the machine, that a report has inside; then no records are asked
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,17 +60,6 @@ class WrittenPart:
         return self.found.job.facts.job.origin
 
 
-@naming_package()
-def evaluate(job: PartJob, asked: PartOptions, stage: Stage = silent) -> PartMeasurement:
-    """What a part's job gives; nothing is written."""
-    from cmm_uq.app.commands.parts.part import evaluate_part
-
-    return evaluate_part(
-        job, seed=asked.seed, trials=asked.trials, digits=asked.digits, rerun=asked.rerun,
-        trust=asked.trust, records=asked.records, history=asked.history, stage=stage,
-    )  # fmt: skip
-
-
 def in_language(job: PartJob, language: Code | None) -> PartJob:
     """A job whose page is to be said in a language; without one as job.toml has it."""
     if language is None:
@@ -95,7 +69,7 @@ def in_language(job: PartJob, language: Code | None) -> PartJob:
 
 
 def write_part(
-    folder: Path, out: Path | None = None, *, asked: PartOptions | None = None, force: bool = False, stage: Stage = silent,
+    folder: Path, out: Path | None = None, *, options: PartOptions | None = None, force: bool = False, stage: Stage = silent,
     language: Code | None = None,
 ) -> WrittenPart:  # fmt: skip
     """Evaluate a part's job and write ``part.html``, ``part.pdf``, ``results.json`` and what comes with them, all or none.
@@ -103,14 +77,21 @@ def write_part(
     ``out``: where to write; ``reports/<job id>`` by default. ``force``: keep what stands in the way as ``NAME.previous``
     instead of refusing.
     """
+    from cmm_uq.app.commands.parts.part import evaluate_part
+
     stage("Reading the job", 0.0)
     job = in_language(read_part(folder), language)
-    return written(job, lambda: evaluate(job, asked or PartOptions(), stage), out, force=force, stage=stage)
+    return written(job, lambda: evaluate_part(job, options, stage), out, force=force, stage=stage)
 
 
 def written(
-    job: PartJob, found: Any, out: Path | None = None, *, force: bool = False, stage: Stage = silent
-) -> WrittenPart:
+    job: PartJob,
+    evaluate: Callable[[], PartMeasurement],
+    out: Path | None = None,
+    *,
+    force: bool = False,
+    stage: Stage = silent,
+) -> WrittenPart:  # fmt: skip
     """Make sure of the folder, then evaluate, render and write, all or none."""
     facts = job.facts.job
     fonts_of(facts.language)  # refused before anything is computed
@@ -118,12 +99,12 @@ def written(
     names = [file_name(name, facts.origin) for name in DOCUMENTS]
     owner, inputs = Owner(COMMAND, facts.id, facts.origin), tuple(job.folder / name for name in job.inputs)
     with staged(folder, owner, inputs=inputs, force=force, expected=(*names, RESULTS, PROVENANCE)) as place:
-        one: PartMeasurement = found()
-        contents = contents_of(one, stage)
+        measurement = evaluate()
+        contents = contents_of(measurement, stage)
         stage(f"Writing: {len(contents)} files to {folder}", 0.95)
         files = place.write(contents)
     stage("Done", 1.0)
-    return WrittenPart(one, contents[RESULTS], files)
+    return WrittenPart(measurement, contents[RESULTS], files)
 
 
 def contents_of(found: PartMeasurement, stage: Stage = silent, *, finished: Finished = unchanged) -> dict[str, bytes]:

@@ -1,9 +1,9 @@
-"""From a part's job to what is found of it: its machine verified, virtual measurements, budget, decisions."""
+"""A part's evaluation, step by step: plan, machine, virtual measurements, shares of the variance, decisions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -34,6 +34,7 @@ from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.further import further_of
 from cmm_uq.app.commands.parts.machine import state_machine, with_calibration, with_history
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.effect_words import title_of
@@ -54,6 +55,70 @@ COVERAGE = 0.95
 ITERATED = 50
 
 
+@dataclass(frozen=True)
+class PartOptions:
+    """How a part is evaluated."""
+
+    seed: int = 0  # of everything random
+    trials: int | None = None  # virtual measurements; ``None`` for :data:`TRIALS`, fewer of a plan of many points
+    # of u that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least
+    digits: int | None = None
+    rerun: bool = False  # whether the machine's certificate is computed again from its inputs
+    # files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed
+    trust: tuple[Path, ...] | None = None
+    records: str | Path | None = None  # of the machine's history, that its drift is read from; ``None`` for none
+    history: bytes | None = None  # of the machine, that a report has inside; then no records are asked
+
+
+@naming_package()
+def evaluate_part(job: PartJob, options: PartOptions | None = None, stage: Stage = silent) -> PartMeasurement:
+    """The uncertainty of what is measured on a part, and whether it conforms; nothing is written."""
+    options = options or PartOptions()
+    seed = options.seed
+    refuse_unfit(job)
+    plan = plan_of(job)
+    trials = affordable(TRIALS, plan) if options.trials is None else options.trials
+    measured = None if job.measured is None else evaluated(plan, job.measured)
+    methods = methods_of(job, plan, measured)
+
+    # the machine: its certificate verified, its errors on the day of the measurement
+    machine = state_machine(
+        job, rerun=options.rerun, trust=options.trust, records=options.records, history=options.history, seed=seed,
+        stage=stage, fits=partial(refuse_out_of_reach, job),
+    )  # fmt: skip
+    job = with_history(with_calibration(job, machine.job), machine.history)
+
+    # the measurement made many times, with draws of every cause (JCGM 101)
+    circumstances = replace(circumstances_of(job, machine.state, plan, PLACES), measured=job.measured)
+    stage("Preparing the virtual measurements", 0.25)
+    virtual = Virtual(plan, circumstances)
+    simulated, errors = _simulate(virtual, trials, options.digits, seed, stage)
+
+    # where the uncertainty comes from, and what would reduce it
+    stage("Shares of each cause", 0.6)
+    shares = variance_shares(virtual, min(affordable(SHARED, plan), trials), seed)
+    stage("What would change the uncertainty", 0.7)
+    draws, twice = min(affordable(COMPARED, plan), trials), partial(_with_twice_the_points, job, machine.state)
+    reductions = ways(plan, circumstances, draws, seed, doubled=twice, planned=virtual)
+    stage("What to measure on the machine", 0.8)
+    unseen = _unseen(virtual, shares)
+    further = further_of(machine.job, unseen)
+
+    # values, limits, decisions (JCGM 106)
+    stage("Decisions", 0.85)
+    characteristics = stated(simulated, measured, plan, errors)
+    decisions = decide_limits(job, plan, errors, measured)
+    together = None if measured is None else _together(conforming(plan, errors, measured)[1], decisions)
+    x, y, z = origin_of(job, machine.state.machine).tolist()
+    return PartMeasurement(
+        job, plan, circumstances, virtual, simulated, characteristics, measured, shares, unseen,
+        None if further is None else further.further, decisions, together, tuple(reductions),
+        point_errors(virtual, seed=seed), (x, y, z), machine.standing, compare_methods(characteristics, shares, methods),
+        digits=options.digits, seed=seed, asked=trials, warnings=machine.warnings,
+        files={} if further is None else further.files,
+    )  # fmt: skip
+
+
 def affordable(draws: int, plan: Plan) -> int:
     """So many virtual measurements, or fewer of a plan of many points, or of features that are found anew in each."""
     own = {one.name: one.association for one in plan.features}
@@ -65,130 +130,35 @@ def affordable(draws: int, plan: Plan) -> int:
     return max(draws // 10, min(draws, draws * MANY // points))
 
 
-def evaluate_part(
-    job: PartJob,
-    *,
-    seed: int = 0,
-    trials: int | None = None,
-    digits: int | None = None,
-    rerun: bool = False,
-    trust: Iterable[Path] | None = None,
-    records: str | Path | None = None,
-    history: bytes | None = None,
-    stage: Stage = silent,
-) -> PartMeasurement:
-    """What a part's job gives.
-
-    ``trials``: number of virtual measurements; by default :data:`TRIALS`, fewer of a plan of many points. ``digits``: of u
-    that are to be known: then so many are made as that needs (JCGM 101:2008, 7.9), ``trials`` at least. ``rerun``: whether
-    the machine's certificate is computed again from its inputs. ``trust``: whose signatures on it are trusted; ``None``
-    where nothing need be signed. ``records``: of the machine's history, for its drift; ``None`` for none.
-    """
-    refuse_unfit(job)
-    plan = plan_of(job)
-    trials = affordable(TRIALS, plan) if trials is None else trials
-    measured = None if job.measured is None else evaluated(plan, job.measured)
-    others = methods_of(job, plan, measured)
-
-    machine = state_machine(
-        job, rerun=rerun, trust=trust, records=records, history=history, seed=seed, stage=stage,
-        fits=partial(refuse_out_of_reach, job),
-    )  # fmt: skip
-    job = with_history(with_calibration(job, machine.job), machine.history)
-    given = circumstances_of(job, machine.state, plan, PLACES)
-    if job.measured is not None:
-        given = replace(given, measured=job.measured)
-    stage("Preparing the virtual measurements", 0.25)
-    virtual = Virtual(plan, given)
-    simulated, errors = _simulated(virtual, trials, digits, seed, stage)
-    stage("Shares of each cause", 0.6)
-    shares = variance_shares(virtual, min(affordable(SHARED, plan), trials), seed)
-    stage("What would change the uncertainty", 0.7)
-    compared_by = min(affordable(COMPARED, plan), trials)
-    found_ways = ways(
-        plan, given, compared_by, seed, doubled=_with_twice_the_points(job, given.machine), planned=virtual
-    )
-    stage("What to measure on the machine", 0.8)
-    unseen = _unseen(virtual, shares)
-    further = further_of(machine.job, unseen)
-    stage("Decisions", 0.85)
-    known = stated(simulated, measured, plan, errors)
-    decided = decide_limits(job, plan, errors, measured)
-    together = None if measured is None else _together(conforming(plan, errors, measured)[1], decided)
-    return PartMeasurement(
-        job,
-        plan,
-        given,
-        virtual,
-        simulated,
-        known,
-        measured,
-        shares,
-        unseen,
-        None if further is None else further.further,
-        decided,
-        together,
-        tuple(found_ways),
-        point_errors(virtual, seed=seed),
-        _three(origin_of(job, machine.state.machine)),
-        machine.standing,
-        compare_methods(known, shares, others),
-        digits=digits,
-        seed=seed,
-        asked=trials,
-        warnings=machine.warnings,
-        files={} if further is None else further.files,
-    )
-
-
-def _together(together: float, decided: Iterable[Judged | None]) -> float | None:
+def _together(together: float, decisions: Iterable[Judged | None]) -> float | None:
     """The probability that all limits are kept, beside those of each as they are told: with a prior, and rare tails."""
-    each = [one.probability for one in decided if one is not None and one.probability is not None]
+    each = [one.probability for one in decisions if one is not None and one.probability is not None]
     return within_bounds(together, np.array(each)) if each else None
 
 
-def _with_twice_the_points(job: PartJob, machine: MachineState) -> Callable[[], tuple[Plan, Circumstances]]:
-    def more() -> tuple[Plan, Circumstances]:
-        other = doubled(job)
-        plan = plan_of(other)
-        return plan, circumstances_of(other, machine, plan, PLACES)
-
-    return more
+def _with_twice_the_points(job: PartJob, machine: MachineState) -> tuple[Plan, Circumstances]:
+    other = doubled(job)
+    plan = plan_of(other)
+    return plan, circumstances_of(other, machine, plan, PLACES)
 
 
-def _three(values: Floats) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z
+def _simulate(virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage) -> tuple[Simulated, Floats]:
+    """Figures of the errors, and (N, c) errors of the first of the virtual measurements that they come from."""
+    blocks, made = list[Floats](), 0
 
-
-@dataclass(eq=False)
-class _Keeping:
-    """Errors of virtual measurements, the first of them kept."""
-
-    virtual: Virtual
-    stage: Stage
-    blocks: list[Floats] = field(default_factory=list)
-    made: int = 0
-
-    def draw(self, random: np.random.Generator, n: int) -> Floats:
-        """(c, n) errors."""
-        errors = self.virtual.errors(random, n)
-        if self.made < KEPT:
-            self.blocks.append(errors[: KEPT - self.made].copy())
-        self.made += n
-        self.stage(f"Virtual measurements: {self.made}", 0.3 + 0.3 * min(1.0, self.made / TRIALS))
+    def draw(random: np.random.Generator, n: int) -> Floats:
+        nonlocal made
+        errors = virtual.errors(random, n)
+        if made < KEPT:
+            blocks.append(errors[: KEPT - made].copy())
+        made += n
+        stage(f"Virtual measurements: {made}", 0.3 + 0.3 * min(1.0, made / TRIALS))
         return np.ascontiguousarray(errors.T)
 
-
-def _simulated(virtual: Virtual, trials: int, digits: int | None, seed: int, stage: Stage) -> tuple[Simulated, Floats]:
-    """Figures of the errors, and (N, c) errors of some of the virtual measurements that they come from."""
-    keeping = _Keeping(virtual, stage)
-    source = Source(virtual.names, keeping.draw)
+    source = Source(virtual.names, draw)
     if digits is None:
-        found = from_source(source, trials, COVERAGE, seed)
-    else:
-        found = settled_source(source, COVERAGE, digits, seed, fewest_trials=trials)
-    return found, np.concatenate(keeping.blocks)
+        return from_source(source, trials, COVERAGE, seed), np.concatenate(blocks)
+    return settled_source(source, COVERAGE, digits, seed, fewest_trials=trials), np.concatenate(blocks)
 
 
 def _unseen(virtual: Virtual, shares: VarianceShares) -> tuple[UnseenError, ...]:

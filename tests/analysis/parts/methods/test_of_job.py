@@ -20,7 +20,7 @@ from cmm_uq.analysis.parts.methods.of_job import lacking, methods_of
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.app.commands.jobs.check import check_job
-from cmm_uq.app.commands.parts.part import evaluate_part
+from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.certificate.part.results import PART_RESULTS, part_results
@@ -170,7 +170,7 @@ def test_the_part_s_command_finds_them_and_check_says_what_they_lack(
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", lambda *_, **__: [])
     job = plate_files({**by_results(), **files()}, by_calibrated_part=CALIBRATED,
                       by_orientations={**ORIENTED, "points_varied": False}, machine_state=STATE)  # fmt: skip
-    found = evaluate_part(part_of(job), trials=1000)
+    found = evaluate_part(part_of(job), PartOptions(trials=1000))
     assert found.methods is not None
     assert [one.name for one in found.methods.characteristics] == [SIZE, ACROSS]
     virtual, calibrated, turned = found.methods.characteristics[0].stated
@@ -227,7 +227,7 @@ def test_the_example_has_all_methods_compared(monkeypatch: pytest.MonkeyPatch) -
     """With few draws; eleven of its twelve intervals hold the true value, and E_n beyond 1 tells of the twelfth."""
     monkeypatch.setattr("cmm_uq.app.commands.parts.part.ways", lambda *_, **__: [])
     assert not [one for one in check_job(EXAMPLE).warnings if one.key.startswith("[by_")]
-    found, truth = evaluate_part(read_part(EXAMPLE), trials=1000), example_truth()
+    found, truth = evaluate_part(read_part(EXAMPLE), PartOptions(trials=1000)), example_truth()
     assert found.methods is not None
     beyond = {
         (one.name, by.method)

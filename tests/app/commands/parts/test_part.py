@@ -17,7 +17,7 @@ from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
 from cmm_uq.app.commands.parts.machine import state_machine
-from cmm_uq.app.commands.parts.part import affordable, decide_limits, evaluate_part
+from cmm_uq.app.commands.parts.part import PartOptions, affordable, decide_limits, evaluate_part
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.certificate.part.measurement import PartMeasurement
@@ -47,7 +47,7 @@ def test_features_that_are_found_anew_each_time_have_fewer_virtual_measurements_
 @cache
 def plain() -> PartMeasurement:
     """The plate with its nominal points, by the machine's certificate."""
-    return evaluate_part(plate_of(by_certificate()), trials=TRIALS)
+    return evaluate_part(plate_of(by_certificate()), PartOptions(trials=TRIALS))
 
 
 @cache
@@ -55,7 +55,7 @@ def shifted() -> PartMeasurement:
     """The plate with its bore measured 20 µm off along x, by figures and draws of the machine alone."""
     off = np.zeros((60, 3))
     off[36:, 0] = 0.02
-    return evaluate_part(plate_of(by_results(), off, **THERE), trials=TRIALS)
+    return evaluate_part(plate_of(by_results(), off, **THERE), PartOptions(trials=TRIALS))
 
 
 def test_a_certificate_is_verified_and_its_recording_conditions_the_errors() -> None:
@@ -206,7 +206,7 @@ def test_every_key_of_results_is_told_in_the_reference_and_no_other() -> None:
 def test_angles_are_in_degrees_in_results() -> None:
     asked = {"name": "a", "what": "angle", "features": ["A", "B"], "lower_deg": 89.0, "upper_deg": 91.0}
     job = plate_of(by_results(), np.zeros((60, 3)), characteristic=[asked], **THERE)
-    found = evaluate_part(job, trials=1000)
+    found = evaluate_part(job, PartOptions(trials=1000))
     data = part_results(found)["characteristics"][0]
     assert data["unit"] == "°"
     assert data["measured"] == pytest.approx(90.0, abs=1e-6)
@@ -264,7 +264,7 @@ def test_a_machine_whose_certificate_does_not_hold_is_refused(
 ) -> None:
     placed = THERE if machine in (by_results, other_draws) and "nothing says" not in words else {}
     with pytest.raises(CmmUqError, match=words.replace("(", r"\(")) as raised:
-        evaluate_part(plate_of(machine(), **{**placed, **changes}), trials=1000)
+        evaluate_part(plate_of(machine(), **{**placed, **changes}), PartOptions(trials=1000))
     assert raised.value.fix
 
 
