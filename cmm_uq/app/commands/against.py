@@ -43,8 +43,6 @@ _STEP = 0.05
 class Against:
     """What is left of a recording once its simulation is taken off.
 
-    Parameters
-    ----------
     model : of the difference; its effects are those that are fitted anew.
     findings : of the screening, and what is odd about the prediction.
     observe : makes the artefact of points, with the uncertainty of what is predicted.
@@ -62,14 +60,7 @@ class Against:
 def against_simulation(job: Job, facts: SimulationFacts) -> Against:
     """Join what the simulation leaves of a recording with the model of what it could lack.
 
-    Parameters
-    ----------
-    job : that was read.
     facts : its ``[simulation]``.
-
-    Raises
-    ------
-    CmmUqError : the recording is damaged or the prediction is none of it.
     """
     recorded, findings = recorded_model(job)
     artefact, where = recorded.artefact, job.recording_path

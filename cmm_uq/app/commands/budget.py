@@ -38,19 +38,7 @@ def write_budget(
 ) -> WrittenBudget:
     """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none.
 
-    Parameters
-    ----------
     file : the model, in TOML.
-    out : where to write; ``reports/<name of the file>`` by default.
-    seed : instead of the file's.
-    force : keep what stands in the way instead of refusing.
-    stage : told of progress.
-    language : of the documents.
-
-    Raises
-    ------
-    CmmUqError : the model cannot be evaluated, or something in the folder is not this command's.
-    OutputError : the folder cannot be written to.
     """
     fonts_of(language)  # refused before anything is computed
     model = read_model_file(file)

@@ -59,8 +59,6 @@ def _told(
 ) -> Iterator[Finding]:
     """Outliers one by one, but those of one cause together, where the worst of them stands.
 
-    Parameters
-    ----------
     times_off : of each observation, in its own standard deviations.
     rows : of the recording, of each of these observations.
     recurring : rows that stay, of points that are off each time.
@@ -112,8 +110,6 @@ def named_draws(
 ) -> Draws:  # fmt: skip
     """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
 
-    Parameters
-    ----------
     values : (N, k) of the model's unknowns.
     mixture : whether they are of a mixture, row after row independent, and not of the posterior, row by row. They go with no
         size of the noise then: those are taken evenly from the posterior, and an ensemble is a chain.
@@ -203,8 +199,6 @@ def contradictions(
     so what the lines along the axis alone say of it, all other named effects as they are on average, must agree with it: all
     of them, within the joint 95 % uncertainty.
 
-    Parameters
-    ----------
     averaged : (N, k) draws of the model's unknowns over all explanations that remain.
     """
     linear, along = estimate.linear, growth(model.artefact)

@@ -33,15 +33,8 @@ _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")
 def opened(where: str | Path | None, out: Path | None) -> Iterator[Records | None]:
     """The records that a command writes to, made where there are none; ``None`` where there are to be none.
 
-    Parameters
-    ----------
     where : option of the command.
     out : folder that it writes to, where that is not the default.
-
-    Raises
-    ------
-    CmmUqError : they cannot be opened.
-    OutputError : they cannot be written to.
     """
     place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
     if place is None:
@@ -58,8 +51,6 @@ def ledger_of(
 ) -> Ledger:
     """For the files of an outcome, that are recorded as they are put in place.
 
-    Parameters
-    ----------
     records : to be added to.
     job : that the outcome is of.
     command : report or diagnose.
@@ -127,8 +118,6 @@ def silent(what: str, part: float) -> None:
 class Written:
     """What a command found and wrote.
 
-    Parameters
-    ----------
     outcome : what was found.
     results : contents of results.json.
     files : what was written, by name.
@@ -179,8 +168,6 @@ class Written:
 class Form:
     """In which files a command writes an outcome, and where.
 
-    Parameters
-    ----------
     command : of ``cmm-uq``.
     documents : their names, in the order in which they are made: a digital certificate (``.xml``) carries the page before it,
         and is attached to the PDF after it; those of a recording that was not measured carry its origin.
@@ -208,21 +195,10 @@ class Form:
     ) -> Written:
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
-        Parameters
-        ----------
         job : that the outcome is of.
         outcome : computes it.
-        out : folder to write to.
-        force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-        stage : told of progress.
         records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
         signing : who signs the documents; ``None`` for nobody.
-
-        Raises
-        ------
-        CmmUqError : as computing does, the documents cannot be signed, or something in the folder that this command did not
-            write for this job.
-        OutputError : the folder, or the records, cannot be written to.
         """
         fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)
@@ -251,10 +227,7 @@ class Form:
     ) -> dict[str, bytes]:  # fmt: skip
         """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
 
-        Parameters
-        ----------
         outcome : that is written.
-        stage : told of progress.
         results_only : whether nothing but ``results.json`` is wanted.
         finished : what becomes of a document before the next is made of it, as of one that is signed.
         """

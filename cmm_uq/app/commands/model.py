@@ -33,13 +33,7 @@ FEWEST_LEFT = 3
 
 
 def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
-    """The model that the job names.
-
-    Raises
-    ------
-    CmmUqError : an unknown effect, one that cannot be of this artefact, too many observations or placings, or a measurement to
-        set aside that is not there.
-    """
+    """The model that the job names."""
     if len(artefact.noise_scale) > OBSERVATIONS.most:
         raise CmmUqError(
             f"{len(artefact.noise_scale)} observations are more than are estimated from at once",
@@ -76,12 +70,7 @@ def _copies(artefact: Artefact, aside: Sequence[int]) -> NDArray[np.bool_]:
 
 
 def _refuse_open_sizes(model: MeasurementModel, where: str) -> None:
-    """Refuse measurements that leave open, whatever the machine's errors, what the measurement is made for.
-
-    Raises
-    ------
-    CmmUqError : too much of the recording is set aside.
-    """
+    """Refuse measurements that leave open, whatever the machine's errors, what the measurement is made for."""
     sought = [i for i, size in enumerate(model.artefact.sizes) if size.role == "sought"]
     if not sought:
         return
@@ -100,12 +89,7 @@ def _rank(model: MeasurementModel, columns: Sequence[int] | slice = slice(None))
 
 
 def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
-    """Refuse to estimate the noise where what is in doubt about each set-up could explain every residual.
-
-    Raises
-    ------
-    CmmUqError : fewer than three observations are left to estimate it from.
-    """
+    """Refuse to estimate the noise where what is in doubt about each set-up could explain every residual."""
     if model.sigma is not None or all(size.role != "set-up" for size in model.artefact.sizes):
         return
     rank, count = _rank(model)
@@ -121,13 +105,7 @@ def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
 def recorded_model(job: Job, *, placings: bool = False) -> tuple[MeasurementModel, tuple[Finding, ...]]:
     """The model that a job names, of what the screening leaves of its recording, and what it found.
 
-    Parameters
-    ----------
     placings : whether nothing but the placings is of interest, for which nominal coordinates serve as well.
-
-    Raises
-    ------
-    CmmUqError : the recording is damaged, or does not fit the artefact or the model.
     """
     kind = kind_of(job)
     where, observe = job.recording_path, kind.observing("screened")
@@ -145,12 +123,7 @@ def recorded_model(job: Job, *, placings: bool = False) -> tuple[MeasurementMode
 
 
 def _refuse_exact(job: Job, model: MeasurementModel) -> None:
-    """Refuse what is said to be measured and fits to the last digit, though its digits would show a nanometre.
-
-    Raises
-    ------
-    CmmUqError : no machine reads so; the noise of one cannot be estimated from it.
-    """
+    """Refuse what is said to be measured and fits to the last digit, though its digits would show a nanometre."""
     found = model.estimate().least_squares
     if job.origin != MEASURED or found.degrees_of_freedom < FEWEST_LEFT:
         return
@@ -181,12 +154,7 @@ def _unread(artefact: Artefact) -> list[Finding]:
 
 
 def refuse_unfit(job: Job) -> None:
-    """Refuse a damaged recording; one that holds planned coordinates, or none, is let through, and so are nominal ones.
-
-    Raises
-    ------
-    CmmUqError : see :func:`recorded_model`.
-    """
+    """Refuse a damaged recording; one that holds planned coordinates, or none, is let through, and so are nominal ones."""
     if len(job.points) and not job.planned and kind_of(job).observe is not None:
         recorded_model(job, placings=True)
 
@@ -198,24 +166,14 @@ OVERFLOW_FIX = (
 
 
 def refuse_planned(job: Job) -> None:
-    """Refuse a recording that only holds the coordinates of a plan; it can be simulated, and nothing else.
-
-    Raises
-    ------
-    CmmUqError : it does.
-    """
+    """Refuse a recording that only holds the coordinates of a plan; it can be simulated, and nothing else."""
     if job.planned:
         raise CmmUqError("holds planned coordinates: nothing is measured", where=f"{job.recording_path} line 1",
                          fix="Put in what the machine indicated, then remove that line")  # fmt: skip
 
 
 def refuse_unmeasured(job: Job) -> None:
-    """Refuse a job of which nothing is measured: a plan's coordinates, or no recording at all where its kind has one.
-
-    Raises
-    ------
-    CmmUqError : nothing is.
-    """
+    """Refuse a job of which nothing is measured: a plan's coordinates, or no recording at all where its kind has one."""
     refuse_planned(job)
     if job.facts.artefact.with_recording and not len(job.points):
         raise CmmUqError("is not there: nothing is measured", where=job.recording_path,
@@ -227,15 +185,9 @@ def recipe_of(
 ) -> Recipe:  # fmt: skip
     """How a job is analysed: in its kind's own way, or as observations that named effects explain.
 
-    Parameters
-    ----------
     own : what is asked of a kind's own analysis.
     usual : of a kind that observes an artefact.
     what : cannot be done of a kind that does neither, as ``reported``.
-
-    Raises
-    ------
-    CmmUqError : the kind offers neither, or nothing is measured yet.
     """
     refuse_unmeasured(job)
     kind = kind_of(job)

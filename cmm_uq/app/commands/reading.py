@@ -35,14 +35,7 @@ NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
     """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`.
 
-    Parameters
-    ----------
-    folder : the job folder, or its job.toml.
     recorded : whether the recording must be there; otherwise a job still to be measured has no points.
-
-    Raises
-    ------
-    CmmUqError : a file is missing or unreadable, or says something unknown or contradictory.
     """
     return reading.read_job(folder, NAMEABLE, recorded=recorded)
 
@@ -57,14 +50,8 @@ def read_machine(folder: Path) -> Job:
 def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
     """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`.
 
-    Parameters
-    ----------
     files : contents of job.toml and of all that it names, by name.
     recorded : whether the recording must be there; otherwise a job still to be measured has no points.
-
-    Raises
-    ------
-    CmmUqError : a file is missing, or says something unknown or contradictory.
     """
     return reading.job_of(files, NAMEABLE, recorded=recorded)
 
@@ -78,12 +65,7 @@ def in_language(job: Job, language: Code | None) -> Job:
 
 
 def compared_with(job: Job, prediction: Path) -> Job:
-    """A job that was read, to be compared with a simulation's prediction in a file that may lie anywhere.
-
-    Raises
-    ------
-    CmmUqError : the file is missing or no prediction.
-    """
+    """A job that was read, to be compared with a simulation's prediction in a file that may lie anywhere."""
     content = content_of(prediction, TABLE_BYTES, "Give the file that the simulation wrote")
     return predicted.against(job, content, prediction.name, prediction)
 
@@ -102,15 +84,9 @@ def job_from_frames(
 ) -> Job:
     """The job that a job.toml with these tables and a recording with these rows would be.
 
-    Parameters
-    ----------
     points : the recording, one row a point; ``None`` for a kind without one, or where it is still to be measured.
     tables : of job.toml, by name; what is ``None`` or empty is left out.
     files : further tables that job.toml names, such as error maps, by name.
-
-    Raises
-    ------
-    CmmUqError : job.toml or a table says something unknown, missing or contradictory, with the key, or line and column.
     """
     told = {name: table for name, table in tables.items() if table}
     recording = dict(_mapping(told.get("recording", {}), "recording"))
@@ -129,22 +105,12 @@ def job_from_frames(
 
 
 def compared_with_frame(job: Job, prediction: pd.DataFrame) -> Job:
-    """A job that was read, to be compared with what a simulation predicts.
-
-    Raises
-    ------
-    CmmUqError : it is no prediction.
-    """
+    """A job that was read, to be compared with what a simulation predicts."""
     return against(job, as_csv(prediction, PREDICTION), PREDICTION)
 
 
 def as_csv(frame: pd.DataFrame, name: str) -> bytes:
-    """A table as CSV: each number in the fewest digits that give it back.
-
-    Raises
-    ------
-    CmmUqError : it is no table.
-    """
+    """A table as CSV: each number in the fewest digits that give it back."""
     import pandas as pd
 
     try:

@@ -127,11 +127,6 @@ def outcome_of(found: Found, seed: int = 0) -> Outcome:
 def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: bool = True) -> Outcome:
     """Analyse a job that was read and compose its certificate; nothing is written.
 
-    Parameters
-    ----------
-    job : that was read.
-    seed : of everything random.
-    stage : told of progress.
     composed : whether the certificate is composed, too, so that whatever stops it is said here; figures are the same.
     """
 
@@ -155,16 +150,7 @@ def write_report(
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
 
-    Parameters
-    ----------
-    job : the job folder.
-    out : where to write; ``reports/<job id>`` by default.
-    seed : of everything random.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    stage : told of progress.
-    told : of the job, before anything is computed.
     records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
-    language : of the documents, instead of the job's.
     signing : who signs the certificate; ``None`` for nobody.
     """
     tell = stage or silent

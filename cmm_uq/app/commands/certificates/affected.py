@@ -50,8 +50,6 @@ Figures = tuple[float, float, float, float]
 class JobInputs:
     """What of a job's inputs decides whether a correction touches it.
 
-    Parameters
-    ----------
     job : job.toml.
     columns : of its files; ``None`` where a recording is of another format, whose columns have other names.
     """
@@ -162,9 +160,6 @@ class FigureChange:
 class AffectedCertificate:
     """One certificate that corrections touch.
 
-    Parameters
-    ----------
-    certificate : as recorded.
     corrections : that touch it.
     changes : of its figures; ``None`` where it was not computed again.
     decision, diagnosis : as they are now.
@@ -193,14 +188,10 @@ def affected_certificates(
 ) -> Iterator[AffectedCertificate]:  # fmt: skip
     """Certificates of versions from the first on that corrections up to the last touch, by day.
 
-    Parameters
-    ----------
-    records : that they are in.
     first, last : versions; only the installed one can compute anew.
     recompute : whether they are computed again.
     out : folder for drafts that are to replace those that changed; ``None`` to write none.
     where : records that the drafts are kept in.
-    stage : told of progress.
     """
     if order(last) > order(__version__):
         raise CmmUqError(

@@ -19,8 +19,6 @@ PRIVATE, PUBLIC = 0o600, 0o644
 class TrialKey:
     """What was made.
 
-    Parameters
-    ----------
     key : PKCS#12 file.
     certificate : PEM file of its certificate.
     until : last day of the certificate.
@@ -34,16 +32,9 @@ class TrialKey:
 def new_test_key(path: Path, name: str, asking: Asking) -> TrialKey:
     """Make a test key; a file that is there is not written over.
 
-    Parameters
-    ----------
     path : of the PKCS#12 file; its certificate comes beside it, ``.pem`` in place of the suffix.
     name : of whom it is for.
     asking : for the passphrase where the environment has none.
-
-    Raises
-    ------
-    CmmUqError : a file is there already, or name or passphrase are none.
-    OutputError : the folder cannot be written to.
     """
     beside = path.with_suffix(".pem")
     if beside == path:

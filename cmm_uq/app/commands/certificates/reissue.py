@@ -61,8 +61,6 @@ Shown = tuple[Text, Text, Text]
 def with_replaced(job: Job, where: str | Path | None, out: Path | None) -> Job:
     """The job with the results of the certificate that it replaces, where it names no file of them and the records have them.
 
-    Parameters
-    ----------
     where : option that names the records.
     out : folder that is written to, where that is not the default.
     """
@@ -83,8 +81,6 @@ def with_replaced(job: Job, where: str | Path | None, out: Path | None) -> Job:
 def replaced_in(records: Records, number: str, serial: str) -> Certificate | None:
     """The certificate of a number as it was issued: the newest that anybody released, else the newest.
 
-    Parameters
-    ----------
     serial : of the machine; empty where it has none.
     """
     found = [
@@ -109,12 +105,7 @@ def results_of(records: Records, certificate: Certificate) -> bytes:
 
 
 def reissued(outcome: Outcome) -> Outcome:
-    """The outcome with the comparison, where the certificate replaces another.
-
-    Raises
-    ------
-    CmmUqError : its job says that no figure is changed, and one is.
-    """
+    """The outcome with the comparison, where the certificate replaces another."""
     job = outcome.found.job
     replaces = job.facts.job.replaces
     if replaces is None or job.origin != MEASURED:
@@ -134,8 +125,6 @@ def reissued(outcome: Outcome) -> Outcome:
 def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Comparison:
     """What differs between both results, as printed.
 
-    Parameters
-    ----------
     number : of the certificate that is replaced.
     before : its results.json, or what the records have of it.
     after : results.json of the one in its place.
@@ -158,12 +147,7 @@ def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -
 
 
 def refuse_denied(comparison: Comparison, where: str) -> None:
-    """Refuse the statement that nothing is changed where anything is.
-
-    Raises
-    ------
-    CmmUqError : a decision or a figure differs.
-    """
+    """Refuse the statement that nothing is changed where anything is."""
     if comparison.differences:
         told = semicolons([one.sentence for one in comparison.differences[:3]])
         count = len(comparison.differences)
@@ -173,12 +157,7 @@ def refuse_denied(comparison: Comparison, where: str) -> None:
 
 
 def refuse_unlike(records: Records, certificate: Certificate) -> None:
-    """Refuse to release a certificate that replaces another of these records, and was not compared with it.
-
-    Raises
-    ------
-    CmmUqError : the results of both are at hand, and the certificate does not say what differs.
-    """
+    """Refuse to release a certificate that replaces another of these records, and was not compared with it."""
     file = Path(certificate.folder) / RESULTS
     if not file.is_file() or sha256_of(file) != certificate.results_sha256:
         return
@@ -195,12 +174,7 @@ def refuse_unlike(records: Records, certificate: Certificate) -> None:
 
 
 def refuse_denial(records: Records, before: Certificate, after: Certificate, reason: str) -> None:
-    """Refuse a reason for a replacement that says that nothing is changed where anything is.
-
-    Raises
-    ------
-    CmmUqError : see :func:`refuse_denied`.
-    """
+    """Refuse a reason for a replacement that says that nothing is changed where anything is."""
     if denies_a_change(reason):
         then, now = (json.loads(results_of(records, one)) for one in (before, after))
         refuse_denied(compared(before.number, then, now), "--reason")

@@ -25,8 +25,6 @@ _TOLD, _NEWEST = 4, 2000
 class Release:
     """What a signature did.
 
-    Parameters
-    ----------
     certificate : as it is now.
     waiting : how many persons more must release it.
     """
@@ -38,15 +36,7 @@ class Release:
 def certificate_named(records: Records, name: str, states: Collection[str]) -> RecordedCertificate:
     """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest.
 
-    Parameters
-    ----------
-    records : that it is in.
-    name : of it.
     states : that are asked for.
-
-    Raises
-    ------
-    CmmUqError : there is none, or several are called so and nobody said which.
     """
     found = [one for one in records.named(name) if one.command == "report"]
     if not found:
@@ -75,18 +65,10 @@ def release(
 ) -> Release:  # fmt: skip
     """Release a certificate, or sign it as the first of two persons.
 
-    Parameters
-    ----------
-    records : that it is in.
-    name : of the certificate; see :func:`certificate_named`.
     by : who releases it.
     reason : for the record.
     despite : what is said of a certificate that states no pass; it stays in the records.
     ask : asks for that where it is not given.
-
-    Raises
-    ------
-    CmmUqError : it must not be released, or not by this person, or nothing is said of what is no pass.
     """
     certificate, person = certificate_named(records, name, ("draft",)), _person(by)
     if (why := blocked(certificate)) is not None:
@@ -119,17 +101,9 @@ def release(
 def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: str | None = None) -> Release:
     """Withdraw a certificate, or put another in its place.
 
-    Parameters
-    ----------
-    records : that it is in.
-    name : of the certificate.
     by : who withdraws it.
     reason : why.
     replaced_by : the certificate in its place, which must be released.
-
-    Raises
-    ------
-    CmmUqError : it does not count any more, or what is to replace it does not.
     """
     certificate, person = certificate_named(records, name, STANDING), _person(by)
     if not reason.strip():
@@ -170,8 +144,6 @@ def blocked(certificate: RecordedCertificate) -> str | None:
 def no_pass(certificate: RecordedCertificate, content: Mapping[str, Any]) -> str:
     """What a certificate states that is no pass, in words; empty where nobody has to say a word of it.
 
-    Parameters
-    ----------
     content : of its entry; one of an earlier version has the gravest decision alone.
     """
     if certificate.decision in ("pass", "conditional pass", NONE):

@@ -26,12 +26,7 @@ def listed_standards() -> list[tuple[str, tuple[str, ...]]]:
 
 @naming_package()
 def clauses_of(name: str) -> Sequence[Clause]:
-    """Clauses of a standard, or of a document that decisions go by.
-
-    Raises
-    ------
-    CmmUqError : there is none of this name, or it has no clauses here.
-    """
+    """Clauses of a standard, or of a document that decisions go by."""
     standard = standard_named(name)
     found = CLAUSES.get(name, ()) if standard is None else standard.clauses
     if not found:
@@ -42,12 +37,7 @@ def clauses_of(name: str) -> Sequence[Clause]:
 
 
 def form(name: str) -> str:
-    """The form of a standard, to be filled in.
-
-    Raises
-    ------
-    CmmUqError : see :func:`clauses_of`.
-    """
+    """The form of a standard, to be filled in."""
     clauses = clauses_of(name)
     parts = [
         f"# Clauses of {name} as cmm-uq {__version__} takes them. Hold each against your own copy and answer it; then\n"
@@ -69,13 +59,7 @@ def form(name: str) -> str:
 
 
 def write_form(name: str, file: Path) -> Path:
-    """Write the form of a standard; nothing is overwritten.
-
-    Raises
-    ------
-    CmmUqError : see :func:`clauses_of`.
-    OutputError : the file is there already, or cannot be written.
-    """
+    """Write the form of a standard; nothing is overwritten."""
     content = form(name)
     refuse_taken(file)
     write_new(file, content.encode())

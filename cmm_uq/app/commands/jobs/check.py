@@ -50,8 +50,6 @@ _TABLE_KEY = re.compile(r"\[+([^\]]+)\]+ ?([\w.]*)")
 class Problem:
     """Something that is wrong with a job, or that should be known.
 
-    Parameters
-    ----------
     problem : what it is.
     file : where it stands, if in a file.
     line : of the file, from 1.
@@ -89,8 +87,6 @@ class Problem:
 class JobCheck:
     """What there is to say of a job before it is computed.
 
-    Parameters
-    ----------
     job : its folder, or its job.toml.
     problems : that would stop the command.
     warnings : that the certificate would state, or that what stands there is not a measurement.
@@ -128,12 +124,7 @@ class JobCheck:
 
 @naming_package()
 def check_job(folder: Path) -> JobCheck:
-    """Check a job.
-
-    Parameters
-    ----------
-    folder : the job folder, or its job.toml.
-    """
+    """Check a job."""
     wrong, path = Gathered(), folder if folder.suffix == ".toml" else folder / "job.toml"
     job: Job | None = None
     warnings: list[Problem] = []

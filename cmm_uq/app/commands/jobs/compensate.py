@@ -37,14 +37,8 @@ PROVENANCE = "compensation.json"
 def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
     """The recording of a job at the coordinates that its error maps make of it, and how it came about.
 
-    Parameters
-    ----------
     job : with ``[machine] error_map``.
     beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
-
-    Raises
-    ------
-    CmmUqError : the job has no error map, or it does not serve these points.
     """
     maps = maps_of(job)
     refuse_planned(job)
@@ -66,10 +60,7 @@ def write_compensated(
 ) -> dict[str, Path]:  # fmt: skip
     """Write a job folder with the compensated recording, marked as such; its job.toml names no error map any more.
 
-    Parameters
-    ----------
     map_text_c : temperature, °C, at which the error map is written beside it in the contractors' text form.
-
     Returns and raises as :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`.
     """
     read = read_job(job)
@@ -83,14 +74,8 @@ def write_compensated(
 def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
     """The job that :func:`write_compensated` writes, in memory.
 
-    Parameters
-    ----------
     job : with ``[machine] error_map``.
     beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
-
-    Raises
-    ------
-    CmmUqError : the job has no error map, or it does not serve these points.
     """
     _refuse(job)
     return job_of(_files(job, beyond, {}))
@@ -172,13 +157,9 @@ def write_compensated_cloud(
 ) -> dict[str, Path]:
     """Write the coordinates of a cloud, x, y, z in mm in the frame of the scales, and how they came about.
 
-    Parameters
-    ----------
     job : of which ``[machine]`` names the error maps and describes the digitizer; its recording is not read.
     cloud : columns u_mm, v_mm in the scan plane and scale readings d_mm, e_mm, f_mm; pose, time_s, temp_x_c … where needed.
     beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
-    progress : told the part done.
-
     Returns and raises as :func:`~cmm_uq.app.commands.jobs.simulate.write_simulation`.
     """
     read = read_machine(job)

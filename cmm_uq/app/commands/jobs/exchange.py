@@ -33,14 +33,7 @@ _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
 def read_export(path: Path, keys: ImportKeys | None = None) -> Imported:
     """A file in any format that is known.
 
-    Parameters
-    ----------
-    path : of the file.
     keys : what it leaves open.
-
-    Raises
-    ------
-    CmmUqError : it is of no known format, damaged or hostile, or can be read in two ways that no key settles.
     """
     content = content_of(path, TABLE_BYTES, "Check its name")
     found = imported(content, str(path), keys or ImportKeys())
@@ -64,15 +57,9 @@ def own_format(found: Imported) -> bytes:
 def write_recording(path: Path, found: Imported, out: Path) -> None:
     """Write a recording in the project's own format, whole or not at all, and over nothing.
 
-    Parameters
-    ----------
     path : of the export; a first line that says what a recording was made by is kept.
     found : what was read of it.
     out : to write to.
-
-    Raises
-    ------
-    OutputError : something is there, or it cannot be written.
     """
     mark = _MARK.match(content_of(path, TABLE_BYTES, "Check its name"))
     content = (mark[0].removeprefix(b"\xef\xbb\xbf") if mark else b"") + own_format(found)
@@ -87,22 +74,10 @@ def write_job_of_export(
 
     Nothing is made up: artefact, limits and travel are those that are given, whatever a new job of the kind would begin with.
 
-    Parameters
-    ----------
     kind : of measurement.
-    export : the file.
     folder : that does not exist, or is empty.
     given : what job.toml is to say, by table and key; the machine's name at least.
     keys : what the export leaves open.
-
-    Returns
-    -------
-    path of each file.
-
-    Raises
-    ------
-    CmmUqError : the folder is not empty, or the readers of a job refuse the export or what is given.
-    OutputError : the folder cannot be written to.
     """
     from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export
     from cmm_uq.base.output import Owner, staged
@@ -126,19 +101,8 @@ _FIX = "Name the results.json of a report, or the folder it lies in"
 def write_qif(report: Path, out: Path | None = None) -> Path:
     """Write the results of a report as QIF.
 
-    Parameters
-    ----------
     report : its results.json, or the folder it lies in.
     out : file to write, ``<job id>.qif`` by default.
-
-    Returns
-    -------
-    the file.
-
-    Raises
-    ------
-    CmmUqError : it is no results.json of a report.
-    OutputError : the file is there already, or cannot be written.
     """
     path = report / RESULTS if report.is_dir() else report
     found = read_results(
@@ -153,14 +117,8 @@ def write_qif(report: Path, out: Path | None = None) -> Path:
 def read_certificate(file: Path, schema: Path | None = None) -> Certificate:
     """The certificate of a file.
 
-    Parameters
-    ----------
     file : XML.
     schema : folder of the schemas; ``None`` for our own checks alone.
-
-    Raises
-    ------
-    CmmUqError : it is missing, no DCC, or breaks the schema, with line and XPath.
     """
     content = content_of(file, DCC_BYTES, "Name a digital calibration certificate (.xml)")
     certificate = read(content, str(file))

@@ -34,17 +34,11 @@ def job_files(
 ) -> dict[str, bytes]:  # fmt: skip
     """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next.
 
-    Parameters
-    ----------
     kind : of measurement.
     tables : what job.toml says.
     files : the recording that it names, and other files.
     examples : dotted keys whose figures are an example's; a measured recording is refused beside them.
     begin : what the job begins with, if not what its kind does.
-
-    Raises
-    ------
-    CmmUqError : the readers of a job refuse it.
     """
     found = kind_or_refused(kind)
     job = read_new(found, tables, files)
@@ -56,12 +50,7 @@ def job_files(
 
 
 def kind_or_refused(name: str) -> Kind:
-    """The kind of this name.
-
-    Raises
-    ------
-    CmmUqError : there is none.
-    """
+    """The kind of this name."""
     found = kind_named(name)
     if found is None:
         raise CmmUqError(f"there is no kind {name!r}", fix=suggestion(name, names()))

@@ -84,15 +84,8 @@ def usual(name: str) -> dict[str, Any]:
 def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     """Contents of every file of a new job, by name.
 
-    Parameters
-    ----------
     name : of the kind, or of a further way of it, such as ``shift_plate``.
     given : what job.toml is to say, by table and key, in place of what the kind begins with.
-    id : of the job.
-
-    Raises
-    ------
-    CmmUqError : no such kind, or what is given is refused by the readers of a job.
     """
     kind, begin = _begun(name)
     tables = _tables(kind, begin, given, id)
@@ -113,16 +106,9 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
 def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
     """A new job of a recording that was measured: nothing of machine, artefact and limits but what is given.
 
-    Parameters
-    ----------
     kind : of measurement, or a further name of it.
     given : what job.toml is to say, by table and key.
     files : the recording that it names, and other files.
-    id : of the job.
-
-    Raises
-    ------
-    CmmUqError : the readers of a job refuse it, or a key that the kind needs is not given.
     """
     found, begin = _begun(kind)
     if "date" not in given.get("job", {}):
@@ -137,14 +123,7 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
 def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
     """Contents of every file of a job that is only planned: nothing is recorded.
 
-    Parameters
-    ----------
     given : what job.toml is to say; its kind is ``artefact.kind``, a ballbar by default.
-    id : of the job.
-
-    Raises
-    ------
-    CmmUqError : no such kind, or what is given is refused by the readers of a job.
     """
     name = str(given.get("artefact", {}).get("kind", "ballbar"))
     kind, begin = _begun(name)
@@ -161,22 +140,11 @@ def write_new(
 ) -> dict[str, Path]:
     """Write the folder of a new job, of a part or of a new budget; never over anything.
 
-    Parameters
-    ----------
     name : see :func:`known`, or :data:`PLAN`, :data:`PART` or :data:`BUDGET`.
     folder : that does not exist, or is empty.
     given : see :func:`new_job`.
     drawing : QIF plan or DMIS program that a part begins from.
     answers : what the user described of a part.
-
-    Returns
-    -------
-    path of each file.
-
-    Raises
-    ------
-    CmmUqError : the folder is not empty, no such kind, or what is given is refused.
-    OutputError : the folder cannot be written to.
     """
     check_empty(folder)
     id = job_id(folder, given, name)  # noqa: A001
@@ -209,12 +177,7 @@ def job_id(folder: Path, given: Tables, otherwise: str = "job") -> str:
 
 
 def check_empty(folder: Path, but: str = "") -> None:
-    """Refuse a folder that something lies in.
-
-    Raises
-    ------
-    CmmUqError : it does, or it is a file.
-    """
+    """Refuse a folder that something lies in."""
     try:
         there = sorted(path.name for path in folder.iterdir() if not (but and path.name.startswith(but)))
     except FileNotFoundError:

@@ -85,12 +85,7 @@ SCHEMAS: Mapping[str, Callable[[], Schema]] = MappingProxyType({
 
 @naming_package()
 def schema_named(name: str) -> Schema:
-    """One of :data:`SCHEMAS`.
-
-    Raises
-    ------
-    CmmUqError : there is none of this name.
-    """
+    """One of :data:`SCHEMAS`."""
     if name not in SCHEMAS:
         raise CmmUqError(f"there is no schema {name!r}", fix=suggestion(name, SCHEMAS))
     return SCHEMAS[name]()

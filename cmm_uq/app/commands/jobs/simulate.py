@@ -45,16 +45,9 @@ _FIX = "Give effects, sizes and noise that a machine can have"
 def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
     """The points of a recording with the placings of the job's own.
 
-    Parameters
-    ----------
     job : its recording gives the placings and the columns.
     truth : what acts.
-    seed : instead of the one in ``truth``.
     truth_path : file that it was read from, for messages.
-
-    Raises
-    ------
-    CmmUqError : an unknown effect, parameter or size, or a column that an effect needs is missing.
     """
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
@@ -111,17 +104,7 @@ def _refuse_unrecorded(points: Points, acting: Sequence[Effect], truth: Truth, t
 def write_simulation(
     job: Path, truth: Path, out: Path, *, seed: int | None = None, force: bool = False
 ) -> dict[str, Path]:  # fmt: skip
-    """Write a job folder with a simulated recording, marked as such, and the truth that it was drawn from.
-
-    Returns
-    -------
-    path of each file.
-
-    Raises
-    ------
-    CmmUqError : bad input, or something in the folder that this command did not write for this job.
-    OutputError : the folder cannot be written to.
-    """
+    """Write a job folder with a simulated recording, marked as such, and the truth that it was drawn from."""
     read = read_job(job)
     kind_of(read).observing("simulated")
     content = content_of(truth, JOB_BYTES, _TRUTH_GIVES)
@@ -134,15 +117,8 @@ def write_simulation(
 def simulated_job(job: Job, truth: Path | Mapping[str, Any], *, seed: int | None = None) -> Job:
     """The job that :func:`write_simulation` writes, in memory.
 
-    Parameters
-    ----------
     job : whose recording gives the placings and the columns.
     truth : what acts, as the path of a ``truth.toml``, or as what such a file says.
-    seed : instead of the one in ``truth``.
-
-    Raises
-    ------
-    CmmUqError : bad input.
     """
     kind_of(job).observing("simulated")
     if isinstance(truth, Path):

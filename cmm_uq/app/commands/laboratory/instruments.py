@@ -28,15 +28,9 @@ def ready_profiles() -> list[tuple[str, str, str]]:
 def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Path]:
     """The source that is meant, and the folder that its files lie in.
 
-    Parameters
-    ----------
     what : a profile, or the name of a source where a job is given.
     port : at which it is; empty where the job says it.
     job : folder.
-
-    Raises
-    ------
-    CmmUqError : there is no such source, or no port is named.
     """
     if job is None:
         name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(ENDING))
@@ -54,13 +48,7 @@ def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Pa
 class Attempt:
     """An instrument that is open, and what came of it so far.
 
-    Parameters
-    ----------
     what, port, job : see :func:`declared`.
-
-    Raises
-    ------
-    CmmUqError : it cannot be opened.
     """
 
     def __init__(self, what: str, port: str, job: Path | None) -> None:
@@ -86,13 +74,7 @@ class Attempt:
 
 
 def write_profile(out: Path, wanted: ProfileDraft) -> None:
-    """Write a new profile that reads its own example.
-
-    Raises
-    ------
-    CmmUqError : it cannot be made of what was said.
-    OutputError : something is there, or it cannot be written.
-    """
+    """Write a new profile that reads its own example."""
     if out.suffix != ENDING:
         raise CmmUqError("a profile's file ends in .toml", where=str(out), fix=f"Name it {out.stem or 'my-gauge'}.toml")
     content = drafted(wanted)
@@ -104,14 +86,8 @@ def write_profile(out: Path, wanted: ProfileDraft) -> None:
 def simulated_instrument(profile: str, way: str) -> Iterator[str]:
     """A simulated instrument, at the port that is given, until it is left.
 
-    Parameters
-    ----------
     profile : a ready one.
     way : ``pty``, ``socket`` or ``rfc2217``; empty for the usual one.
-
-    Raises
-    ------
-    CmmUqError : there is no simulation of it, or no such way.
     """
     from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, simulated
     from cmm_uq.laboratory.live.instruments.speakers import SPEAKERS

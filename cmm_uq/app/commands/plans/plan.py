@@ -30,16 +30,7 @@ PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
     """Plan a job that was read, whose recording may be missing; nothing is written.
 
-    Parameters
-    ----------
-    job : that was read.
     power : whether to predict what the diagnosis would find, which takes most of the time.
-    seed : of the recordings drawn for that.
-    stage : told of progress.
-
-    Raises
-    ------
-    CmmUqError : the plan is impossible.
     """
     from cmm_uq.app.commands.plans.planning import make_plan
 
@@ -71,20 +62,8 @@ def write_plan(
     ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
     to measure.
 
-    Parameters
-    ----------
     job : the job folder; its recording may be missing.
-    out : where to write; ``reports/<job id>/plan`` by default.
     power : whether to predict what the diagnosis would find, which takes most of the time.
-    seed : of the recordings drawn for that.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    stage : told of progress.
-    language : of the page, instead of the job's.
-
-    Raises
-    ------
-    CmmUqError : the plan is impossible, or something in the folder that this command did not write for this job.
-    OutputError : the folder cannot be written to.
     """
     read, tell = in_language(read_job(job, recorded=False), language), stage or silent
     return PLAN.write(

@@ -37,8 +37,6 @@ _NANOMETRE = 1e-6
 def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded: int) -> tuple[Condition, ...]:
     """Conditions of the standard that a ready plan is named after, and of all that the job wishes to be decided.
 
-    Parameters
-    ----------
     name : of the plan.
     points : of everything that will have been measured.
     recorded : how many of them were, the first ones; of these copies do not count.
@@ -66,8 +64,6 @@ def completing(
 ) -> tuple[SetUp, ...]:  # fmt: skip
     """Placings of the usual ready plan of which each supplies something that the standards' tests still lack.
 
-    Parameters
-    ----------
     recorded : what was measured.
     after : the recording with further placings.
     """
@@ -112,8 +108,6 @@ Progress = Callable[[str, float], None]
 class Outlook:
     """What some placings tell.
 
-    Parameters
-    ----------
     placings : of them all.
     points : the same as one recording.
     identifiability : of the effects named; ``None`` for a kind that names none.
@@ -131,8 +125,6 @@ class Outlook:
 class Plan:
     """What to measure, and what it will tell.
 
-    Parameters
-    ----------
     job, setting : what was asked.
     name : of the placings to start from, a ready plan or the recording.
     start : what these tell.
@@ -191,16 +183,8 @@ def minutes(setting: Setting, placing: SetUp) -> float:
 def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> Plan:
     """Plan a job.
 
-    Parameters
-    ----------
     job : with or without a recording.
     power : whether to predict what the diagnosis would find.
-    seed : of the recordings drawn for that.
-    progress : told what is done, and the part of the whole.
-
-    Raises
-    ------
-    CmmUqError : the plan is impossible: no room, no fixture, no effect, no time.
     """
     tell = progress or (lambda what, part: None)
     tell("Finding what the placings determine", 0.05)
