@@ -84,8 +84,8 @@ def plate_of(machine: Mapping[str, bytes], points: Floats | None = None, **chang
     return part_of(plate_files(machine, points, **changes))
 
 
+# tables of results.json whose keys are names, and what the reference writes for them.
 _ANY = {"inputs_sha256": "FILE", "seen": "CAUSE"}
-"""Tables of results.json whose keys are names, and what the reference writes for them."""
 
 
 def results_keys(data: Any, path: str = "") -> Iterator[str]:

@@ -28,8 +28,7 @@ from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior, sample_with_noise
 from tests.part_machines import by_certificate, plate_of
 
-TRIALS = 1000
-"""Enough to be computed again to the byte; how near draws come to the truth is looked at elsewhere."""
+TRIALS = 1000  # enough to be computed again to the byte; how near draws come to the truth is looked at elsewhere
 
 
 @cache

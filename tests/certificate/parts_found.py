@@ -78,12 +78,7 @@ def found_of(
     job: PartJob | None = None, *, points: Floats | None = None, state: MachineState | None = None, draws: int = DRAWS,
     **changes: Any,
 ) -> PartMeasurement:  # fmt: skip
-    """A part's measurement; without points one that is planned.
-
-    Parameters
-    ----------
-    changes : of what is found, in place of what was drawn.
-    """
+    """A part's measurement; without points one that is planned."""
     job = replace(job or plate(), measured=points)
     plan = plan_of(job)
     given = circumstances_of(job, state or machine(), plan, 3)

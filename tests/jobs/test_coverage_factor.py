@@ -19,7 +19,7 @@ def test_a_table_divides_by_two_and_a_quarter() -> None:
 
 def test_degrees_of_freedom_stand_for_a_factor_where_none_is_stated() -> None:
     assert factor_of(2.25, 4.0) == 2.25
-    assert factor_of(None, 4.0) == pytest.approx(2.87, abs=5e-3)  # t at 95.45 % (GUM, table G.2)
+    assert factor_of(None, 4.0) == pytest.approx(2.78, abs=5e-3)  # t at 95 % (GUM, table G.2)
 
 
 def test_a_heading_of_a_certificate_divides_by_two_and_a_quarter() -> None:

@@ -18,9 +18,8 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.association import ASSOCIATIONS, Association
 
 FeatureKind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
+# points that determine a feature
 FEWEST: dict[FeatureKind, int] = {"point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6}
-"""Points that determine a feature."""
-
 # features with a direction: along a line or an axis, normal to a plane or to that of a circle
 DIRECTED: tuple[FeatureKind, ...] = ("line", "plane", "circle", "cylinder", "cone")
 SIZED: tuple[FeatureKind, ...] = ("circle", "sphere", "cylinder")  # features with a diameter

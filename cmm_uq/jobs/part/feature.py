@@ -111,9 +111,8 @@ def refuse_not_modelled(table: Any) -> Any:
 Kind = Literal["point", "line", "plane", "circle", "sphere", "cylinder", "cone"]
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
 Pattern = Literal["points", "grid", "sections", "lines", "circles", "spiral"]
-
+# points that determine a feature
 FEWEST: Mapping[Kind, int] = {"point": 1, "line": 2, "plane": 3, "circle": 3, "sphere": 4, "cylinder": 5, "cone": 6}
-"""Points that determine a feature."""
 
 PATTERNS: Mapping[Kind, tuple[Pattern, ...]] = {
     "point": (), "line": ("points",), "plane": ("points", "grid", "circles", "spiral"), "circle": ("points",),

@@ -16,10 +16,8 @@ from cmm_uq.jobs.part.tables import CalibratedPartFacts, OrientationsFacts, Part
 
 COLUMNS = ("feature", "point", "x_mm", "y_mm", "z_mm")
 FAR_MM = 5.0  # from the nominal contact point: a measured one farther away is in another frame, unit or order
-
+# by what the factor of points in another unit to those in mm is; a scale that is off by a hundredth is another matter
 _IN_UNITS = {1 / 25.4: "in inches", 1e-3: "in metres", 25.4: "taken for inches once too often", 1e3: "in µm"}
-"""By what the factor of points in another unit to those in mm is; a scale that is off by a hundredth is another matter."""
-
 _FIX = "Save it as CSV in UTF-8, with commas between the columns"
 
 

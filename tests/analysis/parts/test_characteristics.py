@@ -295,8 +295,7 @@ def test_a_feature_that_lies_far_away_is_prepared_anew() -> None:
     np.testing.assert_allclose(found[:2], middle[:2], atol=NANOMETRE)
 
 
-SEAT = cone("seat")
-"""Half an angle of 10°, widening upwards, 20 mm wide at z = 0."""
+SEAT = cone("seat")  # half an angle of 10°, widening upwards, 20 mm wide at z = 0
 
 
 @pytest.mark.parametrize(("one", "moves", "value"), [
@@ -311,9 +310,7 @@ SEAT = cone("seat")
     (Characteristic("", "z", ("seat",), ABC), {"seat": shifted(0.0, 0.0, 0.02)}, 0.02),
     (Characteristic("", "distance", ("D", "seat")), {"seat": shifted(0.02, 0.0, 0.0)}, 199.98),
 ])  # fmt: skip
-def test_places_along_an_axis_are_measured_too(
-    one: Characteristic, moves: dict[str, Move], value: float
-) -> None:  # fmt: skip
+def test_places_along_an_axis_are_measured_too(one: Characteristic, moves: dict[str, Move], value: float) -> None:
     features = (*BLOCK, circle("ring", [100, 50, -5], 8.0), circle("below", [100, 50, -15], 8.0), SEAT)
     assert measured(features, one, moves) == pytest.approx(value, abs=2e-7)
 

@@ -26,12 +26,8 @@ DRAWN: dict[str, Callable[[np.random.Generator], Floats]] = {
     "of two": lambda random: random.choice([-1.5, 1.5], N) + 0.2 * random.standard_normal(N),
     "with tails": lambda random: random.standard_t(4.0, N),
 }
-PROVED = 0.05
-"""Of ISO 14253-1: the probability of the contrary that a pass or a fail leaves."""
-
-DRAW_ERROR = 4 * np.sqrt(0.05 / N)
-"""Four standard deviations of a share of one in twenty."""
-
+PROVED = 0.05  # of ISO 14253-1: the probability of the contrary that a pass or a fail leaves
+DRAW_ERROR = 4 * np.sqrt(0.05 / N)  # four standard deviations of a share of one in twenty
 errors_of = st.sampled_from(sorted(DRAWN))
 numbers = st.floats(-3.0, 6.0).map(lambda number: round(number, 3))
 limits_of = st.one_of(st.none(), numbers)
@@ -39,7 +35,7 @@ limits_of = st.one_of(st.none(), numbers)
 
 def all_of(
     errors: Floats, measured: Floats, plan: Plan
-) -> tuple[tuple[StatedCharacteristic, ...], Floats, float, list[LimitDecision]]:  # fmt: skip
+) -> tuple[tuple[StatedCharacteristic, ...], Floats, float, list[LimitDecision]]:
     names = [one.name for one in plan.characteristics]
     simulated = from_source(Source(names, lambda random, n: errors.T.copy()), N)
     each, together = conforming(plan, errors, measured)

@@ -22,8 +22,8 @@ PLAN = Plan(
     (circle("hole", [0, 0, 0], 20.0, 8), spot("o", [0, 0, 0])),
     (Characteristic("zone", "roundness", ("hole",), upper=1.5), Characteristic("size", "size", ("hole",), upper=1.5)),
 )
+# errors of 0.25 on average, in standard deviations.
 DRAWS = np.random.default_rng(11).standard_normal((200_000, 1)) + 0.25
-"""Errors of 0.25 on average, in standard deviations."""
 ERRORS = np.repeat(DRAWS, 2, axis=1)
 
 

@@ -15,7 +15,6 @@ from cmm_uq.jobs.part.job import PartJob, read_part
 from tests.conftest import ROOT
 
 CERTIFICATE = ROOT / "examples" / "part-plate-simulated" / "machine" / "certificate-simulated.pdf"
-
 BEGIN = ["Shaft", "D 7", "11.5e-6", str(CERTIFICATE), "3", "0 0 -120", "0.2"]
 
 

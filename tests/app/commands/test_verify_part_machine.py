@@ -24,8 +24,7 @@ from tests.part_machines import by_certificate, plate_of
 from tests.part_reports import put, sampled_once, unchanged
 
 PDF = "part-simulated.pdf"
-TRIALS = 4000
-"""With fewer, what a forged history changes would be within what computing again allows for the draws."""
+TRIALS = 4000  # with fewer, what a forged history changes would be within what computing again allows for the draws
 BRIDGE = {"serial": "", "name": "Simulated bridge machine", "manufacturer": "", "model": "", "place": ""}
 
 

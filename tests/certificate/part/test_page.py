@@ -49,7 +49,7 @@ LONG = "Bohrung für den Passstift am Flansch des Getriebegehäuses, Ausführung
 STYLI = [
     {"name": "down", "diameter_mm": 4.0, "offset_mm": [0.0, 0.0, -150.0], "u_diameter_um": 0.3},
     {"name": "side", "diameter_mm": 3.0, "offset_mm": [0.0, 40.0, -120.0], "u_offset_um": [0.5, 0.5, 0.5]},
-]  # fmt: skip
+]
 KINDS: list[dict[str, Any]] = [
     {"name": LONG, "kind": "cone", "point_mm": [30.0, 40.0, -5.0], "direction": [0.0, 0.0, 1.0], "diameter_mm": 16.0,
      "angle_deg": 60.0, "inner": True, "length_mm": 8.0, "stylus": "down",
@@ -66,7 +66,7 @@ CHARACTERISTICS = [
     {"name": f"Ø {LONG[:90]}", "what": "size", "features": ["ball"], "upper_mm": 24.01},
     {"name": "edge", "what": "straightness", "features": ["edge"], "tolerance_mm": 0.01},
     {"name": "to the ball", "what": "distance", "features": ["spot", "ball"]},
-]  # fmt: skip
+]
 
 
 @pytest.fixture(scope="module")

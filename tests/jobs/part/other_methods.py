@@ -9,17 +9,12 @@ import numpy as np
 from cmm_uq.jobs.part.job import PartJob
 from tests.jobs.part.parts import plate
 
+# the plate's characteristics: diameter of its bore, 30 mm, and the bore's distance from the face B, 40 mm
 SIZE, ACROSS = "1", "5"
-"""The plate's characteristics: diameter of its bore, 30 mm, and the bore's distance from the face B, 40 mm."""
-
+# of the calibrated part's bore: systematic error, and half of what two repeats in a set-up differ by, mm
 BIAS, SPREAD = 3e-3, 1e-3
-"""Of the calibrated part's bore: systematic error, and half of what two repeats in a set-up differ by, mm."""
-
-OFF = 1e-3 * np.array([3.0, -1.0, -4.0, 2.0])
-"""Of the orientations, mm; their mean is nothing."""
-
-SCALE, TIP = 20e-6, 6e-3
-"""Errors of the common scale, and of the tip's effective diameter, mm."""
+OFF = 1e-3 * np.array([3.0, -1.0, -4.0, 2.0])  # of the orientations, mm; their mean is nothing
+SCALE, TIP = 20e-6, 6e-3  # errors of the common scale, and of the tip's effective diameter, mm
 
 
 def calibrated_rows() -> list[str]:

@@ -184,8 +184,6 @@ NO_SIDE = feature(6, "Circle", "open", "<Location>4 5 6</Location><Normal>0 0 1<
 MADE = feature(6, "Point", "made", "<Location>4 5 6</Location><Normal>0 0 1</Normal>", "", "<Constructed/>")
 NURBS = feature(6, "Plane", "bent", "<SubstituteFeatureAlgorithm>NURBS</SubstituteFeatureAlgorithm>")
 MAXIMUM = "<MaterialCondition>MAXIMUM</MaterialCondition>"
-
-
 PROJECTED = "<ProjectedToleranceZoneValue>12</ProjectedToleranceZoneValue>"
 SCAN = feature(8, "Circle", "scan", "<Location>4 5 6</Location><Normal>0 0 1</Normal>", HOLE,
                "<Constructed><FromScan/></Constructed>")  # fmt: skip

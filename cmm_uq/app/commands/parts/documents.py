@@ -91,7 +91,7 @@ def written(
     *,
     force: bool = False,
     stage: Stage = silent,
-) -> WrittenPart:  # fmt: skip
+) -> WrittenPart:
     """Make sure of the folder, then evaluate, render and write, all or none."""
     facts = job.facts.job
     fonts_of(facts.language)  # refused before anything is computed

@@ -144,9 +144,9 @@ def test_the_reference_sphere_is_probed_at_25_points_of_its_upper_half() -> None
     assert toward[:, 2].min() >= -1e-12
 
 
-@pytest.mark.parametrize(("order", "times", "part"), [
-    ((0, 1, 2), (), 0.5), ((0, 2, 1), (), 1.0), ((), (0.0, 30.0, 120.0), 0.25),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("order", "times", "part"), [((0, 1, 2), (), 0.5), ((0, 2, 1), (), 1.0), ((), (0.0, 30.0, 120.0), 0.25)]
+)
 def test_what_is_probed_later_has_moved_farther(order: tuple[int, ...], times: tuple[float, ...], part: float) -> None:
     """Of three points the second is off by that part of the whole movement which is over when it is probed."""
     spots = (spot("a", [0, 0, 0]), spot("b", [100, 0, 0]), spot("c", [200, 0, 0]))

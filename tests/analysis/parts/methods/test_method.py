@@ -28,8 +28,7 @@ from cmm_uq.base.errors import CmmUqError
 from tests.parts_drawn import POSE, block, bore, machine, plane, spot
 
 CYCLES = np.repeat(np.arange(10), 2)
-REPEATS = 50 + 1e-3 * np.tile([1.0, 3.0], 10)
-"""Ten at +1 µm and ten at +3 µm: b = 2 µm, s = √(20/19) µm."""
+REPEATS = 50 + 1e-3 * np.tile([1.0, 3.0], 10)  # ten at +1 µm and ten at +3 µm: b = 2 µm, s = √(20/19) µm
 
 
 def test_by_hand() -> None:
@@ -83,15 +82,10 @@ def test_what_does_not_do(count: int, cycles: int, u: float, words: str) -> None
         )
 
 
-OF = np.repeat(np.arange(4), 5)
-"""Four orientations, five repeats."""
-
+OF = np.repeat(np.arange(4), 5)  # four orientations, five repeats
 G = 1e-3 * np.array([3.0, -1.0, -4.0, 2.0])[OF]
-E = 1e-3 * np.tile([-2.0, -1, 0, 1, 2], 4)
-"""Errors of orientations and repeats that add up to nothing, mm."""
-
-MEAN_U = 1e-3 * np.sqrt((9 + 1 + 16 + 4) / 3 / 4)
-"""Standard deviation of the orientations' means over √4, mm."""
+E = 1e-3 * np.tile([-2.0, -1, 0, 1, 2], 4)  # errors of orientations and repeats that add up to nothing, mm
+MEAN_U = 1e-3 * np.sqrt((9 + 1 + 16 + 4) / 3 / 4)  # standard deviation of the orientations' means over √4, mm
 
 
 def standard(size: float, error: float, u: float = 0.5e-3, **more: object) -> CalibratedStandard:

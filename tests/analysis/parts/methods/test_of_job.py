@@ -41,8 +41,7 @@ from tests.jobs.part.other_methods import (
 from tests.jobs.part.parts import plate
 from tests.part_machines import by_results, plate_files, results_keys
 
-STATE = {"certificate": "machine",
-         "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}  # fmt: skip
+STATE = {"certificate": "machine", "travel_mm": {"x": [0.0, 900.0], "y": [0.0, 1200.0], "z": [-600.0, 0.0]}}
 
 
 def methods(**changes: Any) -> dict[str, MethodResult]:

@@ -25,9 +25,7 @@ STATE = MachineState(Machine("1102"), effects(["scale_x", "scale_y"]), np.zeros(
 @pytest.fixture
 def records(tmp_path: Path) -> Path:
     """One ppm a year, each known to 0.5 ppm."""
-    return recorded(
-        tmp_path, *(certificate("1102", dt.date(2021 + i, 3, 2), scale(float(i))) for i in range(6))
-    )  # fmt: skip
+    return recorded(tmp_path, *(certificate("1102", dt.date(2021 + i, 3, 2), scale(float(i))) for i in range(6)))
 
 
 def test_without_records_the_age_is_told_and_nothing_is_drawn() -> None:
