@@ -20,8 +20,7 @@ from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
 from cmm_uq.certificate.origin import CERTIFICATE, DIGITAL, came_about, file_name, program
 from cmm_uq.certificate.outcome import Outcome, Page
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.result import StatedUncertainty as Stating
+from cmm_uq.certificate.result import Result, StatedUncertainty
 from cmm_uq.certificate.results.contents import results
 from cmm_uq.certificate.results.plain import posterior_file, posterior_name
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
@@ -200,13 +199,13 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     )
 
 
-def with_capability(result: Result) -> tuple[Result, Stating]:
+def with_capability(result: Result) -> tuple[Result, StatedUncertainty]:
     """The result as a certificate states it, and what was raised.
 
     Lengths are taken at the artefact's longest dimension. The noise is a figure of the recording and stays.
     """
     longest = max((s.nominal for s in result.artefact.sizes if s.role == "dimension" and s.unit == "mm"), default=0.0)
-    stating = Stating.of(result.job, longest)
+    stating = StatedUncertainty.of(result.job, longest)
     reported = [size.name for size in result.artefact.sizes if size.role != "set-up"]
     stated = replace(
         result,

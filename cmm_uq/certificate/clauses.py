@@ -17,8 +17,7 @@ from cmm_uq.certificate.origin import CERTIFICATE
 from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.chain import certified_on_this_machine, dates_out_of_order
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.jobs.tables.identification import Identification, Laboratory
-from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced
+from cmm_uq.jobs.tables.identification import Identification, Laboratory, ReplacedCertificate
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE
 
@@ -116,7 +115,7 @@ def draft(job: Job) -> bool:
     return certifies(job) and bool(missing(job))
 
 
-def replaced_certificate(replaced: Replaced) -> Text:
+def replaced_certificate(replaced: ReplacedCertificate) -> Text:
     """Number and date of a certificate that is replaced."""
     return say("{number} of {date}", number=Verbatim(replaced.number), date=day(replaced.date))
 

@@ -6,7 +6,7 @@ capitals, their laboratory is named as nobody, and no word of conformity is said
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
@@ -17,27 +17,27 @@ from cmm_uq.base.messages import Day, Number, Text, Verbatim, say
 from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate
 from cmm_uq.certificate.origin import BANNERS
-from cmm_uq.certificate.results.reissue import Reissue as Comparison
+from cmm_uq.certificate.results.reissue import Reissue
 from cmm_uq.certificate.sections.traceability import claimed
-from cmm_uq.jobs.dcc.administrative import CalibrationLaboratory as Laboratory
 from cmm_uq.jobs.dcc.administrative import (
+    CalibrationLaboratory,
     Contact,
     CoreData,
+    IdentificationNumber,
     Item,
     Items,
+    LanguageText,
     Location,
     PerformanceLocation,
     Person,
     PrimitiveQuantity,
     RefTypeDefinition,
+    ReplacedReport,
     Rich,
     Somebody,
     Words,
 )
-from cmm_uq.jobs.dcc.administrative import IdentificationNumber as Identification
-from cmm_uq.jobs.dcc.administrative import LanguageText as Said
-from cmm_uq.jobs.dcc.administrative import ReplacedReport as Replaced
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.certificate import StatementMetadata
 from cmm_uq.jobs.dcc.quantities import RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import MEASURED
@@ -58,11 +58,11 @@ def speaking(code: Code) -> SayIn:
     return say_in
 
 
-def said(text: str, say_in: SayIn) -> tuple[Said, ...]:
+def said(text: str, say_in: SayIn) -> tuple[LanguageText, ...]:
     """In each language; without one where nobody may translate it."""
     if isinstance(text, Text) and not isinstance(text, Verbatim | Number | Day):
-        return tuple(Said(spoken, language) for language, spoken in say_in(text).items())
-    return (Said(str.__str__(text)),)
+        return tuple(LanguageText(spoken, language) for language, spoken in say_in(text).items())
+    return (LanguageText(str.__str__(text)),)
 
 
 def words_of(text: str, say_in: SayIn) -> Words:
@@ -71,7 +71,7 @@ def words_of(text: str, say_in: SayIn) -> Words:
 
 def rich_of(texts: Iterable[str], say_in: SayIn) -> Rich:
     """Paragraphs: all of one language, then all of the next."""
-    found: dict[str | None, list[Said]] = {}
+    found: dict[str | None, list[LanguageText]] = {}
     for text in texts:
         for one in said(text, say_in):
             found.setdefault(one.language, []).append(one)
@@ -80,7 +80,7 @@ def rich_of(texts: Iterable[str], say_in: SayIn) -> Rich:
 
 def english(texts: Iterable[str]) -> Rich:
     """Sentences of results.json, which is English in every language."""
-    return Rich(contents=tuple(Said(text, "en") for text in texts))
+    return Rich(contents=tuple(LanguageText(text, "en") for text in texts))
 
 
 def one_line(text: str) -> str:
@@ -97,10 +97,7 @@ _NOBODY = say("nobody: nothing is certified")
 
 @dataclass(frozen=True)
 class Mark:
-    """Why this is no certificate.
-
-    ``word``: that its identifier begins with; ``banner``: what is said of it.
-    """
+    """Why this is no certificate: a word that its identifier begins with, and what is said of it."""
 
     word: str
     banner: Text
@@ -128,7 +125,7 @@ def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
         mandatory_languages=tuple(languages)[:1],
         identifier=number if mark is None else f"{mark.word}-{number}",
         identifications=tuple(
-            Identification(issuer=issuer, value=one_line(value), name=words_of(name, say_in), ref_type=(ref_type,))
+            IdentificationNumber(issuer=issuer, value=one_line(value), name=words_of(name, say_in), ref_type=(ref_type,))
             for issuer, value, name, ref_type in known if value
         ),
         received=facts.received,
@@ -137,13 +134,13 @@ def core_data(job: Job, languages: Sequence[str], say_in: SayIn) -> CoreData:
         location=PerformanceLocation(place="other"),
         issued=facts.issued if certifies(job) else None,
         replaced=None if facts.replaces is None
-        else Replaced(change="substituted", identifier=one_line(facts.replaces.number)),
+        else ReplacedReport(change="substituted", identifier=one_line(facts.replaces.number)),
     )  # fmt: skip
 
 
 def items(job: Job, say_in: SayIn) -> Items:
     machine = job.facts.machine
-    serial = Identification(
+    serial = IdentificationNumber(
         issuer="manufacturer",
         value=one_line(machine.serial) or str.__str__(NOT_STATED),
         name=words_of(say("Serial number"), say_in),
@@ -162,30 +159,22 @@ def items(job: Job, say_in: SayIn) -> Items:
     return Items(owner=owner, items=(item,))
 
 
-def _travel(job: Job, say_in: SayIn) -> list[PrimitiveQuantity]:
-    found = []
+def _travel(job: Job, say_in: SayIn) -> Iterator[PrimitiveQuantity]:
     for axis in "xyz":
-        travel = getattr(job.facts.machine.travel_mm, axis)
-        if travel:
+        if travel := getattr(job.facts.machine.travel_mm, axis):
             name = words_of(say("Measuring range of {axis}", axis=Verbatim(axis.upper())), say_in)
-            ends = RealList(
-                labels=("lowest", "highest"),
-                values=tuple(Decimal(repr(float(end))) for end in travel),
-                units=(UNITS["mm"].dsi,),
-            )
-            found.append(
-                PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=("cmm_measuringRange",))
-            )
-    return found
+            values = tuple(Decimal(repr(float(end))) for end in travel)
+            ends = RealList(labels=("lowest", "highest"), values=values, units=(UNITS["mm"].dsi,))
+            yield PrimitiveQuantity(id=f"travel_{axis}", name=name, value=ends, ref_type=("cmm_measuringRange",))
 
 
-def laboratory(job: Job, say_in: SayIn) -> Laboratory:
+def laboratory(job: Job, say_in: SayIn) -> CalibrationLaboratory:
     """Who answers for the certificate; nobody where nothing is certified."""
     facts = job.facts.laboratory
     if not certifies(job):
-        return Laboratory(contact=Contact(name=words_of(_NOBODY, say_in), location=_location("", say_in)))
+        return CalibrationLaboratory(contact=Contact(name=words_of(_NOBODY, say_in), location=_location("", say_in)))
     code = one_line(facts.accreditation) or None
-    return Laboratory(code=code, contact=_contact(facts.name, facts.address, say_in))
+    return CalibrationLaboratory(code=code, contact=_contact(facts.name, facts.address, say_in))
 
 
 def persons(job: Job, say_in: SayIn) -> tuple[Person, ...]:
@@ -208,42 +197,30 @@ def customer(job: Job, say_in: SayIn) -> Contact:
     return _contact(job.facts.job.customer, job.facts.job.address, say_in)
 
 
-def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]:
+def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tuple[StatementMetadata, ...]:
     """What it is not, what the results relate to, how they are traceable, what it replaces, when the next is agreed."""
+
+    def stated(name: Text, texts: Iterable[Text], **more: Any) -> StatementMetadata:
+        return StatementMetadata(name=words_of(name, say_in), declaration=rich_of(texts, say_in), **more)
+
     facts, mark, found = job.facts.job, mark_of(job), []
     if mark is not None:
-        found.append(
-            Statement(name=words_of(mark.banner, say_in), declaration=rich_of((mark.banner,), say_in), valid=False,
-                      ref_type=("cmm_notACertificate",))
-        )  # fmt: skip
+        found.append(stated(mark.banner, (mark.banner,), valid=False, ref_type=("cmm_notACertificate",)))
     if certifies(job):
         chain = claimed(job)
-        found += [Statement(declaration=rich_of((text,), say_in), ref_type=("cmm_general",)) for text in STATEMENTS]
-        found.append(
-            Statement(
-                name=words_of(say("Traceability"), say_in), traceable=chain.claim == "traceable",
-                declaration=rich_of((chain.statement,), say_in),
-                ref_type=("basic_metrologicallyTraceableToSI",),
-            )
-        )  # fmt: skip
-    if facts.replaces is not None:
-        told: list[Text] = [
-            replaced_certificate(facts.replaces),
-            Verbatim(facts.replaces.reason),
-            Verbatim(facts.replaces.changed),
+        found += [
+            StatementMetadata(declaration=rich_of((text,), say_in), ref_type=("cmm_general",)) for text in STATEMENTS
         ]
-        if (comparison := Comparison.of_results(results)) is not None:
+        found.append(stated(say("Traceability"), (chain.statement,), traceable=chain.claim == "traceable",
+                            ref_type=("basic_metrologicallyTraceableToSI",)))  # fmt: skip
+    if (replaces := facts.replaces) is not None:
+        told: list[Text] = [replaced_certificate(replaces), Verbatim(replaces.reason), Verbatim(replaces.changed)]
+        if (comparison := Reissue.of_results(results)) is not None:
             told += [comparison.sentence, *(one.sentence for one in comparison.differences)]
-        found.append(
-            Statement(
-                name=words_of(say("Replaces certificate"), say_in),
-                declaration=rich_of(told, say_in),
-                ref_type=("basic_revision",),
-            )
-        )
+        found.append(stated(say("Replaces certificate"), told, ref_type=("basic_revision",)))
     if facts.recalibration_agreed:
         name = words_of(say("Next calibration, as agreed with the customer"), say_in)
-        found.append(Statement(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
+        found.append(StatementMetadata(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
     further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
         (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),
@@ -251,8 +228,7 @@ def formal_statements(job: Job, results: Mapping[str, Any], say_in: SayIn) -> tu
     ]  # fmt: skip
     for what, text in further:
         if text:
-            paragraphs = (Verbatim(text), *((NOT_OURS,) if text is facts.from_customer else ()))
-            found.append(Statement(name=words_of(what, say_in), declaration=rich_of(paragraphs, say_in)))
+            found.append(stated(what, (Verbatim(text), *((NOT_OURS,) if text is facts.from_customer else ()))))
     return tuple(found)
 
 

@@ -45,13 +45,8 @@ from cmm_uq.certificate.digital_certificate.quantities import (
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.jobs.dcc.administrative import Attached
-from cmm_uq.jobs.dcc.certificate import Administrative, Certificate, Data, Measurement
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
-from cmm_uq.jobs.dcc.certificate import DccResult as Result
-from cmm_uq.jobs.dcc.quantities import CovarianceColumn as Column
-from cmm_uq.jobs.dcc.quantities import CovarianceElement as Covariance
-from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion as Ellipsoid
-from cmm_uq.jobs.dcc.quantities import ExpandedList, RealList
+from cmm_uq.jobs.dcc.certificate import Administrative, Certificate, Data, DccQuantity, DccResult, Measurement
+from cmm_uq.jobs.dcc.quantities import CovarianceColumn, CovarianceElement, EllipsoidalRegion, ExpandedList, RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import Verdicts
 
@@ -119,13 +114,10 @@ def digital_certificate(
 
 
 def _title(job: Job) -> Text:
-    mark = mark_of(job)
-    named = say("Calibration of {machine}", machine=Verbatim(job.facts.machine.name))
-    return (
-        named
-        if mark is None
-        else say("{banner}: {machine}", banner=mark.banner, machine=Verbatim(job.facts.machine.name))
-    )
+    mark, machine = mark_of(job), Verbatim(job.facts.machine.name)
+    if mark is None:
+        return say("Calibration of {machine}", machine=machine)
+    return say("{banner}: {machine}", banner=mark.banner, machine=machine)
 
 
 def free(results: Mapping[str, Any]) -> frozenset[str]:
@@ -134,7 +126,7 @@ def free(results: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(name for combination in known.get("undetermined", ()) for name in combination)
 
 
-def _results(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> list[Result]:
+def _results(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> list[DccResult]:
     keys = [key for key in (*_TITLES, *results) if key in results and key not in _NOT_STATED_THERE]
     found = []
     for key in dict.fromkeys(keys):
@@ -145,15 +137,13 @@ def _results(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures)
             else tuple(figures.parts((key,), data))
         )
         if parts:
-            title = _TITLES.get(key, Verbatim(without_unit(key).capitalize()))
-            found.append(
-                Result(name=words_of(title, say_in), data=Data(parts=parts), ref_type=(plain_name(f"cmm_{key}"),))
-            )
+            title = words_of(_TITLES.get(key, Verbatim(without_unit(key).capitalize())), say_in)
+            found.append(DccResult(name=title, data=Data(parts=parts), ref_type=(plain_name(f"cmm_{key}"),)))
     together = _together(results, say_in, figures)
     return found if together is None else [*found, together]
 
 
-def _together(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> Result | None:
+def _together(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> DccResult | None:
     """Estimates and their covariance as an ellipsoidal region; without what the recording does not determine."""
     data = results.get("covariance")
     if data is None:
@@ -164,10 +154,10 @@ def _together(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures
     if not 1 < len(chosen) <= _MOST or len(found) < len(chosen):
         return None
     units = [dsi_of(data["units"][i]) for i in chosen]
-    region = Ellipsoid(
+    region = EllipsoidalRegion(
         columns=tuple(
-            Column(covariances=tuple(
-                Covariance(value=decimal(data["matrix"][row][column]), unit=product(units[a], units[b]))
+            CovarianceColumn(covariances=tuple(
+                CovarianceElement(value=decimal(data["matrix"][row][column]), unit=product(units[a], units[b]))
                 for a, row in enumerate(chosen)
             ))
             for b, column in enumerate(chosen)
@@ -182,25 +172,21 @@ def _together(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures
         ),
         region=region,
     )  # fmt: skip
-    title = say("Estimates together, with their covariance")
-    quantity = Quantity(
-        id=figures.id_of(("covariance",)), name=words_of(title, say_in), value=stated, ref_type=("cmm_covariance",)
-    )
-    return Result(name=words_of(title, say_in), data=Data(parts=(quantity,)), ref_type=("cmm_covariance",))
+    title, ref_type = words_of(say("Estimates together, with their covariance"), say_in), ("cmm_covariance",)
+    quantity = DccQuantity(id=figures.id_of(("covariance",)), name=title, value=stated, ref_type=ref_type)
+    return DccResult(name=title, data=Data(parts=(quantity,)), ref_type=ref_type)
 
 
 def _of(results: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
     """An estimate, or a size of the artefact, by its name in the covariance."""
     owner, _, parameter = name.partition(".")
-    place: Mapping[str, Any] = (
-        results["estimates"].get(owner, {}) if owner != "artefact" else results.get("artefact", {})
-    )
+    place = results.get("artefact", {}) if owner == "artefact" else results["estimates"].get(owner, {})
     found = place.get(parameter)
     return found if isinstance(found, Mapping) and "u" in found else None
 
 
-def _everything(results: bytes, say_in: SayIn) -> Result:
+def _everything(results: bytes, say_in: SayIn) -> DccResult:
     """results.json itself: what D-SI has no place for stands there."""
     file = Attached(file_name="results.json", mime_type="application/json", data=results)
     name = words_of(say("Every figure, for other programs"), say_in)
-    return Result(name=name, data=Data(parts=(file,)), ref_type=("cmm_resultsFile",))
+    return DccResult(name=name, data=Data(parts=(file,)), ref_type=("cmm_resultsFile",))

@@ -18,11 +18,7 @@ from cmm_uq.certificate.digital_certificate.administration import SayIn, english
 from cmm_uq.certificate.digital_certificate.figures import DigitalFigures, Part
 from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, dsi_of, ratio
 from cmm_uq.certificate.wording import stated_row, stated_value
-from cmm_uq.jobs.dcc.administrative import Rich
-from cmm_uq.jobs.dcc.certificate import Data, QuantityList
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
-from cmm_uq.jobs.dcc.certificate import DccResult as Result
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.certificate import Data, DccQuantity, DccResult, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Real, RealList
 from cmm_uq.jobs.verdicts import TOLERANCE_RULE, Verdict, Verdicts
 
@@ -47,22 +43,22 @@ _P_TWICE = Decimal("0.9545")
 """Probability of a normal distribution within two standard deviations."""
 
 
-def of_tolerances(verdicts: Verdicts, say_in: SayIn, *, certifies: bool) -> Mapping[str, Statement]:
+def of_tolerances(verdicts: Verdicts, say_in: SayIn, *, certifies: bool) -> Mapping[str, StatementMetadata]:
     """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result."""
     return {one.name: _of_tolerance(one, say_in, certifies=certifies) for one in verdicts if not one.by}
 
 
-def _of_tolerance(one: Verdict, say_in: SayIn, *, certifies: bool) -> Statement:
+def _of_tolerance(one: Verdict, say_in: SayIn, *, certifies: bool) -> StatementMetadata:
     limit, unit = decimal(one.limit or 0.0), dsi_of(one.unit)
     bounds = ((say("Smallest permissible value"), -limit), (say("Largest permissible value"), limit))
-    return Statement(
+    return StatementMetadata(
         name=words_of(say("Conformity with its tolerance"), say_in),
         description=english([f"Missing: {what}" for what in one.missing]) if one.missing else None,
         references=(TOLERANCE_RULE,),
         declaration=rich_of((Verbatim(one.outcome), *((_WHY[one.outcome],) if one.outcome in _WHY else ())), say_in),
         conformity=IN_THE_SCHEMA[one.outcome] if certifies else None,
         data=Data(parts=tuple(
-            Quantity(name=words_of(name, say_in), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+            DccQuantity(name=words_of(name, say_in), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
             for name, bound in bounds
         )),
         ref_type=("basic_conformity", f"cmm_{one.outcome.replace(' ', '')}") if certifies else ("cmm_notCertified",),
@@ -71,60 +67,46 @@ def _of_tolerance(one: Verdict, say_in: SayIn, *, certifies: bool) -> Statement:
 
 def statements(
     decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
-) -> tuple[Statement, ...]:
-    """A statement for each decision of results.json.
-
-    ``decided``: its ``conformity``.
-    """
+) -> tuple[StatementMetadata, ...]:
+    """A statement for each decision of results.json."""
     return tuple(_statement(i, one, say_in, figures, certifies=certifies) for i, one in enumerate(decided))
 
 
-def _statement(i: int, one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures, *, certifies: bool) -> Statement:
-    decision = one["decision"]
-    named = say(
-        "{standard}, {characteristic}",
-        standard=Verbatim(one["standard"]),
-        characteristic=Verbatim(one["characteristic"]),
-    )
-    return Statement(
-        id=figures.id_of(("conformity", str(i))),
+def _statement(
+    i: int, one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
+) -> StatementMetadata:
+    decision, path = one["decision"], ("conformity", str(i))
+    standard, characteristic = Verbatim(one["standard"]), Verbatim(one["characteristic"])
+    named = say("{standard}, {characteristic}", standard=standard, characteristic=characteristic)
+    remarks = [*one["remarks"], *(f"Missing: {what}" for what in one["missing"])]
+    # as on the first page: of a size that may be zero its interval, beside which no U is stated
+    value = stated_value(one["value_um"], 2 * one["u_um"], signed=one.get("signed", True))
+    declared = (
+        say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(one["quantity"])),
+        stated_row(decision, value, UNITS["µm"], one["limit_um"]), *((_WHY[decision],) if decision in _WHY else ()),
+    )  # fmt: skip
+    return StatementMetadata(
+        id=figures.id_of(path),
         name=words_of(named, say_in),
-        description=_described(one),
+        description=english(remarks) if remarks else None,
         norms=(one_line(one["standard"]),),
         references=(one_line(one["rule"]),),
-        declaration=rich_of(
-            (say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(one["quantity"])), _in_words(one),
-             *((_WHY[decision],) if decision in _WHY else ())), say_in,
-        ),
+        declaration=rich_of(declared, say_in),
         conformity=IN_THE_SCHEMA[decision] if certifies else None,
-        data=Data(parts=tuple(_figures(("conformity", str(i)), one, say_in, figures))),
+        data=Data(parts=tuple(_figures(path, one, say_in, figures))),
         ref_type=("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",),
-    )  # fmt: skip
-
-
-def _in_words(one: Mapping[str, Any]) -> Text:
-    """The line of the first page; a size that may be zero by its interval, beside which no U is stated."""
-    value = stated_value(one["value_um"], 2 * one["u_um"], signed=one.get("signed", True))
-    return stated_row(one["decision"], value, UNITS["µm"], one["limit_um"])
-
-
-def _described(one: Mapping[str, Any]) -> Rich | None:
-    """Remarks, and what of the test is missing, as results.json has them."""
-    told = [*one["remarks"], *(f"Missing: {what}" for what in one["missing"])]
-    return english(told) if told else None
+    )
 
 
 def _figures(path: tuple[str, ...], one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> Iterator[Part]:
     """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
 
-    def quantity(key: str, name: Text, value: Real, *ref_type: str) -> Quantity:
-        return Quantity(id=figures.id_of((*path, key)), name=words_of(name, say_in), value=value, ref_type=ref_type)
+    def quantity(key: str, name: Text, value: Real, *ref_type: str) -> DccQuantity:
+        return DccQuantity(id=figures.id_of((*path, key)), name=words_of(name, say_in), value=value, ref_type=ref_type)
 
     u, limit, guard = decimal(one["u_um"]), decimal(one["limit_um"]), one["guard_band_um"]
-    stated = (
-        Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal") if u > 0 else None
-    )
-    value = Real(value=decimal(one["value_um"]), unit=_MICROMETRE, uncertainty=stated)
+    stated = Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal")
+    value = Real(value=decimal(one["value_um"]), unit=_MICROMETRE, uncertainty=stated if u > 0 else None)
     yield quantity("value_um", say("Value that is least favourable"), value, "basic_measuredValue")
     bound = Real(value=limit, unit=_MICROMETRE)
     yield quantity("limit_um", say("Limit"), bound, "cmm_toleranceLimit")
@@ -153,7 +135,7 @@ def _permissible(
         if value is not None:
             letter = key.partition("_")[0].upper()
             name = say("{letter} of the maximum permissible error A + L/K, at most B", letter=Verbatim(letter))
-            yield Quantity(
+            yield DccQuantity(
                 id=figures.id_of((*path, "mpe", key)), name=words_of(name, say_in), ref_type=("cmm_toleranceLimit",),
                 value=Real(value=decimal(value), unit=units[key]),
             )  # fmt: skip
@@ -161,7 +143,7 @@ def _permissible(
 
 def evidence(
     decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
-) -> tuple[Result, ...]:
+) -> tuple[DccResult, ...]:
     """Every value that was decided, and the budget of the one that is named."""
     found = []
     for i, one in enumerate(decided):
@@ -170,7 +152,7 @@ def evidence(
                  *figures.parts((*path, "test_uncertainty"), one["test_uncertainty"]))  # fmt: skip
         if parts:
             name = words_of(say("All values decided by {standard}", standard=Verbatim(one["standard"])), say_in)
-            found.append(Result(name=name, data=Data(parts=parts), ref_type=("cmm_conformity",)))
+            found.append(DccResult(name=name, data=Data(parts=parts), ref_type=("cmm_conformity",)))
     return tuple(found)
 
 
@@ -191,14 +173,14 @@ def _values(
         distributions=("normal",),
     )  # fmt: skip
     known = all(one["u_um"] > 0 for one in errors)
-    column = Quantity(
+    column = DccQuantity(
         id=figures.id_of((*below, "error_um")), name=words_of(say("Value"), say_in), ref_type=("basic_measurementError",),
         value=RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
     )  # fmt: skip
     others = [{key: value for key, value in one.items() if key not in ("error_um", "u_um", "U_um")} for one in errors]
     rest = [part for table in figures.parts(below, others) if isinstance(table, QuantityList) for part in table.parts]
     words = tuple(IN_THE_SCHEMA[one["outcome"]] for one in errors)
-    outcomes = Statement(conformity_list=words, ref_type=("basic_conformity",)) if certifies else None
+    outcomes = StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)) if certifies else None
     yield QuantityList(
         name=words_of(say("Values in the order of the recording"), say_in), parts=(column, *rest),
         metadata=() if outcomes is None else (outcomes,), ref_type=("cmm_table",),

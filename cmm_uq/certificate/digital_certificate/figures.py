@@ -42,13 +42,11 @@ from cmm_uq.certificate.digital_certificate.quantities import (
 )
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
 from cmm_uq.jobs.dcc.administrative import Characters
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
-from cmm_uq.jobs.dcc.certificate import QuantityList
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
 
 Path = tuple[str, ...]
-Part = Quantity | QuantityList
+Part = DccQuantity | QuantityList
 
 
 NOT_DETERMINED = say("not determined by this recording")
@@ -68,7 +66,7 @@ class DigitalFigures:
     """
 
     def __init__(
-        self, say_in: SayIn, free: Collection[str] = (), stated: Mapping[str, Statement] = MappingProxyType({})
+        self, say_in: SayIn, free: Collection[str] = (), stated: Mapping[str, StatementMetadata] = MappingProxyType({})
     ) -> None:
         self.say_in, self.free, self.stated = say_in, free, stated
         self._ids: set[str] = set()
@@ -107,10 +105,10 @@ class DigitalFigures:
             return title_of(path[-1])
         return Verbatim(without_unit(path[-1]))
 
-    def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> Quantity:
+    def _quantity(self, path: Path, value: Any, *, name: Text | None = None) -> DccQuantity:
         label = words_of(name or self.title(path), self.say_in)
         of = self.stated.get(".".join(path[1:])) if path[0] == "estimates" else None
-        return Quantity(id=self.id_of(path), name=label, value=value, ref_type=_ref_type(path, value),
+        return DccQuantity(id=self.id_of(path), name=label, value=value, ref_type=_ref_type(path, value),
                         metadata=() if of is None else (of,))  # fmt: skip
 
     def _with_uncertainty(self, path: Path, data: Mapping[str, Any], unit: Unit) -> Iterator[Part]:
@@ -132,13 +130,12 @@ class DigitalFigures:
 
     def _group(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
         if is_budget(data):
-            inner = list(self._budget(path, data))
+            inner = self._budget(path, data)
         elif is_matrix(data):
-            inner = list(self._matrix((*path, "matrix"), data["matrix"], [dsi_of(one) for one in data["units"]]))
+            inner = self._matrix((*path, "matrix"), data["matrix"], [dsi_of(one) for one in data["units"]])
         else:
-            inner = list(self._curve(path, data, unit))
-        if inner:
-            yield QuantityList(name=words_of(self.title(path), self.say_in), parts=tuple(inner), id=self.id_of(path))
+            inner = self._curve(path, data, unit)
+        yield from self._parts_of(path, list(inner))
 
     def _curve(self, path: Path, data: Mapping[str, Any], unit: Unit | None) -> Iterator[Part]:
         """Each key by itself, but for a curve of errors with u and interval of each, which are one list."""
@@ -166,13 +163,16 @@ class DigitalFigures:
         elif all(isinstance(value, Mapping) for value in values):
             yield from self._rows(path, values)
         else:
-            inner = [
-                part for i, value in enumerate(values) for part in self.parts((*path, str(i)), value, unit or above)
-            ]
-            if inner:
-                yield QuantityList(
-                    name=words_of(self.title(path), self.say_in), parts=tuple(inner), id=self.id_of(path)
-                )
+            of = unit or above
+            yield from self._parts_of(
+                path, [p for i, v in enumerate(values) for p in self.parts((*path, str(i)), v, of)]
+            )
+
+    def _parts_of(self, path: Path, parts: Sequence[Part], name: Text | None = None) -> Iterator[Part]:
+        """The parts below a key as one list, if there are any."""
+        if parts:
+            label = words_of(name or self.title(path), self.say_in)
+            yield QuantityList(name=label, parts=tuple(parts), id=self.id_of(path))
 
     def _rows(self, path: Path, rows: Sequence[Mapping[str, Any]]) -> Iterator[Part]:
         """A table by its columns; row by row where a cell holds more than a figure, a text or a point."""
@@ -181,8 +181,7 @@ class DigitalFigures:
         else:
             keys = list(dict.fromkeys(key for row in rows for key in row))
             inner = [part for key in keys for part in self._column((*path, key), [row.get(key) for row in rows])]
-        if inner:
-            yield QuantityList(name=words_of(self.title(path), self.say_in), parts=tuple(inner), id=self.id_of(path))
+        yield from self._parts_of(path, inner)
 
     def _column(self, path: Path, cells: Sequence[Any]) -> Iterator[Part]:
         """A column; cells without a figure are left out, and labels then say which rows, from 1, the others are."""
@@ -228,9 +227,8 @@ class DigitalFigures:
     def _budget(self, path: Path, data: Mapping[str, Any]) -> Iterator[Part]:
         unit = dsi_of(data["unit"])
         stated = expanded_of(data)
-        value = Real(value=decimal(data["value"]), unit=unit, uncertainty=stated) if data["value"] is not None else None
-        if value is not None:
-            yield self._quantity((*path, "value"), value)
+        if data["value"] is not None:
+            yield self._quantity((*path, "value"), Real(value=decimal(data["value"]), unit=unit, uncertainty=stated))
         for key in ("u", "U"):
             yield self._quantity((*path, key), Real(value=decimal(data[key]), unit=unit))
         for key in ("k", "dof"):
@@ -249,13 +247,9 @@ class DigitalFigures:
             held = [i for i, line in enumerate(lines) if line[key] is not None]
             if held:
                 labels = tuple(str(i + 1) for i in held) if len(held) < len(lines) else ()
-                found = RealList(
-                    labels=labels, values=decimals([lines[i][key] for i in held]), units=tuple(units[i] for i in held)
-                )
-                inner.append(self._quantity((*below, key), found))
-        yield QuantityList(
-            name=words_of(say("Uncertainty budget"), self.say_in), parts=tuple(inner), id=self.id_of(below)
-        )
+                values, own = decimals([lines[i][key] for i in held]), tuple(units[i] for i in held)
+                inner.append(self._quantity((*below, key), RealList(labels=labels, values=values, units=own)))
+        yield from self._parts_of(below, inner, say("Uncertainty budget"))
 
 
 def _texts(values: Sequence[Any]) -> Any:

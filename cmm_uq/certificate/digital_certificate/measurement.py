@@ -20,12 +20,16 @@ from cmm_uq.certificate.digital_certificate.administration import (
 from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.chain import holds_on, right
-from cmm_uq.jobs.dcc.administrative import Hash, PrimitiveQuantity, Software, Somebody
-from cmm_uq.jobs.dcc.administrative import IdentificationNumber as Identification
-from cmm_uq.jobs.dcc.certificate import Data, Equipment, Equipments, Method
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
-from cmm_uq.jobs.dcc.certificate import InfluenceCondition as Condition
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.administrative import Hash, IdentificationNumber, PrimitiveQuantity, Rich, Software, Somebody
+from cmm_uq.jobs.dcc.certificate import (
+    Data,
+    DccQuantity,
+    Equipment,
+    Equipments,
+    InfluenceCondition,
+    Method,
+    StatementMetadata,
+)
 from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Real
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -91,7 +95,7 @@ def equipment(job: Job, results: Mapping[str, Any], say_in: SayIn) -> Equipments
         Equipment(
             name=words_of(Verbatim(one.name), say_in), model=one_line(one.model or "") or None,
             manufacturer=Somebody(name=words_of(Verbatim(one.maker), say_in)) if one.maker else None,
-            certificate=_paper(one.certificate, say_in) if one.certificate else None,
+            certificate=_referral(one_line(one.certificate), say_in) if one.certificate else None,
             identifications=_serial(one.serial or "", say_in), ref_type=("cmm_instrument",),
         )
         for one in taken
@@ -113,11 +117,15 @@ def _reference(
     )  # fmt: skip
 
 
-def _serial(serial: str, say_in: SayIn) -> tuple[Identification, ...]:
+def _serial(serial: str, say_in: SayIn) -> tuple[IdentificationNumber, ...]:
     if not serial.strip():
         return ()
     name = words_of(say("Serial number"), say_in)
-    return (Identification(issuer="manufacturer", value=one_line(serial), name=name, ref_type=("basic_serialNumber",)),)
+    return (
+        IdentificationNumber(
+            issuer="manufacturer", value=one_line(serial), name=name, ref_type=("basic_serialNumber",)
+        ),
+    )
 
 
 def _certificate(job: Job, chain: Traceability | None, say_in: SayIn) -> Hash | None:
@@ -131,21 +139,18 @@ def _certificate(job: Job, chain: Traceability | None, say_in: SayIn) -> Hash | 
     told += [say("due {date}", date=day(chain.until))] if chain.until else []
     told += [say("{right:capital}", right=right(chain))] if right(chain) else []
     digest = sha256(job.inputs)[file] if file is not None and file in job.inputs else None
+    valid = None if chain.until is None else holds_on(chain, job.facts.job.date)
+    return _referral(number, say_in, digest, rich_of(told, say_in) if told else None, valid)
+
+
+def _referral(
+    number: str, say_in: SayIn, digest: str | None = None, described: Rich | None = None, valid: bool | None = None
+) -> Hash:
     return Hash(
         referral=words_of(say("Calibration certificate"), say_in), referral_id=number,
-        procedure="SHA-256" if digest else NO_HASH, value=digest or NO_HASH,
-        description=rich_of(told, say_in) if told else None,
-        in_validity_range=None if chain.until is None else holds_on(chain, job.facts.job.date),
+        procedure="SHA-256" if digest else NO_HASH, value=digest or NO_HASH, description=described,
+        in_validity_range=valid,
     )  # fmt: skip
-
-
-def _paper(number: str, say_in: SayIn) -> Hash:
-    return Hash(
-        referral=words_of(say("Calibration certificate"), say_in),
-        referral_id=one_line(number),
-        procedure=NO_HASH,
-        value=NO_HASH,
-    )
 
 
 def _certified(
@@ -153,10 +158,8 @@ def _certified(
 ) -> Iterator[PrimitiveQuantity]:
     if length is not None:
         u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
-        stated = (
-            Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
-        )
-        yield _primitive(f"{owner}_length", name, length, UNITS["mm"], say_in, stated)
+        stated = Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal")
+        yield _primitive(f"{owner}_length", name, length, UNITS["mm"], say_in, stated if u else None)
     if cte:
         yield _primitive(f"{owner}_cte", say("Coefficient of thermal expansion"), cte, UNITS["1/K"], say_in)
 
@@ -168,44 +171,41 @@ def _primitive(
     return PrimitiveQuantity(id=id_, name=words_of(name, say_in), value=real, ref_type=("basic_referenceValue",))
 
 
-def conditions(job: Job, say_in: SayIn) -> tuple[Condition, ...]:
+def conditions(job: Job, say_in: SayIn) -> tuple[InfluenceCondition, ...]:
     """As the job states them, and the least and largest recorded temperatures, in K and in °C."""
     found = []
     if job.facts.job.conditions:
-        told = rich_of((Verbatim(job.facts.job.conditions),), say_in)
+        told = Data(parts=(rich_of((Verbatim(job.facts.job.conditions),), say_in),))
         found.append(
-            Condition(name=words_of(say("Conditions"), say_in), data=Data(parts=(told,)), ref_type=("cmm_conditions",))
+            InfluenceCondition(name=words_of(say("Conditions"), say_in), data=told, ref_type=("cmm_conditions",))
         )
     for column, what in TEMPERATURES.items():
         if column in job.points.columns:
             values = job.points.columns[column]
+            low, high = float(values.min()), float(values.max())
             ends = (
-                _temperature(
-                    f"{column}.min", say("Lowest temperature"), float(values.min()), "basic_temperatureMin", say_in
-                ),
-                _temperature(
-                    f"{column}.max", say("Highest temperature"), float(values.max()), "basic_temperatureMax", say_in
-                ),
+                _temperature(f"{column}.min", say("Lowest temperature"), low, "basic_temperatureMin", say_in),
+                _temperature(f"{column}.max", say("Highest temperature"), high, "basic_temperatureMax", say_in),
             )
             name = words_of(say("Temperature: {what}", what=what), say_in)
-            found.append(Condition(name=name, data=Data(parts=ends), ref_type=("basic_temperature",)))
+            found.append(InfluenceCondition(name=name, data=Data(parts=ends), ref_type=("basic_temperature",)))
     return tuple(found)
 
 
-def _temperature(id_: str, name: Text, celsius: float, ref_type: str, say_in: SayIn) -> Quantity:
+def _temperature(id_: str, name: Text, celsius: float, ref_type: str, say_in: SayIn) -> DccQuantity:
     shown = Decimal(repr(celsius))
     kelvin = Real(value=shown + _KELVIN, unit=UNITS["K"].dsi)
     both = Hybrid(values=(kelvin, Real(value=shown, unit=UNITS["°C"].dsi)))
-    return Quantity(id=id_, name=words_of(name, say_in), value=both, ref_type=(ref_type,))
+    return DccQuantity(id=id_, name=words_of(name, say_in), value=both, ref_type=(ref_type,))
 
 
-def metadata(results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]:
+def metadata(results: Mapping[str, Any], say_in: SayIn) -> tuple[StatementMetadata, ...]:
     """From which files it can be computed again, and what was odd in the recording."""
     hashes = [f"{name} SHA-256 {digest}" for name, digest in results["job"]["inputs_sha256"].items()]
     seed = results.get("sampling", {}).get("seed")
     again = [*hashes, *([] if seed is None else [f"seed {seed}"])]
     found = [
-        Statement(
+        StatementMetadata(
             name=words_of(say("Inputs, from which every figure follows again"), say_in), ref_type=("cmm_inputs",),
             declaration=rich_of([Verbatim(line) for line in again], say_in),
         )
@@ -213,5 +213,5 @@ def metadata(results: Mapping[str, Any], say_in: SayIn) -> tuple[Statement, ...]
     odd = [one["why"] for one in results.get("screening", ())]
     if odd:
         name = words_of(say("What is odd in the recording"), say_in)
-        found.append(Statement(name=name, declaration=english(odd), ref_type=("cmm_screening",)))
+        found.append(StatementMetadata(name=name, declaration=english(odd), ref_type=("cmm_screening",)))
     return tuple(found)

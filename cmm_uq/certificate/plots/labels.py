@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.base.languages.translation import Translation as Said
+from cmm_uq.base.languages.translation import Translation
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.certificate.plots.style import SMALL, lettered, measuring_fonts
@@ -51,7 +51,7 @@ def narrowed(text: Text, room_mm: float) -> Text:
     kept = whole if width_mm(whole, SMALL) <= room_mm else _longest(whole, room_mm)
     if kept == text:
         return text
-    return Verbatim(kept) if said is text else Said(kept, text)
+    return Verbatim(kept) if said is text else Translation(kept, text)
 
 
 def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "normal") -> list[Text]:
@@ -68,7 +68,7 @@ def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "norma
         return [narrowed(text, room_mm)]
     rest = whole[ends[-1] :].strip()
     kept = rest if width_mm(rest, size, weight) <= room_mm else _longest(rest, room_mm * SMALL / size)
-    return [Said(line, text) for line in (whole[: ends[-1]], kept)]
+    return [Translation(line, text) for line in (whole[: ends[-1]], kept)]
 
 
 def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:

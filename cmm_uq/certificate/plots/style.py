@@ -28,8 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import ENGLISH, LANGUAGES, Code
-from cmm_uq.base.languages.translation import Translation as Said
+from cmm_uq.base.languages.translation import ENGLISH, LANGUAGES, Code, Translation
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import Floats
@@ -114,7 +113,7 @@ def _said(text: str, code: Code) -> Text:
     """A message in the language; a plain string in a picture is a figure (a test holds pictures to that)."""
     if isinstance(text, Text):
         return said_in(text, code)
-    return Said(LANGUAGES[code].number(text), Verbatim(text))
+    return Translation(LANGUAGES[code].number(text), Verbatim(text))
 
 
 @cache

@@ -9,8 +9,7 @@ import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
 from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Decided, Statement
-from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect as LeftOut
+from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.base.languages.translation import ENGLISH
@@ -147,7 +146,7 @@ def false_alarms(alpha: float) -> dict[str, float]:
     return {} if alpha == FALSE_ALARMS else {"false_alarms": alpha}
 
 
-def effect_data(item: LeftOut, gain: Improvement) -> dict[str, Any]:
+def effect_data(item: OmittedEffect, gain: Improvement) -> dict[str, Any]:
     return {
         "effect": item.effect, "probability": item.probability, "probability_together": item.together,
         "group": list(item.group), "explained": item.explained, "parameters": _quantities(item.parameters),

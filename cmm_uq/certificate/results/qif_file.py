@@ -15,7 +15,7 @@ from decimal import Decimal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from cmm_uq.base.units import UNITS, Unit, printed_unit
-from cmm_uq.jobs.reports import ReportResults as Reported
+from cmm_uq.jobs.reports import ReportResults
 from cmm_uq.jobs.verdicts import Verdicts
 
 SPACE = "http://qifstandards.org/xsd/qif3"
@@ -61,7 +61,7 @@ class _Numbered:
         return made
 
 
-def qif(results: Reported) -> bytes:
+def qif(results: ReportResults) -> bytes:
     values, numbered = (*_tested(results), *_factors(results)), _Numbered()
     limited = [one for one in values if one.limit is not None]
     for kind, alike in _alike(limited).items():
@@ -99,7 +99,7 @@ def _alike(values: Sequence[QifValue]) -> dict[tuple[str, float, Unit], list[Qif
     return found
 
 
-def _tested(results: Reported) -> Iterator[QifValue]:
+def _tested(results: ReportResults) -> Iterator[QifValue]:
     for statement in results.conformity:
         named = " ".join(filter(None, (statement.standard, statement.characteristic)))
         for one in statement.errors:
@@ -109,7 +109,7 @@ def _tested(results: Reported) -> Iterator[QifValue]:
             yield QifValue(named, item, one.error_um, one.u_um, one.limit_um, UNITS["µm"], one.outcome)
 
 
-def _factors(results: Reported) -> Iterator[QifValue]:
+def _factors(results: ReportResults) -> Iterator[QifValue]:
     free = {name for combination in results.identifiability.undetermined for name in combination}
     limited = {one.name: one for one in _verdicts(results) if not one.by}
     for effect, parameters in results.estimates.items():
@@ -120,7 +120,7 @@ def _factors(results: Reported) -> Iterator[QifValue]:
                             verdict.outcome if verdict else "")  # fmt: skip
 
 
-def _verdicts(results: Reported) -> Verdicts:
+def _verdicts(results: ReportResults) -> Verdicts:
     return Verdicts.of_results(results.model_dump())
 
 
@@ -175,7 +175,7 @@ def _units(parent: Element, units: set[Unit]) -> None:
             _text(one, "UnitName", unit.qif)
 
 
-def _attributes(parent: Element, results: Reported, values: Sequence[QifValue]) -> None:
+def _attributes(parent: Element, results: ReportResults, values: Sequence[QifValue]) -> None:
     """Origin and decisions in words, and error factors without a tolerance."""
     said = [("origin of the recording", results.job.origin)]
     said += [(f"decision by {one.called}" if one.by else f"decision on {one.name} by its tolerance", one.outcome)

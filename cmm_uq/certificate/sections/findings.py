@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cmm_uq.analysis.diagnosis.assertion import WithheldEffect as Withheld
-from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect as LeftOut
+from cmm_uq.analysis.diagnosis.assertion import WithheldEffect
+from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.joint import Mode
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, say
@@ -23,7 +23,7 @@ _TOLD = 8
 """Periods that a sentence tells; results.json has all."""
 
 
-def sentences(withheld: Sequence[Withheld]) -> list[Text]:
+def sentences(withheld: Sequence[WithheldEffect]) -> list[Text]:
     told: list[Text] = []
     for item in withheld:
         why = say("{why} ({periods})", why=item.why, periods=_listed(item.modes)) if item.modes else item.why
@@ -32,7 +32,7 @@ def sentences(withheld: Sequence[Withheld]) -> list[Text]:
     return told
 
 
-def other_periods(item: LeftOut) -> Text:
+def other_periods(item: OmittedEffect) -> Text:
     """A sentence on further periods that fit, to follow that on an effect; nothing where there are none."""
     if not item.modes:
         return NOTHING
@@ -45,7 +45,7 @@ def other_periods(item: LeftOut) -> Text:
     )
 
 
-def withheld_data(withheld: Sequence[Withheld]) -> list[dict[str, Any]]:
+def withheld_data(withheld: Sequence[WithheldEffect]) -> list[dict[str, Any]]:
     return [{"effect": item.effect, "probability": item.probability, "why": item.why,
              "periods_mm": periods_data(item.modes)} for item in withheld]  # fmt: skip
 

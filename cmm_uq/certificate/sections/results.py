@@ -14,7 +14,7 @@ from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.first_page import subject_of, tolerances_of
 from cmm_uq.certificate.wording import OUTCOME_WORDS, expanded, title_of
 from cmm_uq.jobs.job import Job
-from cmm_uq.jobs.reports import EstimateWithInterval as Figure
+from cmm_uq.jobs.reports import EstimateWithInterval
 from cmm_uq.jobs.verdicts import Verdict
 from cmm_uq.maths.uncertainty.quantity import Quantity, rounded
 
@@ -151,7 +151,7 @@ def as_found_data(job: Job) -> dict[str, Any]:
     return {"as_found": found}
 
 
-def _quantity(figure: Figure, now: Quantity) -> Quantity:
+def _quantity(figure: EstimateWithInterval, now: Quantity) -> Quantity:
     low, high = figure.interval95
     return Quantity(figure.value, figure.u, (low, high), now.unit)
 
