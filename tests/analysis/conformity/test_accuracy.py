@@ -129,7 +129,3 @@ def test_intervals_cover_the_figure_that_repetitions_would_show() -> None:
             hits[name] += quantity.interval95[0] <= many[name].mean() <= quantity.interval95[1]
     for name, count in hits.items():
         assert 0.91 < count / 400 < 0.985, name
-
-
-def test_one_length_alone_has_no_scatter() -> None:
-    assert figures(np.array([404.0]))["rms_accuracy_error_um"] == 0.0

@@ -161,7 +161,7 @@ def test_what_is_not_stated_or_not_recorded_makes_no_pass(
     assert "pass" not in now or "pass" in then
 
 
-PARTS = (
+PARTS = [
     "1",
     "2",
     "*/20",
@@ -177,7 +177,7 @@ PARTS = (
     "3/2",
     "1/10",
     "2/5/1",
-)
+]
 
 
 @given(

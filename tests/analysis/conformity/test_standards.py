@@ -107,27 +107,6 @@ def test_a_complete_test_turns_at_the_limits_of_its_rule(
     assert outcome(rejected_um + hundredth) == "fail"
 
 
-@pytest.mark.parametrize(
-    ("short_um", "long_um", "named_mm"),
-    [
-        # 2.56 of 2.5667, u 0.01: 0.67 u or 74.8 %; 4.99 of 5.1667, u 0.4: 0.44 u or 67.1 %, though there is more room
-        (2.56, 4.99, 800.0),
-        (2.564, 4.99, 20.0),  # 0.27 u or 60.5 %
-        # 20 u and 9 u from the limit: both 1 to the last digit, but not as unlikely to be beyond
-        (2.3667, 1.5667, 800.0),
-        # 743 u and 87 u beyond: both 0 to the last digit, and the farther one is named
-        (10.0, 40.0, 800.0),
-        (50.0, 40.0, 20.0),
-    ],
-)
-def test_the_least_favourable_length_is_the_one_of_the_lowest_probability(
-    short_um: float, long_um: float, named_mm: float
-) -> None:
-    found = judged(gauge([np.eye(3)[0]], [[20.0, 800.0]], errors={(1, 2, 20.0): short_um, (1, 2, 800.0): long_um}))
-    assert found.named.length_mm == pytest.approx(named_mm)
-    assert found.named.repeat == 2
-
-
 def test_one_length_that_fails_fails_the_test_though_others_are_undecided() -> None:
     """At 800 mm 5.10 of 5.1667, u 0.4: undecided. At 20 mm 2.60 of 2.5667, u 0.01: 3.3 u beyond, P = 0.04 %."""
     errors = {(1, 1, 20.0): 2.60, (1, 3, 20.0): 2.60, (1, 1, 800.0): 5.10}
