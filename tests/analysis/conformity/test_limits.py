@@ -33,8 +33,10 @@ BY_PRIOR: tuple[Rule, ...] = (
     "JCGM 106", PosteriorProbability(posterior_probability=0.99), "Z540.3",
     UnconditionalRisk(max_unconditional_false_accept=0.001),
 )  # fmt: skip
-DEVIATIONS = (-0.13, -0.105, -0.095, -0.08, 0.0, 0.06, 0.079, 0.081, 0.0833, 0.0837, 0.09, 0.0999, 0.1001, 0.11, 0.1163, 0.1167,
-              0.121, 0.14)  # fmt: skip
+DEVIATIONS = (
+    -0.13, -0.105, -0.095, -0.08, 0.0, 0.06, 0.079, 0.081, 0.0833, 0.0837, 0.09, 0.0999, 0.1001, 0.11, 0.1163, 0.1167,
+    0.121, 0.14,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("rule", RULES, ids=str)
