@@ -19,6 +19,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
+from cmm_uq.jobs.importing.imported import imported_references
 from cmm_uq.jobs.importing.recording import LARGEST_NUMBER, OPTIONAL, largest
 from cmm_uq.jobs.importing.sheet import Recognition
 from cmm_uq.jobs.importing.vocabulary import COVERAGE
@@ -57,8 +58,6 @@ def with_references(
     twice = next((name for name in REFERENCES if name in points.columns), None)
     if twice is not None:
         raise CmmUqError(f"has {twice}, and so has {chain.file}", where=where, fix="Leave one of them out")
-    from cmm_uq.jobs.importing.imported import imported_references
-
     found = imported_references(inputs[chain.file], place, chain)
     if "point" not in found.columns:
         raise CmmUqError("does not number its values", where=place,

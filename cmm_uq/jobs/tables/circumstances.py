@@ -1,6 +1,6 @@
-"""A standard's clauses as a laboratory holds them against its own copy: a form that it fills in, beside job.toml.
+"""``[test_uncertainty]``, ``[rated_conditions]`` and ``[probe]``: the circumstances of a standard's test.
 
-``[test_uncertainty]``, ``[rated_conditions]`` and ``[probe]``: the circumstances of a standard's test.
+A standard's clauses as a laboratory holds them against its own copy are among them: a form that it fills in, beside job.toml.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ import datetime as dt
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.files.limits import LISTED
 from cmm_uq.base.files.table import Table, Temperature, Uncertainty
-from cmm_uq.jobs.recording.short_gauge import ShortGauge
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
+
+if TYPE_CHECKING:
+    from cmm_uq.jobs.recording.short_gauge import ShortGauge
 
 
 class HeldClause(Table):
