@@ -85,11 +85,11 @@ from pathlib import Path
 from cmm_uq.base.output import Owner, staged, interruption, staging
 interruption.watch()
 out = Path(sys.argv[1])
-discard = staging.Staged.discard
+discard = staging.Stage.discard
 def slowly(place):  # as on a busy disk
     discard(place)
     time.sleep(0.1)
-staging.Staged.discard = slowly
+staging.Stage.discard = slowly
 real = staging._write
 def written(path, content):
     time.sleep(0.01)
