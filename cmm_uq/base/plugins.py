@@ -46,7 +46,6 @@ class Plugin:
 
     @property
     def name(self) -> str:
-        """Of what it offers."""
         return self.entry.name
 
     @property

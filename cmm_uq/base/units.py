@@ -56,13 +56,11 @@ class Unit(Text):
     si: float
 
     def __new__(cls, symbol: str, dsi: str, qif: str, si: float) -> Self:
-        """A row of the table."""
         unit = super().__new__(cls, symbol)
         unit.dsi, unit.qif, unit.si = dsi, qif, si
         return unit
 
     def __reduce__(self) -> tuple[type[Unit], tuple[str, str, str, float]]:
-        """For pickling."""
         return Unit, (str.__str__(self), self.dsi, self.qif, self.si)
 
 

@@ -195,7 +195,6 @@ def provenance_name(recording: str) -> str:
 
 
 def provenance_of(content: bytes, recording: bytes, origin: str, where: str) -> Provenance:
-    """What stands in the file."""
     fix = "Take it away, or have cmm-uq acquire write it anew"
     try:
         said = AcquisitionRecord.model_validate_json(content)

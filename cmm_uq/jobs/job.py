@@ -292,7 +292,6 @@ class Job:
 
     @property
     def origin(self) -> Origin:
-        """Of the recording."""
         return self.facts.job.origin
 
     @property

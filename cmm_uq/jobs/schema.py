@@ -37,7 +37,6 @@ class _Described(GenerateJsonSchema):
         return str(dft) if isinstance(dft, str) else super().encode_default(dft)
 
     def model_schema(self, schema: Any) -> Any:
-        """One table."""
         found, table = super().model_schema(schema), schema["cls"]
         told = sentences(table)
         for name, key in found.get("properties", {}).items():

@@ -20,7 +20,6 @@ _OPEN = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) 
 
 
 def content_of(path: Path, limit: Limit, fix: str) -> bytes:
-    """Bytes of a file."""
     where = str(path)
     try:
         descriptor = os.open(path, _OPEN)

@@ -135,7 +135,6 @@ class CsvTable:
 
 
 def csv_table(content: bytes, where: str, required: Iterable[str], *, most_rows: Limit = ROWS) -> CsvTable:
-    """Table of a CSV file."""
     cells = cells_of(content, where, "Save it as CSV in UTF-8", most_rows=most_rows)
     header = tuple(cells.header)
     if not cells.rows:

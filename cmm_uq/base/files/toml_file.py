@@ -40,7 +40,6 @@ _MARKS = frozenset("\u200c\u200d\u200e\u200f\u061c\u00ad\ufeff")
 
 
 def toml_of(text: str, where: str, *, most_word: int = WORD.most, most_listed: int = LISTED.most) -> dict[str, Any]:
-    """Contents of a TOML file."""
     _check_text(text, where)
     try:
         data = tomllib.loads(text)

@@ -16,7 +16,6 @@ from cmm_uq.base.output.placing import free_name
 
 @contextlib.contextmanager
 def writing_to(path: Path, fix: str) -> Iterator[None]:
-    """While something is written there."""
     try:
         yield
     except (OSError, ValueError) as error:

@@ -111,7 +111,6 @@ class Stage:
 
     @property
     def stage(self) -> Path:
-        """The hidden folder."""
         return self.folder / f"{STAGE}{self.token}"
 
     @property

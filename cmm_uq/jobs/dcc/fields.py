@@ -42,7 +42,6 @@ class Simple:
 
 
 def _matching(what: str, pattern: str) -> Simple:
-    """A text of a pattern."""
     wanted = re.compile(pattern)
 
     def read(text: str) -> str:
@@ -54,7 +53,6 @@ def _matching(what: str, pattern: str) -> Simple:
 
 
 def one_of(*words: str) -> Simple:
-    """One of some words."""
     return _matching(f"one of {', '.join(words)}", "|".join(words))
 
 
@@ -247,7 +245,6 @@ class Field:
 
     @property
     def repeated(self) -> bool:
-        """Whether it holds several."""
         return isinstance(self.place, Many | ForeignElements) or (isinstance(self.place, Choice) and self.place.many)
 
     @property
@@ -259,7 +256,6 @@ class Field:
 
 
 def prefixed(tag: str, space: str) -> str:
-    """A tag with its prefix."""
     return tag if ":" in tag else f"{space}:{tag}"
 
 

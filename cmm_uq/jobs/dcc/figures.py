@@ -187,7 +187,6 @@ def _of_reals(value: Reals) -> dict[str, Any]:
 
 
 def _stated(given: object) -> ValueUncertainty:
-    """Of one value."""
     if isinstance(given, Univariate):
         return _stated(given.stated)
     if isinstance(given, (Expanded, ExpandedMU)):

@@ -101,7 +101,6 @@ _IGNORED = ("xsi:schemaLocation", "xsi:noNamespaceSchemaLocation", "xsi:type")
 
 
 def read(data: bytes, where: str) -> Certificate:
-    """The certificate of a file."""
     root = _root(data, where)
     reader = _Reader(where, strict=root.attributes.get("schemaVersion") == VERSION)
     found = reader.read(root, Certificate)

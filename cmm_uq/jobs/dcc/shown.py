@@ -39,7 +39,6 @@ class CertificateView:
 
 
 def shown(certificate: Certificate) -> CertificateView:
-    """A certificate for a person."""
     return CertificateView(_particulars(certificate), tuple(_measured(one) for one in certificate.measurements))
 
 

@@ -65,7 +65,6 @@ class Node:
 
 
 def parsed(data: bytes, where: str) -> Node:
-    """The root of a file."""
     if len(data) > DCC_BYTES.most:
         raise CmmUqError(f"is larger than {DCC_BYTES.most} {DCC_BYTES.unit}", where=where, fix="Is it the right file?")
     grown = _Growing(where)

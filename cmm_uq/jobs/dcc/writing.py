@@ -13,7 +13,6 @@ from cmm_uq.jobs.dcc.tree import Node, serialised
 
 
 def written(certificate: Certificate) -> bytes:
-    """The file of a certificate."""
     root = Node(ROOT, {})
     version = certificate.version
     root.attributes["xsi:schemaLocation"] = f"https://ptb.de/dcc https://ptb.de/dcc/v{version}/dcc.xsd"

@@ -229,7 +229,6 @@ class _Table:
         return found, facts
 
     def labels(self) -> list[str] | None:
-        """Names of the points."""
         own = self.header.columns.get(NAME, ())
         if len(own) != 1 or self.header.points > 1:
             return None

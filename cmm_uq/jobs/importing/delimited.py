@@ -55,7 +55,6 @@ class Delimited(Format):
 
 
 def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
-    """What separates cells."""
     if keys.delimiter is not None:
         return DELIMITERS[keys.delimiter]
     scores = {}

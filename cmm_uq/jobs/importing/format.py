@@ -97,7 +97,6 @@ TEXT = "delimited.Delimited"
 
 
 def format_of(content: bytes, where: str) -> Format:
-    """The format of a file."""
     head = content[:HEAD]
     for plugin in offered(IMPORTS, Plugin):
         found = plugin.loaded(Format)  # type: ignore[type-abstract]

@@ -74,7 +74,6 @@ def unit_named(text: str) -> WrittenUnit | None:
 
 
 def length_named(text: str) -> WrittenUnit | None:
-    """A unit of length."""
     unit = unit_named(text)
     return unit if unit is not None and unit.sort == LENGTH else None
 

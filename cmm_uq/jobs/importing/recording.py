@@ -48,7 +48,6 @@ OTHER_UNITS = re.compile(
 
 
 def read_recording(content: bytes, name: str, machine: Machine, without: Collection[str] = ()) -> Points:
-    """Points of a recording."""
     wrong, table = Gathered(), dict[str, Floats]()
     header, rows, lines = _table(content, name, wrong)
     with wrong.going_on():

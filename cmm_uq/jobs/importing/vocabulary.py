@@ -110,7 +110,6 @@ class Heading:
 
 @lru_cache(maxsize=4096)
 def understood(heading: str) -> Heading:
-    """What a heading says."""
     if heading in _OWN:
         return Heading(heading)
     if heading[:1] in _FIGURES or len(heading) > _LONGEST:

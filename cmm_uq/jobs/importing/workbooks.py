@@ -137,7 +137,6 @@ def _sheet(name: str, found: Iterable[Sequence[Any]], where: str) -> Sheet:
 
 
 def cell_of(value: Any) -> Cell:
-    """A cell's value."""
     if value is None:
         return ""
     if isinstance(value, bool):

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.jobs.reports import ResultsPart, read_results, results_named
+from cmm_uq.jobs.reports import ResultsFile, ResultsPart, read_results, results_named
 from cmm_uq.jobs.tables.machine import DigitizerFacts, Pose
 from cmm_uq.jobs.tables.origin import SIMULATED, Origin
 
@@ -53,8 +53,7 @@ class _Job(ResultsPart):
     origin: Origin
 
 
-class _Results(ResultsPart):
-    schema_: Annotated[Literal["cmm-uq/results/1"], Field(alias="schema")]
+class _Results(ResultsFile):
     job: _Job
     digitizer: _Digitizer
 

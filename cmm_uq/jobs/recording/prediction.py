@@ -122,21 +122,18 @@ class Prediction:
 
     @property
     def of_lengths(self) -> bool:
-        """Whether lengths are predicted, not coordinates."""
         return bool(len(self.length))
 
 
 def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Prediction:
-    """The prediction in a file."""
     cells = _table(content, where)
     place = _places(cells, where, facts)
     unit = UNIT_MM[facts.unit]
     table: dict[str, Floats] = {}
     for column, i in place.items():
-        table[column] = numbers([row[i] for row in cells.rows], partial(_at, cells, where, i))
-        scaled = table[column] * (unit if column in (*COORDINATES, LENGTH) else 1.0)
-        _check_size(scaled, column, cells, where, i)
-        table[column] = scaled
+        values = numbers([row[i] for row in cells.rows], partial(_at, cells, where, i))
+        table[column] = values * (unit if column in (*COORDINATES, LENGTH) else 1.0)
+        _check_size(table[column], column, cells, where, i)
     whole = {name: table[name].astype(np.int64) for name in WHOLE if name in table}
     count, point = len(cells.rows), whole.get("point")
     lengths = LENGTH in table
@@ -152,12 +149,12 @@ def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Predi
 
 def is_error_map(content: bytes, where: str) -> bool:
     """Whether a file is no prediction but an error map as CSV."""
-    names = [name.strip() for name in _header(text_of(content, where, _FIX)).split(",")]
-    return set(_OF_A_MAP) <= set(names)
+    return set(_OF_A_MAP) <= {name.strip() for name in _header(text_of(content, where, _FIX)).split(",")}
 
 
 def _table(content: bytes, where: str) -> Cells:
-    delimiter = _delimiter(_header(text_of(content, where, _FIX)))
+    head = _header(text_of(content, where, _FIX))
+    delimiter = ";" if ";" in head else "\t" if "\t" in head else ","
     cells = cells_of(content, where, _FIX, delimiter=delimiter)
     if not cells.rows:
         raise CmmUqError("has no rows", where=where, fix="The first line names the columns, then one row a point")
@@ -173,11 +170,6 @@ def _table(content: bytes, where: str) -> Cells:
 def _header(text: str) -> str:
     """The line that names the columns."""
     return next((line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), "")
-
-
-def _delimiter(header: str) -> str:
-    """What separates the names of the columns."""
-    return ";" if ";" in header else "\t" if "\t" in header else ","
 
 
 def _plain(cell: str, *, decimal_comma: bool) -> str:

@@ -182,7 +182,6 @@ class ConformityFacts(Table):
 
 
 def clause_files(wishes: list[ConformityFacts]) -> list[str]:
-    """Forms that a job names."""
     return list(dict.fromkeys(wish.clauses for wish in wishes if wish.clauses is not None))
 
 

@@ -126,7 +126,6 @@ class Growing:
         return np.hypot(self.fixed_um, longer) if self.squares else np.asarray(self.fixed_um + longer)
 
     def over(self, k: float) -> Growing:
-        """Divided by a coverage factor."""
         return replace(self, fixed_um=self.fixed_um / k, per_mm=self.per_mm / k)
 
 
