@@ -118,7 +118,7 @@ def usual_table(of: FleetValue) -> Table:
             left, one=say("One more model or place has fewer machines; fleet.json has all."),
             many=say("{count} more models and places have fewer machines; fleet.json has all.", count=left),
         ))  # fmt: skip
-    return Table(say("UsualRate drift"), columns, rows, tuple(notes))
+    return Table(say("Usual drift"), columns, rows, tuple(notes))
 
 
 def outsiders(of: FleetValue) -> Block:
@@ -234,7 +234,7 @@ def _blocks(of: FleetValue) -> tuple[Block, ...]:
     shown, chains = groups_shown(of), of.fleet.chains
     plot = fleet_plot(
         shown, [group_words(each) for each in shown], axis=say("Rate in {unit}, with 95 % interval", unit=per_year(of)),
-        caption=say("UsualRate drift of models and places."),
+        caption=say("Usual drift of models and places."),
         alternative=say("Average machine: {rate}.", rate=usual_rate(of)),
     )  # fmt: skip
     sampled = say(

@@ -192,7 +192,6 @@ def _sampled(
 
 
 def _spaced(draws: Floats, count: int) -> Floats:
-    """Draws from all parts of the chains."""
     return draws[np.linspace(0, len(draws) - 1, count).astype(np.intp)]
 
 
@@ -215,7 +214,6 @@ def _usual(
 
 
 def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covariance: Floats) -> UsualRate:
-    """Of a sum of effects over draws of the hyper-parameters."""
     means, variances = mean @ row, np.einsum("i,wij,j->w", row, covariance, row)
     rate, u = float(means.mean()), float(np.sqrt(variances.mean() + means.var()))
     half = float(special.ndtri(0.975)) * u
@@ -223,7 +221,6 @@ def _moments(kind: str, name: str, count: int, row: Floats, mean: Floats, covari
 
 
 def _spreads(draws: Floats, unit: float) -> tuple[HyperParameter, ...]:
-    """Posterior of each hyper-parameter in the unit of the values."""
     quantiles = np.exp(np.quantile(draws, [0.5, 0.025, 0.975], axis=0))
     scales = [1.0 if name == "steps_per_year" else unit for name in NAMES]
     return tuple(
@@ -317,7 +314,6 @@ class FleetValue:
 
     @property
     def compared(self) -> bool:
-        """Whether machines could be compared."""
         return comparable(self.members)
 
     @cached_property
@@ -338,10 +334,8 @@ class FleetValue:
     @property
     def beyond(self) -> NDArray[np.bool_]:
         """Whether a machine was beyond its limit at its last certificate, (N,): as that says, or where it says nothing."""
-        probably = self.median == 0
-        return np.array(
-            [one.outcome in BEYOND if one.outcome else bool(probably[i]) for i, one in enumerate(self.members)]
-        )
+        stated = zip(self.members, self.median == 0, strict=True)
+        return np.array([one.outcome in BEYOND if one.outcome else bool(probably) for one, probably in stated])
 
     def crosses_by(self, day: float) -> NDArray[np.bool_]:
         """Whether a machine that was not crosses its limit by an ordinal, (N,)."""
@@ -362,17 +356,14 @@ class FleetResult:
 
     @property
     def newest(self) -> float:
-        """Ordinal of the newest certificate."""
         return max(float(member.history.day[-1]) for value in self.values for member in value.members)
 
     @property
     def in_a_year(self) -> float:
-        """Ordinal, a year after the newest certificate."""
         return self.newest + YEAR
 
     @property
     def compared(self) -> bool:
-        """Whether machines could be compared by any value."""
         return any(value.compared for value in self.values)
 
     @property
@@ -386,7 +377,6 @@ def comparable(members: Iterable[FleetMember]) -> bool:
 
 
 def seen_again(member: FleetMember) -> bool:
-    """Whether a machine has certificates of two days."""
     return bool(np.ptp(member.history.day) > 0)
 
 
@@ -401,11 +391,9 @@ def judged(learnt: Iterable[tuple[str, str, str, tuple[FleetMember, ...], Fleet,
     belongs = np.ones(len(p), dtype=np.bool_)
     belongs[weighed] = belonging(p[weighed])
     ends = np.cumsum([len(fleet.machines) for *_, fleet, _ in all_learnt])[:-1]
-    return FleetResult(
-        tuple(
-            FleetValue(name, quantity, unit, members, fleet, those, left_out)
-            for (name, quantity, unit, members, fleet, left_out), those in zip(
-                all_learnt, np.split(belongs, ends), strict=True)
-        ),
-        seed,
-    )  # fmt: skip
+    parts = zip(all_learnt, np.split(belongs, ends), strict=True)
+    values = (
+        FleetValue(name, quantity, unit, members, fleet, those, left_out)
+        for (name, quantity, unit, members, fleet, left_out), those in parts
+    )
+    return FleetResult(tuple(values), seed)

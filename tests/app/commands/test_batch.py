@@ -231,8 +231,8 @@ def test_a_signal_leaves_whole_reports_and_says_how_to_go_on(tmp_path: Path, num
     script = f"""if 1:
         import sys
         from cmm_uq.app import cli
-        from cmm_uq.app.commands import batch_asked
-        batch_asked.PROGRAM = {CANNED!r}
+        from cmm_uq.app.commands.laboratory import batch
+        batch.PROGRAM = {CANNED!r}
         sys.argv = ["cmm-uq", "batch", {str(jobs)!r}, "--out", {str(out)!r}, "--workers", "2"]
         cli.main()"""
     process = subprocess.Popen([sys.executable, "-c", script], stderr=subprocess.PIPE, text=True)

@@ -13,7 +13,7 @@ import select
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cmm_uq.laboratory.live.instruments.ipp.protocol import (
@@ -61,7 +61,7 @@ class MethodError(Exception):
 
 
 class Methods:
-    """A CMM: each method is a generator of its data, named ``_do_`` and its name in small letters.
+    """A CMM: each method gives its data, if any, and is named ``_do_`` and its name in small letters.
 
     ``part_c``: temperature of the part, °C; ``None``: no such property; ``version``: that it says; ``None``: it does
     not know the question.
@@ -77,112 +77,96 @@ class Methods:
     def said(self, line: str) -> None:
         """Say something beside the data of a method: a report of a daemon."""
 
-    def _do_startsession(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_startsession(self, tag: str, method: Term) -> None:
         if self.state.session:
             raise MethodError(8)
         self.state.session, self.state.error, self.state.report = True, False, ("X", "Y", "Z")
-        yield from ()
 
-    def _do_endsession(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_endsession(self, tag: str, method: Term) -> None:
         self.state.session = False
         self.state.daemons.clear()
-        yield from ()
 
-    def _do_getdmeversion(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_getdmeversion(self, tag: str, method: Term) -> list[str]:
         if self.version is None:
             raise MethodError(501)
-        yield f'DMEVersion("{self.version}")'
+        return [f'DMEVersion("{self.version}")']
 
-    def _do_getmachineclass(self, tag: str, method: Term) -> Iterator[str]:
-        yield "GetMachineClass(CartCMM)"
+    def _do_getmachineclass(self, tag: str, method: Term) -> list[str]:
+        return ["GetMachineClass(CartCMM)"]
 
-    def _do_clearallerrors(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_clearallerrors(self, tag: str, method: Term) -> None:
         self.state.error = False
-        yield from ()
 
-    def _do_aborte(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_aborte(self, tag: str, method: Term) -> None:
         self.state.error = True
-        yield from ()
 
-    def _do_geterrstatuse(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"ErrStatus({int(self.state.error)})"
+    def _do_geterrstatuse(self, tag: str, method: Term) -> list[str]:
+        return [f"ErrStatus({int(self.state.error)})"]
 
-    def _do_getxtderrstatus(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"IsHomed({int(self.state.homed)})"
-        yield f"IsUserEnabled({int(self.state.user)})"
+    def _do_getxtderrstatus(self, tag: str, method: Term) -> list[str]:
+        return [f"IsHomed({int(self.state.homed)})", f"IsUserEnabled({int(self.state.user)})"]
 
-    def _do_home(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_home(self, tag: str, method: Term) -> None:
         self.state.homed, self.state.position, self.state.user = True, [0.0, 0.0, 0.0], False
-        yield from ()
 
-    def _do_ishomed(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"IsHomed({int(self.state.homed)})"
+    def _do_ishomed(self, tag: str, method: Term) -> list[str]:
+        return [f"IsHomed({int(self.state.homed)})"]
 
-    def _do_enableuser(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_enableuser(self, tag: str, method: Term) -> None:
         self.state.user = True
-        yield from ()
 
-    def _do_disableuser(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_disableuser(self, tag: str, method: Term) -> None:
         self.state.user = False
-        yield from ()
 
-    def _do_isuserenabled(self, tag: str, method: Term) -> Iterator[str]:
-        yield f"IsUserEnabled({int(self.state.user)})"
+    def _do_isuserenabled(self, tag: str, method: Term) -> list[str]:
+        return [f"IsUserEnabled({int(self.state.user)})"]
 
-    def _do_get(self, tag: str, method: Term) -> Iterator[str]:
-        yield self.reported(_names(method.arguments, ("X", "Y", "Z", "Tool.A", "Tool.B", "Tool.C")))
+    def _do_get(self, tag: str, method: Term) -> list[str]:
+        return [self.reported(_names(method.arguments, ("X", "Y", "Z", "Tool.A", "Tool.B", "Tool.C")))]
 
-    def _do_onptmeasreport(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_onptmeasreport(self, tag: str, method: Term) -> None:
         self.state.report = _names(method.arguments, ("X", "Y", "Z", "IJK", "ER", "Q", "Tool.A", "Tool.B", "Tool.C"))
-        yield from ()
 
-    def _do_onmovereporte(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_onmovereporte(self, tag: str, method: Term) -> None:
         if self.state.daemons:
             raise MethodError(515)
         rest = [one for one in method.arguments if not (isinstance(one, Term) and one.name in ("Time", "Dis"))]
         self.state.daemons[tag] = _names(tuple(rest), ("X", "Y", "Z"))
-        yield from ()
 
-    def _do_stopdaemon(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_stopdaemon(self, tag: str, method: Term) -> None:
         if len(method.arguments) != 1 or str(method.arguments[0]) not in self.state.daemons:
             raise MethodError(513)
         del self.state.daemons[str(method.arguments[0])]
-        yield from ()
 
-    def _do_stopalldaemons(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_stopalldaemons(self, tag: str, method: Term) -> None:
         if not self.state.daemons:
             raise MethodError(512)
         self.state.daemons.clear()
-        yield from ()
 
-    def _do_goto(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_goto(self, tag: str, method: Term) -> None:
         place, _ = _target(method, self.state.position)
         self._move(place)
-        yield from ()
 
-    def _do_ptmeas(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_ptmeas(self, tag: str, method: Term) -> list[str]:
         place, normal = _target(method, self.state.position)
         size = math.hypot(*normal) or 1.0
         unit = (normal[0] / size, normal[1] / size, normal[2] / size)
         self._move([at + self.radial * n for at, n in zip(place, unit, strict=True)])
-        yield self.reported(self.state.report, unit)
+        return [self.reported(self.state.report, unit)]
 
-    def _do_enumtools(self, tag: str, method: Term) -> Iterator[str]:
-        yield from (f'"{name}"' for name in self.tools)
+    def _do_enumtools(self, tag: str, method: Term) -> list[str]:
+        return [f'"{name}"' for name in self.tools]
 
-    def _do_findtool(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_findtool(self, tag: str, method: Term) -> None:
         self.state.found = self._tool(method)
-        yield from ()
 
-    def _do_changetool(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_changetool(self, tag: str, method: Term) -> None:
         self.state.tool, self.state.user = self._tool(method), False
-        yield from ()
 
-    def _do_settool(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_settool(self, tag: str, method: Term) -> None:
         self.state.tool = self._tool(method)
-        yield from ()
 
-    def _do_getprop(self, tag: str, method: Term) -> Iterator[str]:
+    def _do_getprop(self, tag: str, method: Term) -> list[str]:
         told = []
         for one in method.arguments:
             name = one.name if isinstance(one, Term) else ""
@@ -194,7 +178,7 @@ class Methods:
                 told.append(f"Part.Temperature({number_text(self.part_c)})")
             else:
                 raise MethodError(510)
-        yield ", ".join(told)
+        return [", ".join(told)]
 
     def _tool(self, method: Term) -> str:
         if len(method.arguments) != 1 or method.arguments[0] not in self.tools:
@@ -387,10 +371,10 @@ class SimulatedIppServer(Methods):
                 raise MethodError(8)
             if state.error and not asks:
                 raise MethodError(514)
-            act: Callable[[str, Term], Iterator[str]] | None = getattr(self, f"_do_{method.name.lower()}", None)
+            act: Callable[[str, Term], list[str] | None] | None = getattr(self, f"_do_{method.name.lower()}", None)
             if act is None:
                 raise MethodError(501)
-            for data in act(tag, method):
+            for data in act(tag, method) or ():
                 self._send(f"{tag} # {data}")
         except MethodError as error:
             number = int(error.args[0])
