@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
-from cmm_uq.app.api.outcomes import Diagnosis, Plan, Proof, Report
+from cmm_uq.app.api.outcomes import DiagnosisOutcome, PlanOutcome, ProofOutcome, Report
 from cmm_uq.app.commands.diagnose import diagnosis_outcome
 from cmm_uq.app.commands.jobs.check import JobCheck, check_job, check_read
 from cmm_uq.app.commands.jobs.folder import KEPT, PLAN
@@ -137,7 +137,7 @@ def diagnose(
     alpha: float = FALSE_ALARMS,
     against: pd.DataFrame | str | Path | None = None,
     language: Code | None = None,
-) -> Diagnosis:
+) -> DiagnosisOutcome:
     """Say where recording and model differ, and what was left out.
 
     Parameters
@@ -162,10 +162,10 @@ def diagnose(
             if isinstance(against, str | Path)
             else compared_with_frame(read, against)
         )
-    return Diagnosis(diagnosis_outcome(read, seed=seed, alpha=alpha))
+    return DiagnosisOutcome(diagnosis_outcome(read, seed=seed, alpha=alpha))
 
 
-def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: Code | None = None) -> Plan:
+def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: Code | None = None) -> PlanOutcome:
     """Say what placings of the artefact determine, and search for better ones.
 
     Parameters
@@ -181,7 +181,7 @@ def plan(job: Job | str | Path, *, power: bool = True, seed: int = 0, language: 
     """
     from cmm_uq.app.commands.plans.plan import plan_outcome
 
-    return Plan(plan_outcome(in_language(_job(job), language), power=power, seed=seed))
+    return PlanOutcome(plan_outcome(in_language(_job(job), language), power=power, seed=seed))
 
 
 def part(
@@ -231,7 +231,7 @@ def part(
 def prove(
     job: Job | str | Path, *, cases: int = 200, workers: int | None = None, seed: int = 0, alpha: float = FALSE_ALARMS,
     language: Code | None = None,
-) -> Proof:  # fmt: skip
+) -> ProofOutcome:  # fmt: skip
     """Try the diagnosis on sealed cases drawn with the set-ups, the artefact and the noise of a job.
 
     Parameters
@@ -251,7 +251,7 @@ def prove(
     from cmm_uq.laboratory.schedule.processes import processes
 
     asked = ProofOptions(cases, processes() if workers is None else workers, seed, alpha)
-    return Proof(prove_outcome(in_language(_job(job), language), asked))
+    return ProofOutcome(prove_outcome(in_language(_job(job), language), asked))
 
 
 def simulate(job: Job | str | Path, truth: Mapping[str, Any] | str | Path, *, seed: int | None = None) -> Job:

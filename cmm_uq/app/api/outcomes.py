@@ -132,7 +132,7 @@ class Found:
         return self.form.write(self.job, lambda: self.outcome, out, force=force, records=records).files
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__} of {self.job.facts.job.id}: {self._said()}>"
+        return f"<{type(self).__name__.removesuffix('Outcome')} of {self.job.facts.job.id}: {self._said()}>"
 
     def _said(self) -> str:
         """The outcome in a few words."""
@@ -218,7 +218,7 @@ class Report(Found):
         ]
 
 
-class Diagnosis(Found):
+class DiagnosisOutcome(Found):
     """What ``diagnose`` found."""
 
     form = DIAGNOSE
@@ -247,7 +247,7 @@ class Diagnosis(Found):
         return self.verdict
 
 
-class Plan(Found):
+class PlanOutcome(Found):
     """What ``plan`` found."""
 
     form = PLAN
@@ -264,7 +264,7 @@ class Plan(Found):
         return f"{len(self.placings)} placings to measure, {self.results['minutes']:.0f} min"
 
 
-class Proof(Found):
+class ProofOutcome(Found):
     """What ``prove`` found."""
 
     form = PROVE
@@ -374,3 +374,7 @@ class Part:
         warned = "".join(f"<li>{escape(text)}</li>" for text in self.warnings)
         table = html_table("Summary", (), short.rows)
         return f"<p>{escape(repr(self))}</p>{table}" + (f"<ul>{warned}</ul>" if warned else "")
+
+
+Diagnosis, Plan, Proof = DiagnosisOutcome, PlanOutcome, ProofOutcome
+"""Names of version 0.15, for one release more."""

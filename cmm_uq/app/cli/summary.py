@@ -16,17 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 import typer
 from rich.cells import cell_len
 
-from cmm_uq.app.cli.terminal import (
-    NOT_CONFORMING,
-    Line,
-    columns,
-    folded,
-    on_terminal,
-    put_data,
-    put_json,
-    say,
-    show,
-)
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, Line, columns, folded, on_terminal, put_data, put_json, say, show
 from cmm_uq.base.errors import printable
 from cmm_uq.base.output import MANIFEST
 from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
@@ -233,7 +223,7 @@ def show_summary(
     show(screen_layout(verbose=verbose).screen(summary, name=name, banner=banner, files=rows, folder=folder))
 
 
-class Result(Protocol):
+class CommandResult(Protocol):
     """What a command wrote and found: a job's or a part's."""
 
     @property
@@ -252,7 +242,7 @@ class Result(Protocol):
     def recorded(self) -> str: ...
 
 
-def conclude(result: Result, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
+def conclude(result: CommandResult, *, json: bool, quiet: bool, strict: bool, verbose: bool) -> None:
     """How a command ends that wrote an outcome: results.json or a summary; exit code 4 if strict, when not all is well."""
     if json:
         put_json(result.results.decode())

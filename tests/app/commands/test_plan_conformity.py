@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.app.commands.jobs.check import check_job
 from cmm_uq.app.commands.jobs.simulate import simulate
-from cmm_uq.app.commands.plans.planning import RECORDED, Plan, make_plan
+from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan, make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.app.commands.report import evaluate_job as analyse_job
 from cmm_uq.base.errors import CmmUqError
@@ -42,7 +42,7 @@ limit_um = 5.0
 DIRECTED = ("approach_x", "approach_y", "approach_z")
 
 
-def after(folder: Path, points: Points, further: Sequence[str] = DIRECTED) -> Plan:
+def after(folder: Path, points: Points, further: Sequence[str] = DIRECTED) -> MeasurementPlan:
     """The plan of a recording of nominal points, with these columns."""
     columns = np.column_stack([
         points.measurement, points.point, points.repeat, points.xyz, points.columns["reference_mm"],

@@ -11,7 +11,7 @@ import pytest
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.app.commands.plans.page import plan_document
 from cmm_uq.app.commands.plans.plan import plan_results
-from cmm_uq.app.commands.plans.planning import Plan, make_plan
+from cmm_uq.app.commands.plans.planning import MeasurementPlan, make_plan
 from cmm_uq.app.commands.plans.words import combination
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
@@ -21,7 +21,7 @@ from tests.analysis.planning.plans import EVERY_KIND, setting
 from tests.app.commands.test_planning import JOB, SIX
 
 
-def plan_of(folder: Path, plan: str, length: str = "400.0") -> Plan:
+def plan_of(folder: Path, plan: str, length: str = "400.0") -> MeasurementPlan:
     text = JOB.format(plan=plan, effects=SIX, length=length)
     if not length:
         text = text.replace("length_mm = \nu_um = 0.5\n", "")

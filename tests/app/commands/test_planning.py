@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cmm_uq.app.commands.plans.planning import RECORDED, SPREAD, Plan, make_plan
+from cmm_uq.app.commands.plans.planning import RECORDED, SPREAD, MeasurementPlan, make_plan
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.errors import CmmUqError
 from tests.conftest import ROOT
@@ -36,7 +36,9 @@ effects = [{effects}]
 SIX = '"scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"'
 
 
-def planned(folder: Path, plan: str = "", effects: str = SIX, length: float = 400.0, **options: bool) -> Plan:
+def planned(
+    folder: Path, plan: str = "", effects: str = SIX, length: float = 400.0, **options: bool
+) -> MeasurementPlan:
     (folder / "job.toml").write_text(JOB.format(plan=plan, effects=effects, length=length), encoding="utf-8")
     return make_plan(read_job(folder, recorded=False), power=options.get("power", False))
 

@@ -113,7 +113,7 @@ def test_an_answer_that_nobody_gave_is_refused(ran: Ran, tmp_path: Path) -> None
 
 
 def test_python_gives_the_rates_as_a_table(ran: Ran) -> None:
-    found = api.Proof(proof_outcome(ran.proof))
+    found = api.ProofOutcome(proof_outcome(ran.proof))
     assert found.rates.loc["false_alarms", ["count", "of"]].tolist() == [0, 1]
     assert found.rates.loc["coverage", "of"] >= 1
     assert found.sha256 == ran.proof.sha256

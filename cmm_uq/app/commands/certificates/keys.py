@@ -16,7 +16,7 @@ PRIVATE, PUBLIC = 0o600, 0o644
 
 
 @dataclass(frozen=True)
-class TrialKey:
+class KeyFiles:
     """What was made.
 
     key : PKCS#12 file.
@@ -29,7 +29,7 @@ class TrialKey:
     until: dt.date
 
 
-def new_test_key(path: Path, name: str, asking: Asking) -> TrialKey:
+def new_test_key(path: Path, name: str, asking: Asking) -> KeyFiles:
     """Make a test key; a file that is there is not written over.
 
     path : of the PKCS#12 file; its certificate comes beside it, ``.pem`` in place of the suffix.
@@ -50,7 +50,7 @@ def new_test_key(path: Path, name: str, asking: Asking) -> TrialKey:
         with contextlib.suppress(OSError):
             path.unlink()
         raise
-    return TrialKey(path, beside, made.until)
+    return KeyFiles(path, beside, made.until)
 
 
 def _write(path: Path, content: bytes, mode: int) -> None:

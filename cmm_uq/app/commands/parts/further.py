@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from cmm_uq.analysis.parts.machine.state import FREE
-from cmm_uq.app.commands.plans.planning import Plan, make_plan
+from cmm_uq.app.commands.plans.planning import MeasurementPlan, make_plan
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.toml_file import as_toml
@@ -87,7 +87,7 @@ def _asked(calibrated: Job, names: Iterable[str]) -> list[str]:
     return list(dict.fromkeys([*calibrated.facts.model.effects, *names]))
 
 
-def _plan(calibrated: Job, wanted: Sequence[Effect]) -> Plan | None:
+def _plan(calibrated: Job, wanted: Sequence[Effect]) -> MeasurementPlan | None:
     if not wanted:
         return None
     facts = calibrated.facts
@@ -104,7 +104,7 @@ def _plan(calibrated: Job, wanted: Sequence[Effect]) -> Plan | None:
 _WISHES = {"criterion": "separation", "more": SET_UPS, "number": None, "candidates": CANDIDATES}
 
 
-def _found_by(plan: Plan, wanted: Sequence[Effect]) -> tuple[str, ...]:
+def _found_by(plan: MeasurementPlan, wanted: Sequence[Effect]) -> tuple[str, ...]:
     """Errors that are then no longer left free: each parameter known to half of what physics allows."""
     if plan.better is None or plan.better.identifiability is None:
         return ()
@@ -115,7 +115,7 @@ def _found_by(plan: Plan, wanted: Sequence[Effect]) -> tuple[str, ...]:
     return tuple(one.name for one in wanted if seen.get(one.name, False))
 
 
-def _setups(plan: Plan | None, found: Sequence[str]) -> Text:
+def _setups(plan: MeasurementPlan | None, found: Sequence[str]) -> Text:
     if plan is None or not found:
         return NOTHING
     ends = semicolons(say("{ends} mm", ends=placing.ends) for placing in plan.to_measure)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
 from cmm_uq.analysis.diagnosis.power import POWER, SIZES
 from cmm_uq.analysis.planning.expected import RepeatsRow
-from cmm_uq.app.commands.plans.planning import RECORDED, Plan
+from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan
 from cmm_uq.app.commands.plans.words import (
     CRITERIA,
     STATUS,
@@ -28,7 +25,6 @@ from cmm_uq.app.commands.plans.words import (
     unit_of,
 )
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, names, number, plural, say
-from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
 from cmm_uq.certificate.origin import program
@@ -41,7 +37,7 @@ SHOWN = 6
 _PRIOR = say("not known: averaged over the prior")
 
 
-def noise_facts(plan: Plan) -> tuple[tuple[Text, Text], ...]:
+def noise_facts(plan: MeasurementPlan) -> tuple[tuple[Text, Text], ...]:
     """Reading noise, set-up offset and growth, and where each is from."""
     setting = plan.setting
     source: Text = say("assumed: the job states none")
@@ -70,21 +66,7 @@ def _size(size: float | None, source: Text) -> Text:
     return say("{sigma:.2g} µm ({source})", sigma=size / MICROMETRE, source=source)
 
 
-def noise_data(plan: Plan) -> dict[str, Any]:
-    """For results.json: sizes in µm, ``null`` where they are averaged over."""
-    setting, noise = plan.setting, plan.setting.noise
-    each = {"coordinate_um": setting.sigma / MICROMETRE, "stated": setting.stated is not None}
-    if noise is None:
-        return each
-    return each | {
-        **{f"{axis}_um": size / MICROMETRE for axis, size in zip("xyz", noise.reading, strict=True)},
-        "placing_um": None if noise.placing is None else noise.placing / MICROMETRE,
-        "growth_um": None if noise.growth is None else noise.growth / MICROMETRE,
-        "from": setting.plan.noise_from,
-    }
-
-
-def averaging_note(plan: Plan) -> tuple[Text, ...]:
+def averaging_note(plan: MeasurementPlan) -> tuple[Text, ...]:
     """What an expected uncertainty is where part of the noise is not known."""
     noise = plan.setting.noise
     if noise is None or (noise.placing is not None and noise.growth is not None):
@@ -99,7 +81,7 @@ def averaging_note(plan: Plan) -> tuple[Text, ...]:
     )
 
 
-def worth(plan: Plan) -> tuple[Block, ...]:
+def worth(plan: MeasurementPlan) -> tuple[Block, ...]:
     """Repeats against placings."""
     found = plan.worth
     if found is None:
@@ -127,7 +109,7 @@ def worth(plan: Plan) -> tuple[Block, ...]:
     return (Table(say("Repeats and placings"), heads, tuple(cells), notes), Paragraph(_advice(plan)))
 
 
-def _advice(plan: Plan) -> Text:
+def _advice(plan: MeasurementPlan) -> Text:
     if plan.worth is None:
         return NOTHING
     enough, most = plan.worth.enough, plan.worth.rows[-1].repeats
@@ -162,32 +144,10 @@ def _figure(unknown: Unknown, row: RepeatsRow, i: int) -> Text:
     return _pair(row.u[i] / unit, row.u_more[i] / unit, ".2g")
 
 
-def worth_data(plan: Plan) -> dict[str, Any] | None:
-    """For results.json: uncertainties in the unit of each parameter, ``null`` where it stays free."""
-    if plan.worth is None:
-        return None
-
-    return {"from_repeats": plan.worth.enough, "rows": [_row_data(plan.worth.unknowns, row) for row in plan.worth.rows]}
-
-
-def _row_data(unknowns: Sequence[Unknown], row: RepeatsRow) -> dict[str, Any]:
-    more = {"readings": row.readings_more, "minutes": row.minutes_more, "u": _by_name(unknowns, row.u_more)}
-    return {
-        "repeats": row.repeats, "readings": row.readings, "minutes": row.minutes, "u": _by_name(unknowns, row.u),
-        "one_placing_more": more,
-    }  # fmt: skip
-
-
-def _by_name(unknowns: Sequence[Unknown], u: Floats) -> dict[str, float | None]:
-    return {
-        ".".join(one.key): float(each) if np.isfinite(each) else None for one, each in zip(unknowns, u, strict=True)
-    }
-
-
 MET, NOT_MET = Verbatim("✓"), Verbatim("✗")
 
 
-def plan_document(plan: Plan) -> Document:
+def plan_document(plan: MeasurementPlan) -> Document:
     """The page of a plan."""
     facts = plan.job.facts
     return working_page(
@@ -220,12 +180,12 @@ def plan_document(plan: Plan) -> Document:
     )
 
 
-def _artefact(plan: Plan) -> Text:
+def _artefact(plan: MeasurementPlan) -> Text:
     facts = plan.job.facts.artefact
     return Verbatim(facts.name) if facts.name else Verbatim(facts.kind.replace("_", " "))
 
 
-def to_measure_words(plan: Plan) -> Text:
+def to_measure_words(plan: MeasurementPlan) -> Text:
     """How many placings are still to be measured, and how long that takes."""
     count, total = len(plan.to_measure), sum(plan.minutes)
     if not count:
@@ -237,7 +197,7 @@ def to_measure_words(plan: Plan) -> Text:
     )
 
 
-def _warnings(plan: Plan) -> list[Text]:
+def _warnings(plan: MeasurementPlan) -> list[Text]:
     said: list[Text] = [
         say("Not met: {what}.", what=condition.what) for condition in plan.conditions if not condition.met
     ]
@@ -248,7 +208,7 @@ def _warnings(plan: Plan) -> list[Text]:
     return said
 
 
-def _sections(plan: Plan) -> tuple[Section, ...]:
+def _sections(plan: MeasurementPlan) -> tuple[Section, ...]:
     return (
         Section(say("Placings"), _placings(plan)),
         Section(
@@ -269,7 +229,7 @@ def _sections(plan: Plan) -> tuple[Section, ...]:
     )
 
 
-def placing_rows(plan: Plan) -> list[tuple[Text, ...]]:
+def placing_rows(plan: MeasurementPlan) -> list[tuple[Text, ...]]:
     """Number, title, from and to, points and time of every placing to be measured."""
     return [
         (number(first), placing.title, placing.ends, number(len(placing.points)), number(time, ".0f"))
@@ -277,7 +237,7 @@ def placing_rows(plan: Plan) -> list[tuple[Text, ...]]:
     ]
 
 
-def _placings(plan: Plan) -> tuple[Block, ...]:
+def _placings(plan: MeasurementPlan) -> tuple[Block, ...]:
     if not plan.to_measure:
         return ()
     heads = (
@@ -293,7 +253,7 @@ def _placings(plan: Plan) -> tuple[Block, ...]:
     return (Table(say("Placings in the order of measurement"), heads, tuple(placing_rows(plan)), tuple(notes)),)
 
 
-def _determined(plan: Plan) -> tuple[Block, ...]:
+def _determined(plan: MeasurementPlan) -> tuple[Block, ...]:
     found = plan.outlook.identifiability
     blocks: list[Block] = [Paragraph(say("No reading shows: {text}.", text=text)) for text in plan.free]
     if found is None:
@@ -338,7 +298,7 @@ def _determined(plan: Plan) -> tuple[Block, ...]:
     return tuple(blocks)
 
 
-def _gain(plan: Plan) -> tuple[Block, ...]:
+def _gain(plan: MeasurementPlan) -> tuple[Block, ...]:
     start, better = plan.start.identifiability, plan.better.identifiability if plan.better else None
     criterion = plan.setting.plan.criterion
     if start is None or better is None or plan.better is None or criterion is None:
@@ -406,7 +366,7 @@ def _beside(
     return [picture, table]
 
 
-def _smallest(plan: Plan) -> tuple[Block, ...]:
+def _smallest(plan: MeasurementPlan) -> tuple[Block, ...]:
     if not plan.outlook.powers:
         return ()
     heads = (Column(say("Effect not in the job's model"), numeric=False), Column(say("Parameter"), numeric=False),

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from cmm_uq.analysis.planning.expected import RepeatsRow
 from cmm_uq.analysis.planning.identifiability import Identifiability
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.app.commands.files import Form, Stage, Written, silent
-from cmm_uq.app.commands.plans.page import noise_data, placing_rows, to_measure_words, worth_data
-from cmm_uq.app.commands.plans.planning import Outlook, Plan
+from cmm_uq.app.commands.plans.page import placing_rows, to_measure_words
+from cmm_uq.app.commands.plans.planning import MeasurementPlan, Outlook
 from cmm_uq.app.commands.plans.words import STATUS, absorbed, combination, expected, named, pairs, unit_of
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.plugins import naming_package
+from cmm_uq.base.points import Floats
+from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.results.contents import head
 from cmm_uq.certificate.wording import Figure, Summary
 from cmm_uq.certificate.wording import Headline as Verdict
 from cmm_uq.jobs.job import Job
+from cmm_uq.maths.inference.linear_model import Unknown
 
 TO_FILL_IN = "plan.csv"
 PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
@@ -71,7 +78,7 @@ def write_plan(
     )
 
 
-def recording_to_be(plan: Plan) -> bytes:
+def recording_to_be(plan: MeasurementPlan) -> bytes:
     """The placings that are still to be measured, as the CSV of a recording at nominal coordinates."""
     from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
@@ -86,7 +93,7 @@ def recording_to_be(plan: Plan) -> bytes:
 SCHEMA = "cmm-uq/plan/1"
 
 
-def plan_results(plan: Plan) -> dict[str, Any]:
+def plan_results(plan: MeasurementPlan) -> dict[str, Any]:
     """results.json of a plan."""
     better = None if plan.better is None or plan.scores is None else {
         "criterion": plan.setting.plan.criterion, "score_before": plan.scores[0], "score_after": plan.scores[1],
@@ -153,7 +160,43 @@ def _outlook_data(outlook: Outlook) -> dict[str, Any]:
     }
 
 
-def plan_summary(plan: Plan) -> Summary:
+def noise_data(plan: MeasurementPlan) -> dict[str, Any]:
+    """For results.json: sizes in µm, ``null`` where they are averaged over."""
+    setting, noise = plan.setting, plan.setting.noise
+    each = {"coordinate_um": setting.sigma / MICROMETRE, "stated": setting.stated is not None}
+    if noise is None:
+        return each
+    return each | {
+        **{f"{axis}_um": size / MICROMETRE for axis, size in zip("xyz", noise.reading, strict=True)},
+        "placing_um": None if noise.placing is None else noise.placing / MICROMETRE,
+        "growth_um": None if noise.growth is None else noise.growth / MICROMETRE,
+        "from": setting.plan.noise_from,
+    }
+
+
+def worth_data(plan: MeasurementPlan) -> dict[str, Any] | None:
+    """For results.json: uncertainties in the unit of each parameter, ``null`` where it stays free."""
+    if plan.worth is None:
+        return None
+
+    return {"from_repeats": plan.worth.enough, "rows": [_row_data(plan.worth.unknowns, row) for row in plan.worth.rows]}
+
+
+def _row_data(unknowns: Sequence[Unknown], row: RepeatsRow) -> dict[str, Any]:
+    more = {"readings": row.readings_more, "minutes": row.minutes_more, "u": _by_name(unknowns, row.u_more)}
+    return {
+        "repeats": row.repeats, "readings": row.readings, "minutes": row.minutes, "u": _by_name(unknowns, row.u),
+        "one_placing_more": more,
+    }  # fmt: skip
+
+
+def _by_name(unknowns: Sequence[Unknown], u: Floats) -> dict[str, float | None]:
+    return {
+        ".".join(one.key): float(each) if np.isfinite(each) else None for one, each in zip(unknowns, u, strict=True)
+    }
+
+
+def plan_summary(plan: MeasurementPlan) -> Summary:
     """For the end of the command; its details are the placings, below their headings."""
     found = plan.outlook.identifiability
     met = tuple(

@@ -122,7 +122,7 @@ class Outlook:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class MeasurementPlan:
     """What to measure, and what it will tell.
 
     job, setting : what was asked.
@@ -180,7 +180,7 @@ def minutes(setting: Setting, placing: SetUp) -> float:
 
 
 @refusing_overflow("job.toml", OVERFLOW_FIX)
-def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> Plan:
+def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> MeasurementPlan:
     """Plan a job.
 
     job : with or without a recording.
@@ -212,7 +212,7 @@ def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress
     recorded = len(start.points) if name == RECORDED else 0
     met = of_standards(job, setting, name, final.points, recorded) + _in_time(setting, name, placings)
     worth = None if name == RECORDED else compare_repeats(setting, final.placings)
-    return Plan(job, setting, name, start, better, kept, scores, met, worth=worth)
+    return MeasurementPlan(job, setting, name, start, better, kept, scores, met, worth=worth)
 
 
 def _with_noise(setting: Setting, name: Text, points: Points) -> Setting:
@@ -354,7 +354,7 @@ def _in_time(setting: Setting, name: str, placings: Sequence[SetUp]) -> tuple[Co
     return (Condition(say("at most {budget:g} min: {total:.0f} min", budget=budget, total=total), over),)
 
 
-def _series_plan(job: Job, setting: Setting) -> Plan:
+def _series_plan(job: Job, setting: Setting) -> MeasurementPlan:
     """Placings of a kind that names no effects, and what their readings cannot tell."""
     if setting.planning.free is None:
         raise ValueError("a kind that says nothing of what its placings leave open")
@@ -363,4 +363,4 @@ def _series_plan(job: Job, setting: Setting) -> Plan:
     name, placings, points = _start(job, setting)
     free = setting.planning.free(setting, points, job.recording_path)
     start = Outlook(placings, points, None, ())
-    return Plan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings), free)
+    return MeasurementPlan(job, setting, name, start, None, 0, None, _in_time(setting, name, placings), free)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cmm_uq.analysis.planning.identifiability import Determination, Identifiability
-from cmm_uq.app.commands.plans.planning import RECORDED, Plan
+from cmm_uq.app.commands.plans.planning import RECORDED, MeasurementPlan
 from cmm_uq.base.messages import DASH, Message, Text, Verbatim, listed, number, say
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -150,7 +150,7 @@ def absorbed(found: Identifiability) -> list[Text]:
     ]
 
 
-def base_name(plan: Plan) -> Text:
+def base_name(plan: MeasurementPlan) -> Text:
     """Of the placings to start from."""
     count = len(plan.start.placings)
     return (
