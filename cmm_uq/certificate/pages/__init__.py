@@ -1,1 +1,1 @@
-"""Pages."""
+"""Pages about machines and budgets that are no certificates."""

@@ -1,1 +1,1 @@
-"""Plots."""
+"""Pictures of certificates and pages, each from plain arrays and words."""

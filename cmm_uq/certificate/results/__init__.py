@@ -1,1 +1,1 @@
-"""Results."""
+"""Results for other programs: results.json and the files beside it."""

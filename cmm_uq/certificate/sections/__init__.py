@@ -1,1 +1,1 @@
-"""Sections."""
+"""Sections of a certificate, in the order in which a customer asks for them."""
