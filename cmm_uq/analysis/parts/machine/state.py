@@ -241,12 +241,6 @@ def noise_of_draws(reported: Mapping[str, Floats]) -> StatedNoise:
 _WHERE = "the machine's results.json"
 
 
-def flat_draws(names: Any, centre: Floats, draws: Floats) -> dict[str, Floats]:
-    """Draws (M,) of each quantity by name, from the arrays of ``posterior.npz``: deviations (…, q) from their mean."""
-    values = np.asarray(centre) + np.asarray(draws, dtype=np.float64).reshape(-1, len(centre))
-    return {str(name): values[:, i] for i, name in enumerate(names)}
-
-
 def machine_stated(
     results: Mapping[str, Any],
     draws: Mapping[str, Floats],

@@ -1,7 +1,4 @@
-"""What the reader of a part's page must know of its machine: drafts, dates, temperatures, probes.
-
-The machine that a part was measured on: its certificate verified, refused where it does not hold, then its state.
-"""
+"""The machine that a part was measured on: its certificate verified, refused where it does not hold, then its state."""
 
 from __future__ import annotations
 
@@ -69,14 +66,11 @@ def machine_warnings(job: PartJob, standing: CertificateStatus, calibrated: Job 
     if standing.valid_until is None:
         yield say("The machine's certificate of {date} does not say until when it holds.", date=day(standing.date))
     yield from _thermal(job, calibrated)
-    if calibrated is not None and calibrated.facts.circumstances.probe.sensing == "optical" and _touches(job):
+    touches = any(stylus.diameter_mm > 0 for stylus in job.facts.stylus)
+    if calibrated is not None and calibrated.facts.circumstances.probe.sensing == "optical" and touches:
         yield say(
             "The machine was calibrated with a probe that does not touch; the noise of one that does may be another."
         )
-
-
-def _touches(job: PartJob) -> bool:
-    return any(stylus.diameter_mm > 0 for stylus in job.facts.stylus)
 
 
 def _thermal(job: PartJob, calibrated: Job | None) -> Iterable[Text]:
@@ -157,9 +151,10 @@ def state_machine(
     machine = _machine(job, stated.job)
     fits(machine)
     state = machine_stated(stated.results, stated.draws, machine, corrected=job.facts.machine_state.corrected)
-    state = replace(
-        state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=_known_at(state, standing)
-    )
+    # where the calibration modelled the scales' expansion, their errors are those of 20 °C
+    expanding = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
+    known_at = None if expanding else standing.temperature_c
+    state = replace(state, calibrated=standing.date, valid_until=standing.valid_until, temperature_c=known_at)
     since = with_drift(
         state, standing.serial or standing.machine, job.facts.job.date, records, _where(job), kept=history
     )
@@ -333,12 +328,6 @@ def _standing(job: PartJob, stated: _Stated, *, trusted: bool) -> CertificateSta
         temperature_c=None if recorded is None else float(np.mean(recorded)),
         inputs_sha256=dict(said["inputs_sha256"]) if stated.job is None else hashes(stated.job.inputs),
     )  # fmt: skip
-
-
-def _known_at(state: MachineState, standing: CertificateStatus) -> float | None:
-    """Temperature at which the errors of the scales are known: of 20 °C where the calibration modelled their expansion."""
-    modelled = any(column.startswith("temp_") for effect in state.effects for column in effect.columns)
-    return None if modelled else standing.temperature_c
 
 
 def _where(job: PartJob) -> str:

@@ -26,7 +26,6 @@ from cmm_uq.analysis.parts.machine.state import (
     MachineState,
     StatedNoise,
     Unmodelled,
-    flat_draws,
     machine_stated,
     of_machine,
 )
@@ -324,8 +323,10 @@ def test_a_certificate_says_what_it_left_free() -> None:
         "diagnosis": {"unseen": [{"effect": "rotation_x_y", "detected": 6.58}]},
         "job": {"date": "2026-11-22"},
     }
-    names = ["squareness_xy.angle_arcsec", "scale_x.ppm", "noise.coordinate_um"]
-    draws = flat_draws(names, np.array([5.0, 100.0, 2.0]), np.array([[[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0]]]))
+    draws = {
+        "squareness_xy.angle_arcsec": np.array([6.0, 4.0]), "scale_x.ppm": np.array([99.0, 101.0]),
+        "noise.coordinate_um": np.array([2.0, 2.0]),
+    }  # fmt: skip
     state = machine_stated(results, draws, MACHINE, corrected=False)
     np.testing.assert_allclose(state.draws, [[99.0, 6.0], [101.0, 4.0]])
     assert state.free == ("scale_x",)
