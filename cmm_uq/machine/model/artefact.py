@@ -30,47 +30,29 @@ from cmm_uq.maths.inference.linear_model import Freedoms
 
 @dataclass(frozen=True, eq=False)
 class Indications:
-    """Measured lengths against calibrated ones.
+    """Measured lengths against calibrated ones."""
 
-    Parameters
-    ----------
-    errors : (m,) measured minus calibrated, mm.
-    lengths : (m,) calibrated lengths, mm.
-    u : (m,) standard uncertainty of the calibrated lengths, mm.
-    rows : (m, 2) the points between which each length was measured, as rows of the recording.
-    u_beside : (m,) what of ``u`` comes from a further gauge that is shared by all that have it, mm; ``None``: nothing.
-    """
-
-    errors: Floats
-    lengths: Floats
-    u: Floats
-    rows: Ints
+    errors: Floats  # (m,) measured minus calibrated, mm
+    lengths: Floats  # (m,) calibrated lengths, mm
+    u: Floats  # (m,) standard uncertainty of the calibrated lengths, mm
+    rows: Ints  # (m, 2) the points between which each length was measured, as rows of the recording
+    # (m,) what of ``u`` comes from a further gauge that is shared by all that have it, mm; ``None``: nothing
     u_beside: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Forms:
-    """Form errors of what was probed all around, one for each (measurement, repeat).
+    """Form errors of what was probed all around, one for each (measurement, repeat)."""
 
-    Parameters
-    ----------
-    measurement, repeat : (q,).
-    count : (q,) points of each.
-    form : (q,) range of the distances from the least-squares feature, mm.
-    certified : form deviation of the artefact by its certificate, mm; 0 when it is not given.
-    directions : (n, 3) outward direction of each point from the middle of its feature.
-    size : (q,) measured minus certified size at 20 °C, mm; ``None`` without a certificate.
-    centres : (q, 3) middles of the features, mm; ``None`` where they say nothing.
-    """
-
+    # measurement, repeat: (q,)
     measurement: Ints
     repeat: Ints
-    count: Ints
-    form: Floats
-    certified: float
-    directions: Floats
-    size: Floats | None = None
-    centres: Floats | None = None
+    count: Ints  # (q,) points of each
+    form: Floats  # (q,) range of the distances from the least-squares feature, mm
+    certified: float  # form deviation of the artefact by its certificate, mm; 0 when it is not given
+    directions: Floats  # (n, 3) outward direction of each point from the middle of its feature
+    size: Floats | None = None  # (q,) measured minus certified size at 20 °C, mm; ``None`` without a certificate
+    centres: Floats | None = None  # (q, 3) middles of the features, mm; ``None`` where they say nothing
 
 
 Role = Literal["dimension", "sought", "set-up"]
@@ -91,12 +73,15 @@ class Size:
         (``nominal`` and ``sd`` are then in ``unit``).
     """
 
+    # name, title: in results.json, and in words.
     name: str
     title: Text
-    unit: Unit
-    nominal: float
-    sd: float
-    what: Text = NOTHING
+    unit: Unit  # as printed
+    nominal: float  # where to start, in mm
+    sd: float  # standard uncertainty of the certificate, mm; infinite without a certificate
+    what: Text = NOTHING  # it is, in words without whose: "length"; its title where left out
+    # a dimension of the artefact; a size that the measurement is made for; or what is known of how it was set up (``nominal``
+    # and ``sd`` are then in ``unit``)
     role: Role = "dimension"
 
     def __post_init__(self) -> None:
@@ -123,14 +108,15 @@ class Artefact(ABC):
     rows : (m, j) the points that each observation speaks of, as rows of the recording.
     """
 
-    kind: str
-    title: Text
-    points: Points
-    sizes: tuple[Size, ...]
-    noise_scale: Floats
+    kind: str  # as in ``[artefact] kind``
+    title: Text  # in words
+    points: Points  # the recording
+    sizes: tuple[Size, ...]  # dimensions that enter the model
+    noise_scale: Floats  # (m,) standard uncertainty of each observation, per unit of that of one coordinate
+    # measurement, repeat: (m,) what each observation belongs to
     measurement: Ints
     repeat: Ints
-    rows: Ints
+    rows: Ints  # (m, j) the points that each observation speaks of, as rows of the recording
 
     @property
     def set_up(self) -> Text:
@@ -222,25 +208,16 @@ class Artefact(ABC):
         return np.zeros((len(self.noise_scale), 0))
 
 
-LAST_DIGIT = 1e-9
-"""mm, of means over repeats, which rounding keeps from being the same."""
-
-_ALONG = 0.99
-"""Cosine from which on an axis of an artefact is one of the machine's."""
+LAST_DIGIT = 1e-9  # mm, of means over repeats, which rounding keeps from being the same
+_ALONG = 0.99  # cosine from which on an axis of an artefact is one of the machine's
 
 
 @dataclass(frozen=True, eq=False)
 class Placings:
-    """Points by their placing.
+    """Points by their placing."""
 
-    Parameters
-    ----------
-    index : (n,) placing of each point, 0 … q − 1.
-    numbers : (q,) the ``measurement`` that each placing is.
-    """
-
-    index: Ints
-    numbers: Ints
+    index: Ints  # (n,) placing of each point, 0 … q − 1
+    numbers: Ints  # (q,) the ``measurement`` that each placing is
 
     @classmethod
     def of(cls, numbers: Ints) -> Placings:
@@ -289,6 +266,4 @@ class Placings:
     def columns(self, freedoms: Floats) -> Freedoms:
         """Freedoms that each placing has for itself, by what they do to its points' observations, (n, j) or (n, …, j)."""
         each = int(np.prod(freedoms.shape[1:-1]))
-        return Freedoms(
-            freedoms.reshape(-1, freedoms.shape[-1]), np.repeat(self.index, each), len(self.numbers)
-        )  # fmt: skip
+        return Freedoms(freedoms.reshape(-1, freedoms.shape[-1]), np.repeat(self.index, each), len(self.numbers))

@@ -83,57 +83,33 @@ def longest_lengths(artefact: Artefact) -> Floats:
     return found
 
 
-STEEL = 11.5e-6
-"""Expansion of an artefact whose own is not stated, 1/K."""
-
-_CERTIFICATES = 3.0
-"""Standard uncertainties by which a certificate may be wrong."""
-
-_LEAST_UM = 0.1
-"""However small the uncertainty that a certificate states: balls have dirt on them, and glue creeps."""
-
+STEEL = 11.5e-6  # expansion of an artefact whose own is not stated, 1/K
+_CERTIFICATES = 3.0  # standard uncertainties by which a certificate may be wrong
+_LEAST_UM = 0.1  # however small the uncertainty that a certificate states: balls have dirt on them, and glue creeps
+# weights of faults: of a certified artefact, of one compared with itself at an earlier date, of an uncalibrated one, and of a
+# sphere's form
 _CERTIFIED, _CHANGED, _UNKNOWN, _ROUND = 0.3, 0.3, 2.0, 0.1
-"""Weights of faults: of a certified artefact, of one compared with itself at an earlier date, of an uncalibrated one, and of
-a sphere's form."""
-
+# standard deviation of the artefact's temperature where it was recorded, and where it was not
 _MEASURED_KELVIN, _ASSUMED_KELVIN = 0.3, 1.0
-"""Standard deviation of the artefact's temperature where it was recorded, and where it was not."""
-
+# the same, one time in three, where a thermometer is wrong, hangs elsewhere, or the artefact came from another room
 _FAR_KELVIN = 3.0
-"""The same, one time in three, where a thermometer is wrong, hangs elsewhere, or the artefact came from another room."""
-
+# weight of the artefact's temperature: rooms and thermometers are mostly right; of two dates, nothing is likelier
 _TEMPERATURE = 0.3
-"""Weight of the artefact's temperature: rooms and thermometers are mostly right; of two dates, nothing is likelier."""
-
-_BENDING_UM, _FIXTURE_UM, _HELD = 10.0, 10.0, 0.1
-"""µm, and weight, of how an artefact is supported and clamped."""
-
-MOST_ERRORS = 120
-"""Coefficients of a pattern: with more of them a diagnosis would take minutes."""
-
+_BENDING_UM, _FIXTURE_UM, _HELD = 10.0, 10.0, 0.1  # µm, and weight, of how an artefact is supported and clamped
+MOST_ERRORS = 120  # coefficients of a pattern: with more of them a diagnosis would take minutes
+# form deviation over its standard deviation; the least that a certificate is believed; the latter without a certificate
 _FORM, _LEAST_FORM_UM, _UNKNOWN_FORM_UM = 4.0, 0.05, 0.3
-"""Form deviation over its standard deviation; the least that a certificate is believed; the latter without a certificate."""
-
-_FLAT = 0.05
-"""Extent across a flat artefact over that along it."""
+_FLAT = 0.05  # extent across a flat artefact over that along it
 
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of an artefact's own places.
+    """What is known of an artefact's own places."""
 
-    Parameters
-    ----------
-    um : largest plausible standard deviation of a place from where it should be, µm.
-    mostly : part of it that a certificate leaves.
-    weight : how readily it is thought of, beside the machine's errors.
-    kelvin_weight : the same of its temperature.
-    """
-
-    um: float
-    weight: float
-    mostly: float = 1.0
-    kelvin_weight: float = _TEMPERATURE
+    um: float  # largest plausible standard deviation of a place from where it should be, µm
+    weight: float  # how readily it is thought of, beside the machine's errors
+    mostly: float = 1.0  # part of it that a certificate leaves
+    kelvin_weight: float = _TEMPERATURE  # the same of its temperature
 
 
 def by_certificate(u_um: float | None, uncalibrated_um: float) -> Known:
@@ -158,17 +134,7 @@ def faults(
     axes: int = 3,
     geometry: Iterable[OwnFault] = tuple(GEOMETRY.values()),
 ) -> Iterable[Effect]:
-    """Faults of an artefact of several places.
-
-    Parameters
-    ----------
-    facts : what the job says of it.
-    points : as recorded.
-    body : its places.
-    known : of them.
-    axes : how many of its own axes are seen.
-    geometry : errors of machines that it may look like; all by default.
-    """
+    """Faults of an artefact of several places."""
     own = Owner(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
     if axes * len(body.places) <= MOST_ERRORS and deformations(own).shape[1]:
         yield PATTERN.made(own)
@@ -199,9 +165,7 @@ def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:
 def form_faults(facts: ArtefactFacts, form_um: float | None, points: Points) -> Iterable[Effect]:
     """That a sphere is not round.
 
-    Parameters
-    ----------
-    form_um : form deviation by its certificate, µm, which is about four standard deviations of it.
+    ``form_um``: form deviation by its certificate, µm, which is about four standard deviations of it.
     """
     um = _UNKNOWN_FORM_UM if form_um is None else max(form_um, _LEAST_FORM_UM) / _FORM
     own = Owner(Body.of(points, points.xyz), points, um, _ROUND, 3, expansion_of(facts))

@@ -20,34 +20,22 @@ from cmm_uq.machine.model.recorded import stated_sd
 from cmm_uq.maths.inference.doubt import Cause
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-CALIBRATION = say("calibration of the artefact")
-"""Name of this cause."""
-
-_SAME_MM = 1e-6
-"""Certified distances closer than this are of one place."""
-
-_LEAST_MM = 1e-12
-"""A standard uncertainty that is none."""
+CALIBRATION = say("calibration of the artefact")  # name of this cause
+_SAME_MM = 1e-6  # certified distances closer than this are of one place
+_LEAST_MM = 1e-12  # A standard uncertainty that is none
 
 
 @dataclass(frozen=True, eq=False)
 class CertifiedPlaces:
-    """Places as certified, and how well.
+    """Places as certified, and how well."""
 
-    Parameters
-    ----------
-    facts : what the job says of the artefact.
-    places : (n, j) certified, mm: distances from the first face, or coordinates.
-    u : (n, j) standard uncertainty of each by itself, mm; ``None`` where none is stated of single places.
-    covariance : (f, f) of all certified places for each of the j coordinates, mm²; ``None`` where none is stated.
-    index : (n,) which of these each place is.
-    """
-
-    facts: ReferencedFacts
-    places: Floats
+    facts: ReferencedFacts  # what the job says of the artefact
+    places: Floats  # (n, j) certified, mm: distances from the first face, or coordinates
+    # (n, j) standard uncertainty of each by itself, mm; ``None`` where none is stated of single places
     u: Floats | None = None
+    # (f, f) of all certified places for each of the j coordinates, mm²; ``None`` where none is stated
     covariance: tuple[Floats, ...] | None = None
-    index: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    index: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (n,) which of these each place is
 
     @classmethod
     def of(cls, facts: ReferencedFacts, points: Points, places: Floats) -> CertifiedPlaces:
@@ -77,9 +65,7 @@ class CertifiedPlaces:
     def u_um(self, sd_mm: float) -> float | None:
         """Standard uncertainty of the longest length, µm, as stated; ``None`` where nothing is.
 
-        Parameters
-        ----------
-        sd_mm : the same in mm, by what is stated of single places or lengths.
+        ``sd_mm``: the same in mm, by what is stated of single places or lengths.
         """
         if not self.plain:
             return sd_mm / MICROMETRE
@@ -105,13 +91,7 @@ class CertifiedPlaces:
         return np.asarray(np.maximum(stated, own), dtype=np.float64)
 
     def sd(self, length_mm: float, first: int, last: int) -> float:
-        """Standard uncertainty of the artefact's length, mm; infinite where its places are nominal.
-
-        Parameters
-        ----------
-        length_mm : of the artefact.
-        first, last : the places that are farthest apart.
-        """
+        """Standard uncertainty of the artefact's length, mm; infinite where its places are nominal."""
         if self.facts.nominal:
             return float(np.inf)
         if self.plain:
@@ -124,11 +104,7 @@ class CertifiedPlaces:
 
         With a covariance those that go with that error; what it has beside them is in :meth:`beyond`.
 
-        Parameters
-        ----------
-        about : (n, j) places from where distances count, mm: the first face, or the middle of the balls.
-        sd_mm : standard uncertainty of the longest length.
-        first, last : places at its ends.
+        ``about``: (n, j) places from where distances count, mm: the first face, or the middle of the balls.
         """
         if self.covariance is not None:
             return self._with_the_longest(sd_mm, first, last)[self.index]
@@ -143,12 +119,8 @@ class CertifiedPlaces:
     def beyond(self, size: Size, first: int, last: int, change: Floats, expansion: Floats) -> Cause | None:
         """What the certificate leaves open of the places beyond one common error; ``None`` where nothing is stated.
 
-        Parameters
-        ----------
-        size : the artefact's length, which has the common error.
-        first, last : places at its ends.
-        change : (n·j,) of the observations for one mm of that length.
-        expansion : (n,) size of the artefact at each place over that at 20 °C.
+        ``change``: (n·j,) of the observations for one mm of that length. ``expansion``: (n,) size of the artefact at each
+        place over that at 20 °C.
         """
         if not size.certified or size.sd <= 0:
             return None

@@ -12,34 +12,21 @@ from cmm_uq.base.points import Floats, Points
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations, mm, of the components of a coordinate's noise.
+    """Standard deviations, mm, of the components of a coordinate's noise."""
 
-    Parameters
-    ----------
-    coordinate : of each reading, of every coordinate or along x, y, z.
-    placing : of each point of each placing, which its repeats share.
-    growth : of what grows with the distance from the first point of the placing, at the longest.
-    slow, slow_time_s : of an Ornstein–Uhlenbeck process of each coordinate, and the time over which it forgets; what never
-        does (infinity) is a random walk from the first reading on, whose root mean square over the recording ``slow`` is.
-    tails : degrees of freedom of Student's t for the readings, above 2 (their standard deviation stays); 0 for a normal.
-    resolution : steps in which coordinates are displayed; 0 for none.
-    """
-
-    coordinate: float | tuple[float, float, float] = 0.0
-    placing: float = 0.0
-    growth: float = 0.0
+    coordinate: float | tuple[float, float, float] = 0.0  # of each reading, of every coordinate or along x, y, z
+    placing: float = 0.0  # of each point of each placing, which its repeats share
+    growth: float = 0.0  # of what grows with the distance from the first point of the placing, at the longest
+    # slow, slow_time_s: of an Ornstein–Uhlenbeck process of each coordinate, and the time over which it forgets; what never
+    # does (infinity) is a random walk from the first reading on, whose root mean square over the recording ``slow`` is
     slow: float = 0.0
     slow_time_s: float = 600.0
+    # degrees of freedom of Student's t for the readings, above 2 (their standard deviation stays); 0 for a normal
     tails: float = 0.0
-    resolution: float = 0.0
+    resolution: float = 0.0  # steps in which coordinates are displayed; 0 for none
 
     def drawn(self, points: Points, random: np.random.Generator) -> Floats:
-        """Noise (n, 3), mm, of points; the display's steps are left to :meth:`displayed`.
-
-        Raises
-        ------
-        CmmUqError : slow noise is asked for, and the recording has no time.
-        """
+        """Noise (n, 3), mm, of points; the display's steps are left to :meth:`displayed`."""
         _, placing = np.unique(np.column_stack([points.measurement, points.point]), axis=0, return_inverse=True)
         offsets = self.placing * random.standard_normal((placing.max() + 1, 3))
         found = offsets[placing.ravel()] + np.asarray(self.coordinate) * self._readings(points.xyz.shape, random)

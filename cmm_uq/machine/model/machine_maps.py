@@ -14,13 +14,7 @@ WHERE = "job.toml [machine] error_map"
 
 
 def maps_of(job: Job) -> list[ErrorMap]:
-    """The error maps that a job names, each with its squareness: its own, or that of the machine.
-
-    Raises
-    ------
-    CmmUqError : there is none, one that is no error map, or one whose squareness is stated twice, or not at all beside others
-        that have it.
-    """
+    """The error maps that a job names, each with its squareness: its own, or that of the machine."""
     machine = job.facts.machine
     if not machine.error_map:
         raise CmmUqError("the job has no error map", where=WHERE,
@@ -31,19 +25,7 @@ def maps_of(job: Job) -> list[ErrorMap]:
 def maps_named(
     job: Job, named: Sequence[ErrorMapFile], squareness: SquarenessFacts | None, where: str
 ) -> list[ErrorMap]:
-    """Error maps among the inputs of a job.
-
-    Parameters
-    ----------
-    job : that was read.
-    named : their files.
-    squareness : of those that state none by themselves.
-    where : they are named, for messages.
-
-    Raises
-    ------
-    CmmUqError : see :func:`maps_of`.
-    """
+    """Error maps among the inputs of a job."""
     maps, without = [], []
     for given in named:
         path = str(job.folder / given.file)

@@ -33,50 +33,27 @@ from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel, Unknown
 from cmm_uq.maths.inference.noise import Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior
 
-ARTEFACT = "artefact"
-"""First part of the key of a size of the artefact."""
-
-_NO_MACHINE = 1000.0
-"""mm."""
-
-_SMALLEST_NOISE = 1e-6
-"""mm."""
-
-SMALL_LEAN = 100 * ARCSECOND
-"""rad: squares and products of angles up to this are 0.25 ppm."""
-
+ARTEFACT = "artefact"  # first part of the key of a size of the artefact
+_NO_MACHINE = 1000.0  # mm
+_SMALLEST_NOISE = 1e-6  # mm
+SMALL_LEAN = 100 * ARCSECOND  # rad: squares and products of angles up to this are 0.25 ppm.
+# rad: an axis that leans so is another one; least squares gets there where a recording does not show the angle
 _NO_LEAN = 1.0
-"""rad: an axis that leans so is another one; least squares gets there where a recording does not show the angle."""
-
-_MOVED = 10 * ARCSECOND
-"""rad: about an angle this far away a model is as linear."""
-
-_NO_SQUARENESS = 0.1
-"""rad: a squareness of which no more is known than this, six degrees, is not determined."""
-
+_MOVED = 10 * ARCSECOND  # rad: about an angle this far away a model is as linear
+_NO_SQUARENESS = 0.1  # rad: a squareness of which no more is known than this, six degrees, is not determined
+# condition up to which a design, in typical sizes of the parameters, is not made of the noise of the placings
 _ILL_CONDITIONED = 1e3
-"""Condition up to which a design, in typical sizes of the parameters, is not made of the noise of the placings."""
-
 _ROUNDS = 20
-
-_SIZE_SCALE = 0.1
-"""mm, a typical deviation of an artefact from its nominal size; only scales columns."""
+_SIZE_SCALE = 0.1  # mm, a typical deviation of an artefact from its nominal size; only scales columns
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Least squares at convergence, and the linear model about it.
+    """Least squares at convergence, and the linear model about it."""
 
-    Attributes
-    ----------
-    least_squares : the estimate.
-    linear : the model, linear about ``about``, whose posterior may be sampled.
-    about : (k,) the estimate; or, where the recording leaves an angle to its prior, the likeliest parameters.
-    """
-
-    least_squares: LeastSquares
-    linear: LinearModel
-    about: Floats
+    least_squares: LeastSquares  # the estimate
+    linear: LinearModel  # the model, linear about ``about``, whose posterior may be sampled
+    about: Floats  # (k,) the estimate; or, where the recording leaves an angle to its prior, the likeliest parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +77,19 @@ class MeasurementModel:
     CmmUqError : the nonlinear parameter of an effect is not given, or the artefact has no such fault.
     """
 
-    artefact: Artefact
-    effects: tuple[Effect, ...]
+    artefact: Artefact  # with its recording
+    effects: tuple[Effect, ...]  # what acts; a fault of the artefact is taken as that of this one
+    # standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated
     sigma: float | None = None
+    # (m,) which observations to use; all by default
     used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    # nonlinear parameters, held, of the effects that have some, by the effect's name
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    # a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear model
+    # is then taken about the estimate of that one
     within: MeasurementModel | None = None
+    # mm, what is not known of a coordinate however little the residuals scatter, as of a prediction that the recording is
+    # compared with
     least_noise: float = 0.0
 
     def __post_init__(self) -> None:
@@ -353,14 +337,7 @@ class MeasurementModel:
 
 
 def with_curvature(model: MeasurementModel, components: Components, posterior: NoisyPosterior) -> NoisyPosterior:
-    """The posterior of the model itself, from that of the linear model about its estimate; the same where it bends too little.
-
-    Parameters
-    ----------
-    model : with the estimate that the linear model is about.
-    components : of its noise.
-    posterior : drawn from the linear model.
-    """
+    """The posterior of the model itself; that of the linear model about its estimate where it bends too little."""
     estimate = model.estimate()
     if not model.leans_beyond(estimate.about, posterior.draws.std(axis=0), SMALL_LEAN):
         return posterior

@@ -11,39 +11,22 @@ from cmm_uq.machine.model.measurement import MeasurementModel
 from cmm_uq.machine.model.recorded import Display, display_step
 from cmm_uq.maths.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
 
+# part of the observations' variance that each of two axes must have for their noises to be told apart
 _LEAST_SHARE = 0.15
-"""Part of the observations' variance that each of two axes must have for their noises to be told apart."""
-
-_ALONG = 1e-9
-"""Part of a coordinate below which an observation does not see it."""
-
-_LEAST_TIMES = 8
-"""Different times from which on slow noise is reckoned with."""
-
-_WHOLE = 100
-"""Repeats whose mean and contrasts are one matrix without zeros; of more the matrix would fill the memory."""
-
+_ALONG = 1e-9  # part of a coordinate below which an observation does not see it
+_LEAST_TIMES = 8  # different times from which on slow noise is reckoned with
+_WHOLE = 100  # repeats whose mean and contrasts are one matrix without zeros; of more the matrix would fill the memory
+# longest over median length from which on noise may be seen to grow with it. Of three by three places, seen from a corner,
+# they are 1.41, of four by four 1.5: the last digits of a recording decide of neither.
 _LEAST_SPREAD = 1.45
-"""Longest over median length from which on noise may be seen to grow with it.
-
-Of three by three places, seen from a corner, they are 1.41, of four by four 1.5: the last digits of a recording decide of
-neither.
-"""
-
-_NO_LENGTH = 1e-3
-"""Part of the longest length that is none."""
+_NO_LENGTH = 1e-3  # part of the longest length that is none
 
 
-def noise_of(
-    model: MeasurementModel, used: np.ndarray | None = None, values: Floats | None = None
-) -> Components:  # fmt: skip
+def noise_of(model: MeasurementModel, used: np.ndarray | None = None, values: Floats | None = None) -> Components:
     """The noise of a model's observations.
 
-    Parameters
-    ----------
-    model : with its recording.
-    used : (m,) which observations; by default those that the model uses.
-    values : (k,) of the model's parameters, of a recording yet to be made; by default those that it is estimated to have.
+    ``used``: (m,) which observations; by default those that the model uses. ``values``: (k,) of the model's parameters, of a
+    recording yet to be made; by default those that it is estimated to have.
     """
     artefact = model.artefact
     chosen = model.used if used is None else used
@@ -109,9 +92,7 @@ def sensitivities(model: MeasurementModel, xyz: Floats) -> Floats:
 def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Floats]:
     """Turns observations of one point among themselves so that each sees the noise of one axis, as nearly as that goes.
 
-    Returns
-    -------
-    turn (m, m), and the sensitivities (m, slots, 3) afterwards.
+    Returns turn (m, m), and the sensitivities (m, slots, 3) afterwards.
     """
     m = len(rows)
     one = rows.shape[1] == 1 and len(np.unique(rows)) < m and np.any(sensitivity)

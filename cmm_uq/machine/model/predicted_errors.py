@@ -21,22 +21,14 @@ from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.jobs.recording.prediction import KEY, Prediction
 from cmm_uq.machine.model.artefact import Artefact, Placings
 
+# mm from where a point was recorded, within which it is taken to be predicted: no hand sets up much worse, and errors change
+# by less than their own size over it
 NEAR = 30.0
-"""mm from where a point was recorded, within which it is taken to be predicted: no hand sets up much worse, and errors change
-by less than their own size over it."""
-
-LARGEST_ERROR = 5.0
-"""mm: beyond, no machine's errors are predicted, but another artefact, or points numbered otherwise."""
-
-_REACH = 0.5
-"""Part of the artefact's size, from its middle, at which errors say by how much they stretch."""
-
-_SAME = 1e-7
-"""mm, by which a prediction differs from a recording that it is a copy of: the digits of a file."""
-
+LARGEST_ERROR = 5.0  # mm: beyond, no machine's errors are predicted, but another artefact, or points numbered otherwise
+_REACH = 0.5  # part of the artefact's size, from its middle, at which errors say by how much they stretch
+_SAME = 1e-7  # mm, by which a prediction differs from a recording that it is a copy of: the digits of a file
+# by how many times, and mm, the points must be nearer in a shifted or turned frame for that to be the prediction's
 _ANOTHER_FRAME, _ROUGHLY = 3.0, 0.1
-"""By how many times, and mm, the points must be nearer in a shifted or turned frame for that to be the prediction's."""
-
 _UNITS = ((25.4, "inches"), (1000.0, "metres"), (10.0, "centimetres"), (1e-3, "micrometres"))
 _LIKE_A_UNIT = 0.02
 
@@ -68,42 +60,23 @@ SAME = Frame(np.eye(3), np.zeros(3))
 
 @dataclass(frozen=True, eq=False)
 class PredictedErrors:
-    """What a prediction says of the points of a recording.
+    """What a prediction says of the points of a recording."""
 
-    Parameters
-    ----------
-    errors : (n, 3) indicated minus true, mm.
-    u : (n,) standard uncertainty of a predicted coordinate, mm, as it is stated.
-    turned : (n,) what there is besides because the artefact was taken to lie in another direction than it did, mm.
-    frame : of the prediction.
-    apart : largest distance of a predicted point from where it was recorded, mm; 0 of lengths.
-    unused : rows of the prediction that the recording has no point for.
-    """
-
-    errors: Floats
-    u: Floats
+    errors: Floats  # (n, 3) indicated minus true, mm
+    u: Floats  # (n,) standard uncertainty of a predicted coordinate, mm, as it is stated
+    # (n,) what there is besides because the artefact was taken to lie in another direction than it did, mm
     turned: Floats
-    frame: Frame
-    apart: float
-    unused: int
+    frame: Frame  # of the prediction
+    apart: float  # largest distance of a predicted point from where it was recorded, mm; 0 of lengths
+    unused: int  # rows of the prediction that the recording has no point for
 
 
 def predicted_errors(
     artefact: Artefact, prediction: Prediction, where: str, *, length_mm: float | None = None
-) -> PredictedErrors:  # fmt: skip
+) -> PredictedErrors:
     """The errors that a prediction contains, at the points of a recording.
 
-    Parameters
-    ----------
-    artefact : with its recording.
-    prediction : of its points, or of its lengths.
-    where : the recording's name, for messages.
-    length_mm : of the artefact, as the simulation took it; that of the artefact by default.
-
-    Raises
-    ------
-    CmmUqError : a point is not predicted, is predicted somewhere else or in another unit, or the recording is predicted to
-        its last digit.
+    ``length_mm``: of the artefact, as the simulation took it; that of the artefact by default.
     """
     rows, unused = _matched(artefact.points, prediction, where)
     sizes = _sizes(artefact, length_mm)
@@ -196,12 +169,7 @@ def _of_turning(points: Points, predicted: Floats, errors: Floats) -> Floats:
 
 
 def _frame(prediction: Prediction, rows: Ints, recorded: Floats) -> Frame:
-    """The frame of the prediction: the recording's own, or one shifted, or shifted and turned, against it.
-
-    Raises
-    ------
-    CmmUqError : in none of them every point is predicted near to where it was recorded.
-    """
+    """The frame of the prediction: the recording's own, or one shifted, or shifted and turned, against it."""
     predicted = prediction.xyz[rows]
     frames = (SAME, Frame(np.eye(3), np.median(recorded - predicted, axis=0)), _turned(predicted, recorded))
     far = [np.linalg.norm(frame.of(predicted) - recorded, axis=1) for frame in frames]

@@ -18,27 +18,18 @@ from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import check_length, place, stated_sd
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-LEAST_POINTS = 4
-"""Points that a centre and a distance need, not all in one plane."""
-
-_FLAT = 1e-3
-"""Extent across a plane over the extent in it below which the side that the centre lies on is a guess."""
+LEAST_POINTS = 4  # points that a centre and a distance need, not all in one plane
+_FLAT = 1e-3  # extent across a plane over the extent in it below which the side that the centre lies on is a guess
 
 
 class Radial(Artefact):
-    """Points at one distance from a free centre: n observations of n points.
+    """Points at one distance from a free centre: n observations of n points."""
 
-    Attributes
-    ----------
-    per_size : distance from the centre over the size that the certificate gives (a diameter: ½).
-    size_title, size_what : of that size, with and without whose.
-    plural : what is measured, for messages.
-    """
-
-    per_size: ClassVar[float]
+    per_size: ClassVar[float]  # distance from the centre over the size that the certificate gives (a diameter: ½)
+    # size_title, size_what: of that size, with and without whose
     size_title: ClassVar[Text]
     size_what: ClassVar[Text]
-    plural: ClassVar[str]
+    plural: ClassVar[str]  # what is measured, for messages
 
     def __init__(
         self, facts: ArtefactFacts, points: Points, centred: Placings, expansion: Floats, where: str | None
@@ -68,7 +59,6 @@ class Radial(Artefact):
             )
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`: every point moved along its normal onto the sphere about the least-squares centre."""
         away = true_xyz - self.centres(true_xyz, sizes[0])[self.centred.index]
         squares = np.einsum("ni,ni->n", away, away)
         directions = away / np.sqrt(squares)[:, None] if self._normals is None else self._normals
@@ -78,15 +68,12 @@ class Radial(Artefact):
         return np.asarray(true_xyz + step[:, None] * directions, dtype=np.float64)
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`: displacement away from the centre."""
         return np.asarray(np.einsum("ni,nik->nk", self.directions(xyz), displacement), dtype=np.float64)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`."""
         return np.asarray(self.per_size * self.expansion[:, None], dtype=np.float64)
 
     def placing(self, xyz: Floats) -> Freedoms:
-        """See :meth:`Artefact.placing`: three freedoms of each centre."""
         return self.centred.columns(self.directions(xyz))
 
     def directions(self, xyz: Floats) -> Floats:

@@ -57,14 +57,7 @@ def place(points: Points, rows: NDArray[np.bool_], where: str | None) -> str:
 def check_length(measured: float, certified: float, what: str, where: str | None) -> None:
     """Refuse lengths that differ by a factor that only a mistaken unit or another artefact explains.
 
-    Parameters
-    ----------
-    measured, certified : mm.
-    what : in the plural, as ``the recorded bars``.
-
-    Raises
-    ------
-    CmmUqError : they differ so, with the mistake that explains it.
+    ``measured, certified``: mm. ``what``: in the plural, as ``the recorded bars``.
     """
     if not certified > 0:
         raise CmmUqError(f"{what} are {measured:.6g} mm long on average, and their references lie all in one place",
@@ -83,26 +76,17 @@ def check_length(measured: float, certified: float, what: str, where: str | None
 
 
 INCH = 25.4
-NANOMETRE = 1e-6
-"""mm."""
-
-_EXACT = 1e-5
-"""Part of a step by which a coordinate on the grid may be off, as from a unit's conversion."""
-
-_LEAST_VALUES = 12
-"""Different coordinates from which on a grid is no coincidence."""
-
-_LEAST_SHARE = 0.01
-"""Part of the variance of a coordinate from which on the steps matter."""
+NANOMETRE = 1e-6  # mm
+_EXACT = 1e-5  # part of a step by which a coordinate on the grid may be off, as from a unit's conversion
+_LEAST_VALUES = 12  # different coordinates from which on a grid is no coincidence
+_LEAST_SHARE = 0.01  # part of the variance of a coordinate from which on the steps matter
 
 
 def display_step(xyz: Floats, scatter: float) -> float:
     """Largest step, mm, of which all coordinates are multiples; 0 where it is too fine to matter, or there is none.
 
-    Parameters
-    ----------
-    xyz : (n, 3) mm as recorded.
-    scatter : of a coordinate, mm, as the residuals show it: a step s has the variance s²/12.
+    ``xyz``: (n, 3) mm as recorded. ``scatter``: of a coordinate, mm, as the residuals show it: a step s has the variance
+    s²/12.
     """
     values = np.unique(xyz[np.isfinite(xyz)])
     steps = [f * unit * 10.0**-k for unit in (1.0, INCH) for k in range(1, 6) for f in (5.0, 2.0, 1.0)]
@@ -119,11 +103,8 @@ def display_step(xyz: Floats, scatter: float) -> float:
 def of_last_digit(xyz: Floats, scatter: float) -> float:
     """Standard deviation, mm, that the last digit of figures leaves open, or a nanometre; 0 where residuals show more.
 
-    Parameters
-    ----------
-    xyz : (n, 3) mm as recorded.
-    scatter : of a coordinate, mm, as the residuals show it: of figures without noise, of copies and of their differences, less
-        than the digits can tell.
+    ``xyz``: (n, 3) mm as recorded. ``scatter``: of a coordinate, mm, as the residuals show it: of figures without noise, of
+    copies and of their differences, less than the digits can tell.
     """
     least = max(display_step(xyz, scatter) / float(np.sqrt(12)), NANOMETRE)
     return least if scatter < least else 0.0
@@ -131,20 +112,12 @@ def of_last_digit(xyz: Floats, scatter: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Display:
-    """Rounding to steps that are not small beside the noise: it follows the coordinates, and so looks like physics.
+    """Rounding to steps that are not small beside the noise: it follows the coordinates, and so looks like physics."""
 
-    Parameters
-    ----------
-    step : mm.
-    xyz : (n, 3) coordinates as a model has them, mm, without noise and not rounded.
-    rows : (m, j) points of each observation.
-    sensitivity : (m, j, 3) of the observations to their points.
-    """
-
-    step: float
-    xyz: Floats
-    rows: Ints
-    sensitivity: Floats
+    step: float  # mm
+    xyz: Floats  # (n, 3) coordinates as a model has them, mm, without noise and not rounded
+    rows: Ints  # (m, j) points of each observation
+    sensitivity: Floats  # (m, j, 3) of the observations to their points
 
     @classmethod
     def of(cls, step: float, recorded: Floats, rows: Ints, sensitivity: Floats, residual: Floats) -> Display:

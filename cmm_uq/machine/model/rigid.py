@@ -20,19 +20,16 @@ from cmm_uq.machine.model.recorded import place
 from cmm_uq.maths.geometry.feature import nearest_rotations
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-_ANOTHER_SHAPE = 0.05
-"""rms misfit over the extent from which on a recording cannot be of this artefact."""
+_ANOTHER_SHAPE = 0.05  # rms misfit over the extent from which on a recording cannot be of this artefact
 
 
 class Rigid(Artefact):
     """A rigid artefact as recorded: 3n observations (three coordinates of each point in turn) of n points.
 
-    Attributes
-    ----------
-    placings : which points stand in one placing.
-    body : (n, 3) nominal positions about the middle of each placing, in the artefact's axes and at its temperature, mm.
+    ``placings``: which points stand in one placing.
     """
 
+    # (n, 3) nominal positions about the middle of each placing, in the artefact's axes and at its temperature, mm
     body: Floats
 
     def __init__(self, points: Points) -> None:
@@ -47,18 +44,15 @@ class Rigid(Artefact):
         """Positions (n, 3) about the middle of each placing for these sizes, in the artefact's axes, mm."""
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`: the artefact turned and moved by least squares."""
         shape = self.shape(sizes)
         turned = np.einsum("nij,nj->ni", self.attitudes(true_xyz, shape), shape)
         return np.asarray(self.placings.means(true_xyz) + turned, dtype=np.float64)
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`: every coordinate, along the artefact's own axes."""
         own = np.einsum("nij,nik->njk", self.attitudes(xyz), displacement)
         return np.asarray(own.reshape(3 * len(xyz), displacement.shape[2]), dtype=np.float64)
 
     def placing(self, xyz: Floats) -> Freedoms:
-        """See :meth:`Artefact.placing`: three translations and three rotations of each placing."""
         turns = np.cross(np.eye(3)[None, :, :], self.body[:, None, :])
         freedoms = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=1).transpose(0, 2, 1)
         return self.placings.columns(freedoms)
@@ -66,24 +60,20 @@ class Rigid(Artefact):
     def attitudes(self, xyz: Floats, shape: Floats | None = None) -> Floats:
         """Rotation (n, 3, 3) from the artefact's axes to the machine's, by least squares in each placing (Kabsch 1976).
 
-        Parameters
-        ----------
-        xyz : (n, 3) where the points were found, mm.
-        shape : (n, 3) about the middle of each placing, mm; the nominal one by default.
+        ``xyz``: (n, 3) where the points were found, mm. ``shape``: (n, 3) about the middle of each placing, mm; the nominal
+        one by default.
         """
         body = self.body if shape is None else shape
         moment = self.placings.sums(np.einsum("ni,nj->nij", xyz - self.placings.means(xyz), body))
         return np.asarray(nearest_rotations(moment)[self.placings.index], dtype=np.float64)
 
     def words_of(self, observation: int) -> Text:
-        """See :meth:`Artefact.words_of`: one coordinate of a point."""
         return say(
             "the coordinate along the {title:small}'s {axis} of {what}",
             title=self.title, axis=Verbatim(AXES[observation % 3]), what=super().words_of(observation),
         )  # fmt: skip
 
     def unread(self) -> NDArray[np.bool_]:
-        """See :meth:`Artefact.unread`: the artefact's axis along which the machine's coordinate stood still."""
         return self.placings.unread(self.points.xyz, self.attitudes(self.points.xyz)).ravel()
 
     def deviations(self) -> Floats:
@@ -97,12 +87,7 @@ class Rigid(Artefact):
         return nominal, found
 
     def refuse_another_shape(self, fix: str, where: str | None) -> None:
-        """Refuse a recording none of whose placings has the artefact's shape.
-
-        Raises
-        ------
-        CmmUqError : the positions miss the shape by far more than any machine's errors.
-        """
+        """Refuse a recording none of whose placings has the artefact's shape."""
         misfit = np.sqrt(self.placings.sums(np.sum(self.deviations() ** 2, axis=1))) / self.extents()[0]
         if np.all(misfit > _ANOTHER_SHAPE):
             number = self.placings.numbers[0]

@@ -43,11 +43,9 @@ FURTHER = MappingProxyType(
 )
 """Further built-in effects by name."""
 
+# faults of the artefact itself by name: what they do follows from the artefact that has them
 OWN = MappingProxyType({effect.name: effect for effect in (*own_errors.EFFECTS, *own_states.EFFECTS)})
-"""Faults of the artefact itself by name: what they do follows from the artefact that has them."""
-
-EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})
-"""All built-in effects by name."""
+EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})  # all built-in effects by name
 
 
 def every() -> Mapping[str, Effect]:

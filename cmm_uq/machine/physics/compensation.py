@@ -25,11 +25,9 @@ from cmm_uq.machine.physics.kinematics import Chain, exact, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.maths.geometry import Plane, fit_plane
 
-SETTLED = 1e-10
-"""Change of a coordinate, mm, at which the inverse is found."""
+SETTLED = 1e-10  # change of a coordinate, mm, at which the inverse is found
 MAX_ROUNDS = 50
-BLOCK = 8192
-"""Points computed at a time: as many as a processor's cache holds with all that is between."""
+BLOCK = 8192  # points computed at a time: as many as a processor's cache holds with all that is between
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +70,13 @@ class Compensation:
     beyond : what to do beyond the mapped positions and temperatures.
     """
 
-    maps: ErrorMaps
-    chain: str | Chain = "XYZ"
-    origin: Floats | tuple[float, float, float] = (0.0, 0.0, 0.0)
+    maps: ErrorMaps  # its error maps
+    chain: str | Chain = "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.Chain.of`.
+    origin: Floats | tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) scale reading = coordinate + origin, mm
+    # True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004 eq. 10–13), on
+    # axes that lean exactly.
     rigid: bool = False
-    beyond: Beyond = "refuse"
+    beyond: Beyond = "refuse"  # what to do beyond the mapped positions and temperatures
 
     def error(self, indicated: Floats, when: Circumstances = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """Error e (n, 3) in mm of indicated coordinates, and which points (n,) were extrapolated.
@@ -166,24 +166,14 @@ def compensate_points(points: Points, compensation: Compensation) -> Points:
 def machine_compensation(
     points: Points, maps: ErrorMaps, *, rigid: bool = False, beyond: Beyond = "refuse"
 ) -> Compensation:
-    """Compensation of the machine that read the points, after a check that every map covers its travel.
-
-    Raises
-    ------
-    CmmUqError : a map does not cover the travel.
-    """
+    """Compensation of the machine that read the points, after a check that every map covers its travel."""
     for error_map in maps.maps:
         error_map.covers(points.machine)
     return Compensation(maps, points.machine.chain, points.machine.origin_mm, rigid, beyond)
 
 
 def circumstances(points: Points) -> Circumstances:
-    """Tip offsets and temperatures of the scales, where the recording has their columns.
-
-    Raises
-    ------
-    CmmUqError : a column is there for some axes only.
-    """
+    """Tip offsets and temperatures of the scales, where the recording has their columns."""
     return Circumstances(_three(points.columns, "tip_{}_mm"), _three(points.columns, "temp_{}_c"), points.lines)
 
 
@@ -204,8 +194,8 @@ def _moved(points: Points, xyz: Floats, extrapolated: NDArray[np.bool_]) -> Poin
     return replace(points, xyz=xyz, columns=columns)
 
 
+# the largest angle between normal and approach unless another is chosen, rad; the patent leaves it to the user
 ACCEPTANCE = np.pi / 3
-"""The largest angle between normal and approach unless another is chosen, rad; the patent leaves it to the user."""
 
 
 class DirectionPointError(CmmUqError):
@@ -218,24 +208,14 @@ class DirectionPointError(CmmUqError):
 
 @dataclass(frozen=True, eq=False)
 class OffsetPlane:
-    """A plane surface, compensated for the probe's offset.
+    """A plane surface, compensated for the probe's offset."""
 
-    Parameters
-    ----------
-    point : (3,) of the surface, mm: the centroid of the contact points, moved.
-    normal : (3,) unit normal out of the material, towards the probe.
-    covariance : (6, 6) of point and normal, mm² and rad².
-    angle : between normal and the direction of approach, the largest of several, rad.
-    reversed : whether the fitted normal had to be turned round.
-    contact : the plane through the points of contact.
-    """
-
-    point: Floats
-    normal: Floats
-    covariance: Floats
-    angle: float
-    reversed: bool
-    contact: Plane
+    point: Floats  # (3,) of the surface, mm: the centroid of the contact points, moved
+    normal: Floats  # (3,) unit normal out of the material, towards the probe
+    covariance: Floats  # (6, 6) of point and normal, mm² and rad²
+    angle: float  # between normal and the direction of approach, the largest of several, rad
+    reversed: bool  # whether the fitted normal had to be turned round
+    contact: Plane  # the plane through the points of contact
 
 
 def offset_plane(
@@ -314,4 +294,4 @@ def _refuse_slanting(angles: Floats, acceptance: float) -> None:
         f"the direction point is rejected: it was approached at {beside:.1f}° to the plane's normal, accepted are "
         f"{np.degrees(acceptance):.1f}°",
         "Measure the direction point again nearer to the normal, just before contact, and then the points of contact",
-    )  # fmt: skip
+    )

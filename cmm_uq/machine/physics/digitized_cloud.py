@@ -19,20 +19,13 @@ TEMPERATURES = tuple(f"temp_{axis}_c" for axis in AXES)
 
 @dataclass(frozen=True, eq=False)
 class DigitizedCloud:
-    """What makes coordinates of the rows of a cloud.
+    """What makes coordinates of the rows of a cloud."""
 
-    Parameters
-    ----------
-    poses : the digitizer in each of its poses, by number.
-    columns : of the rows; the first five are u, v, D, E, F.
-    temperatures_at : temperatures (n, 3) of the scales at times (n,), where a log gives them.
-    flagged : whether the result has a fourth column, 1 where a point was extrapolated beyond the maps.
-    """
-
-    poses: Mapping[int, Digitizer]
-    columns: tuple[str, ...]
+    poses: Mapping[int, Digitizer]  # the digitizer in each of its poses, by number
+    columns: tuple[str, ...]  # of the rows; the first five are u, v, D, E, F
+    # temperatures (n, 3) of the scales at times (n,), where a log gives them
     temperatures_at: Callable[[Floats], Floats] | None = None
-    flagged: bool = False
+    flagged: bool = False  # whether the result has a fourth column, 1 where a point was extrapolated beyond the maps
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -40,13 +33,7 @@ class DigitizedCloud:
         return (*COORDINATES, EXTRAPOLATED) if self.flagged else COORDINATES
 
     def __call__(self, rows: Floats) -> Floats:
-        """Coordinates (n, 3), or (n, 4) with the flag, of rows (n, k).
-
-        Raises
-        ------
-        CmmUqError : a value is not finite, a pose is not known, no temperature is known at a time, or a point is refused by
-            the error maps.
-        """
+        """Coordinates (n, 3), or (n, 4) with the flag, of rows (n, k)."""
         finite = np.isfinite(rows)
         if not finite.all():
             row, column = np.argwhere(~finite)[0]
@@ -89,16 +76,8 @@ class DigitizedCloud:
 def columns_for(header: Sequence[str] | None, poses: int, *, logged: bool, where: str) -> tuple[str, ...]:
     """Columns that a cloud is read by.
 
-    Parameters
-    ----------
-    header : its columns; ``None`` for arrays, which have no names: u, v, D, E, F, and the time where there is a log.
-    poses : how many there are.
-    logged : whether a log gives the temperatures of the scales.
-    where : the cloud, for messages.
-
-    Raises
-    ------
-    CmmUqError : a column is missing, or states what the log states as well.
+    ``header``: its columns; ``None`` for arrays, which have no names: u, v, D, E, F, and the time where there is a log.
+    ``logged``: whether a log gives the temperatures of the scales.
     """
     if header is None:
         if poses > 1:

@@ -71,15 +71,9 @@ def scan_plane(readings: Floats, towards: Floats, *, u_point: float | None = Non
 
     A fixed detector finds the plane; the scale readings at which the light falls on it span a plane parallel to it.
 
-    Parameters
-    ----------
-    readings : (n, 3) scale readings, n ≥ 3, mm.
-    towards : (3,) roughly the way w points, out of the digitizer's back: three points do not tell it from its opposite.
-    u_point : standard uncertainty of a point along w, mm; needed for three points, else estimated when left out.
-
-    Raises
-    ------
-    CmmUqError : points on one line, or ``towards`` in the plane.
+    ``readings``: (n, 3) scale readings, n ≥ 3, mm. ``towards``: (3,) roughly the way w points, out of the digitizer's back:
+    three points do not tell it from its opposite. ``u_point``: standard uncertainty of a point along w, mm; needed for three
+    points, else estimated when left out.
     """
     if len(readings) == 3 and u_point is None:
         raise CmmUqError(
@@ -106,16 +100,9 @@ def scan_plane(readings: Floats, towards: Floats, *, u_point: float | None = Non
 def scan_roll(scan: Floats, readings: Floats, alpha: float, beta: float, nominal: float) -> float:
     """Euler angle γ in rad from the scan of a plane surface: the angle with which its points lie in one plane.
 
-    Parameters
-    ----------
-    scan : (n, 2) u, v, mm.
-    readings : (n, 3) scale readings, mm. They must move in two directions, else γ and the surface's slope are one.
-    alpha, beta : rad.
-    nominal : γ as the wrist is indexed, rad; moves in two directions leave a second solution, half a turn away.
-
-    Raises
-    ------
-    CmmUqError : the motion does not determine γ, or it is far from the nominal one.
+    ``scan``: (n, 2) u, v, mm. ``readings``: (n, 3) scale readings, mm. They must move in two directions, else γ and the
+    surface's slope are one. ``alpha, beta``: rad. ``nominal``: γ as the wrist is indexed, rad; moves in two directions leave
+    a second solution, half a turn away.
     """
 
     def placed(gamma: float) -> Floats:
@@ -158,9 +145,7 @@ def mount_axes(rotation: Floats) -> tuple[Floats, Floats, Floats]:
     Z follows from εX and εY, X from Z and εZ, Y is their cross product. The source prints −tan εZ in (30), which is a
     left-handed rotation and contradicts its own (11); here every rotation follows the right hand.
 
-    Parameters
-    ----------
-    rotation : (3, n) sums of the carriages' rotations about X, Y, Z, rad (eq. 26–28).
+    ``rotation``: (3, n) sums of the carriages' rotations about X, Y, Z, rad (eq. 26–28).
     """
     tx, ty, tz = np.tan(rotation)
     Z = np.array([ty, -tx, np.ones_like(tx)])
@@ -182,9 +167,9 @@ class Digitizer:
     compensation : of the machine; its origin is that of the scale readings, so usually 0.
     """
 
-    attitude: Floats
-    offset: Floats
-    compensation: Compensation
+    attitude: Floats  # (3, 3); see :func:`euler_313`
+    offset: Floats  # (3,) [U1 V1 W1], the mount in the digitizer's frame, mm
+    compensation: Compensation  # of the machine; its origin is that of the scale readings, so usually 0
 
     def coordinates(
         self, scan: Floats, readings: Floats, temperatures: Floats | float | None = None
@@ -244,20 +229,14 @@ class Digitizer:
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """One pose of the digitizer, aligned.
+    """One pose of the digitizer, aligned."""
 
-    Parameters
-    ----------
-    alpha, beta, gamma : Euler angles 3-1-3, rad.
-    reading : (3,) [D0 E0 F0], the scale reading with the scan plane's origin at the centre of the sphere, mm.
-    covariance : (3, 3) of the reading, mm².
-    """
-
+    # alpha, beta, gamma: Euler angles 3-1-3, rad
     alpha: float
     beta: float
     gamma: float
-    reading: Floats
-    covariance: Floats
+    reading: Floats  # (3,) [D0 E0 F0], the scale reading with the scan plane's origin at the centre of the sphere, mm
+    covariance: Floats  # (3, 3) of the reading, mm²
 
     @property
     def attitude(self) -> Floats:
@@ -276,16 +255,8 @@ def align_on_sphere(
 
     The covariance is that of the fitted centre, σ²(JᵀJ)⁻¹; systematic lines (the ball's form, the scales) are added to it.
 
-    Parameters
-    ----------
-    scan : (n, 2) u, v in the scan plane, mm.
-    readings : (n, 3) scale readings, mm.
-    alpha, beta, gamma : attitude, rad.
-    u_point : standard uncertainty of a point, mm; from the residuals when left out.
-
-    Raises
-    ------
-    CmmUqError : the points do not determine a sphere.
+    ``scan``: (n, 2) u, v in the scan plane, mm. ``readings``: (n, 3) scale readings, mm. ``alpha, beta, gamma``: attitude,
+    rad. ``u_point``: standard uncertainty of a point, mm; from the residuals when left out.
     """
     sphere = fit_sphere(scan @ euler_313(alpha, beta, gamma)[:, :2].T + readings, u_point=u_point)
     return Alignment(alpha, beta, gamma, sphere.centre, sphere.covariance[:3, :3])
@@ -293,24 +264,14 @@ def align_on_sphere(
 
 @dataclass(frozen=True, eq=False)
 class MountOffset:
-    """Offset of the mount from the digitizer's origin, and the centre of the reference sphere.
+    """Offset of the mount from the digitizer's origin, and the centre of the reference sphere."""
 
-    Parameters
-    ----------
-    offset : (3,) [U1 V1 W1] in the digitizer's frame, mm.
-    sphere : (3,) in the machine's home frame, mm.
-    covariance : (6, 6) of offset and sphere, mm².
-    residuals : (m, 3) readings less those that offset and sphere give, mm.
-    chi_squared : weighted sum of their squares.
-    degrees_of_freedom : 3m − 6.
-    """
-
-    offset: Floats
-    sphere: Floats
-    covariance: Floats
-    residuals: Floats
-    chi_squared: float
-    degrees_of_freedom: int
+    offset: Floats  # (3,) [U1 V1 W1] in the digitizer's frame, mm
+    sphere: Floats  # (3,) in the machine's home frame, mm
+    covariance: Floats  # (6, 6) of offset and sphere, mm²
+    residuals: Floats  # (m, 3) readings less those that offset and sphere give, mm
+    chi_squared: float  # weighted sum of their squares
+    degrees_of_freedom: int  # 3m − 6
 
     @property
     def u(self) -> Floats:
@@ -323,13 +284,7 @@ def mount_offset(alignments: Sequence[Alignment]) -> MountOffset:
 
     Every alignment says D0 = S + E·[U1 V1 W1], S being the centre of the sphere.
 
-    Parameters
-    ----------
-    alignments : three or more attitudes; two that turn about one axis only leave the offset along it unknown.
-
-    Raises
-    ------
-    CmmUqError : the attitudes do not determine the offset.
+    ``alignments``: three or more attitudes; two that turn about one axis only leave the offset along it unknown.
     """
     rows = np.vstack([np.hstack([a.attitude, np.eye(3)]) for a in alignments]) if alignments else np.zeros((0, 6))
     if len(rows) < 6 or np.linalg.matrix_rank(rows, tol=1e-6) < 6:
@@ -361,10 +316,8 @@ def three_alignment_offset(readings: Floats, u: Floats) -> tuple[Floats, Floats]
 
     It uses six of the nine equations with equal weight. The source prints u(U1) = 35.1 µm where (22) gives 15.9 µm.
 
-    Parameters
-    ----------
-    readings : (3, 3) [D E F] of alignment 1 (α = β = 90°, γ = 0), 2 (the same, γ = 90°), 3 (α = 180°, β = 90°, γ = 0), mm.
-    u : (3,) standard uncertainties of D, E, F, mm.
+    ``readings``: (3, 3) [D E F] of alignment 1 (α = β = 90°, γ = 0), 2 (the same, γ = 90°), 3 (α = 180°, β = 90°, γ = 0),
+    mm. ``u``: (3,) standard uncertainties of D, E, F, mm.
     """
     (D1, E1, F1), (_, E2, F2), (D3, E3, _) = readings
     offset = 0.5 * np.array([E1 - E2 + F2 - F1, E1 - E2 - F2 + F1, D1 - D3 + E3 - E1])

@@ -31,25 +31,16 @@ from cmm_uq.base.points import AXES, Floats, Machine
 from cmm_uq.base.units import ARCSECOND, MICROMETRE
 
 COLUMNS = ("dx_um", "dy_um", "dz_um", "rx_arcsec", "ry_arcsec", "rz_arcsec")
-UNITS = np.array([MICROMETRE] * 3 + [ARCSECOND] * 3)
-"""Unit of each column, in mm and rad."""
-
-FINE_UM, STEP_UM = 0.5, 0.01
-"""A map with no displacement above the one and some below the other was not written in µm."""
+UNITS = np.array([MICROMETRE] * 3 + [ARCSECOND] * 3)  # unit of each column, in mm and rad
+FINE_UM, STEP_UM = 0.5, 0.01  # A map with no displacement above the one and some below the other was not written in µm
 
 
 @dataclass(frozen=True, eq=False)
 class AxisErrors:
-    """Errors of one carriage.
+    """Errors of one carriage."""
 
-    Parameters
-    ----------
-    positions : (m,) scale readings, mm, increasing.
-    errors : (m, 6) displacements along x, y, z in mm and rotations about x, y, z in rad.
-    """
-
-    positions: Floats
-    errors: Floats
+    positions: Floats  # (m,) scale readings, mm, increasing
+    errors: Floats  # (m, 6) displacements along x, y, z in mm and rotations about x, y, z in rad
 
     @property
     def span(self) -> tuple[float, float]:
@@ -59,22 +50,13 @@ class AxisErrors:
 
 @dataclass(frozen=True, eq=False)
 class ErrorMap:
-    """Errors of carriages x, y, z, and the squareness of the axes, at one temperature.
+    """Errors of carriages x, y, z, and the squareness of the axes, at one temperature."""
 
-    Parameters
-    ----------
-    axes : carriages x, y, z.
-    squareness : (3,) Sxy, Syz, Szx, rad.
-    temperature : at which it was taken, °C.
-    source : where it comes from.
-    sha256 : of the file, where it comes from one.
-    """
-
-    axes: tuple[AxisErrors, AxisErrors, AxisErrors]
-    squareness: Floats = field(default_factory=lambda: np.zeros(3))
-    temperature: float = 20.0
-    source: str = ""
-    sha256: str = ""
+    axes: tuple[AxisErrors, AxisErrors, AxisErrors]  # carriages x, y, z
+    squareness: Floats = field(default_factory=lambda: np.zeros(3))  # (3,) Sxy, Syz, Szx, rad
+    temperature: float = 20.0  # at which it was taken, °C
+    source: str = ""  # where it comes from
+    sha256: str = ""  # of the file, where it comes from one
 
     def with_squareness_arcsec(self, xy: float, yz: float, zx: float) -> ErrorMap:
         """The map with squareness errors in ″, in the project's sign: e_x = −Sxy·y, e_y = −Syz·z, e_x = −Szx·z."""
@@ -88,12 +70,7 @@ class ErrorMap:
         }
 
     def covers(self, machine: Machine) -> None:
-        """Check that the map reaches over the machine's travel.
-
-        Raises
-        ------
-        CmmUqError : it does not, where the machine's travel is known.
-        """
+        """Check that the map reaches over the machine's travel."""
         for axis, carriage in zip(AXES, self.axes, strict=True):
             low, high = machine.travel_mm[AXES.index(axis)]
             first, last = carriage.span
@@ -114,16 +91,8 @@ def read_error_map(path: Path, *, temperature: float = 20.0, units_checked: bool
 def parse_error_map(content: bytes, where: str, *, temperature: float = 20.0, units_checked: bool = True) -> ErrorMap:
     """Error map from the content of a CSV file with ``axis, position_mm`` and :data:`COLUMNS`.
 
-    Parameters
-    ----------
-    content : of the file, UTF-8.
-    where : its name, for messages.
-    temperature : at which the map was taken, °C.
-    units_checked : refuse numbers that cannot be µm and arc seconds.
-
-    Raises
-    ------
-    CmmUqError : what is wrong, with its line.
+    ``content``: of the file, UTF-8. ``temperature``: at which the map was taken, °C. ``units_checked``: refuse numbers that
+    cannot be µm and arc seconds.
     """
     table = csv_table(content, where, ("axis", "position_mm", *COLUMNS), most_rows=MAP_ROWS)
     unknown = [name for name in table.header if name not in ("axis", "position_mm", *COLUMNS)]
@@ -158,16 +127,7 @@ def write_error_map(error_map: ErrorMap, path: Path) -> None:
 
 
 def check_positions(axis: str, positions: Sequence[float], places: Sequence[str], where: str) -> None:
-    """Refuse positions that are too few, unsorted or there twice.
-
-    Parameters
-    ----------
-    places : file and line of each position.
-
-    Raises
-    ------
-    CmmUqError : with the place of the first that is wrong.
-    """
+    """Refuse positions that are too few, unsorted or there twice."""
     if len(positions) < 2:
         raise CmmUqError(f"axis {axis} has {len(positions)} positions", where=where, fix="An axis needs two or more")
     seen = set(positions[:1])
@@ -186,12 +146,7 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
 
 
 def check_units(carriages: Sequence[AxisErrors], where: str) -> None:
-    """Refuse a map whose numbers cannot be µm and arc seconds: a thousand times too small, or far too large.
-
-    Raises
-    ------
-    CmmUqError : they cannot, and which unit they seem to have.
-    """
+    """Refuse a map whose numbers cannot be µm and arc seconds: a thousand times too small, or far too large."""
     displacements = np.abs(np.concatenate([c.errors[:, :3].ravel() for c in carriages])) / MICROMETRE
     rotations = np.abs(np.concatenate([c.errors[:, 3:].ravel() for c in carriages])) / ARCSECOND
     fix = "Convert displacements to µm and rotations to arc seconds"
@@ -227,8 +182,8 @@ _TABLE = re.compile(r"map data:\s*([xyz])[\s-]*axis", re.IGNORECASE)
 _SQUARENESS = re.compile(r"\b(xy|yz|zx|xz)\s*:\s*(\S+)", re.IGNORECASE)
 _LETTERS = re.compile(r"[xyz](?:\s+[xyz]){6}", re.IGNORECASE)
 _STRAY = str.maketrans(dict.fromkeys("□•·■", " "))
+# columns after the position as appendix B has them: linear, straightness twice, rotation three times
 _ORDER = {"x": "xyzyzx", "y": "yzxxzy", "z": "zxyxyz"}
-"""Columns after the position as appendix B has them: linear, straightness twice, rotation three times."""
 
 
 @dataclass
@@ -244,25 +199,14 @@ class _Reading:
 def read_error_map_text(path: Path, *, temperature: float = 20.0) -> ErrorMap:
     """Error map and squareness from a contractor's text file.
 
-    Parameters
-    ----------
-    temperature : at which it was taken, °C; the file does not say.
-
-    Raises
-    ------
-    CmmUqError : what is wrong, with its line.
+    ``temperature``: at which it was taken, °C; the file does not say.
     """
     content = content_of(path, MAP_BYTES, "Check the name of the map")
     return parse_error_map_text(content, str(path), temperature=temperature)
 
 
 def parse_error_map_text(content: bytes, where: str, *, temperature: float = 20.0) -> ErrorMap:
-    """Error map and squareness from the content of a contractor's text file; see :func:`read_error_map_text`.
-
-    Raises
-    ------
-    CmmUqError : the text is too long, incomplete, or not in µm and arc seconds.
-    """
+    """Error map and squareness from the content of a contractor's text file; see :func:`read_error_map_text`."""
     reading = _Reading()
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     if len(lines) > MAP_ROWS.most or len(max(lines, key=len, default="")) > LINE.most:
@@ -369,15 +313,7 @@ _FORMS = (
 def parse_map_file(content: bytes, where: str, *, temperature: float = 20.0) -> tuple[ErrorMap, bool]:
     """Error map from the content of a file, and whether the file states the squareness.
 
-    Parameters
-    ----------
-    content : of the file, UTF-8.
-    where : its name, for messages.
-    temperature : at which the map was taken, °C.
-
-    Raises
-    ------
-    CmmUqError : it is neither form, or both, or something in it is wrong, with its line.
+    ``content``: of the file, UTF-8. ``temperature``: at which the map was taken, °C.
     """
     text = content.decode("utf-8-sig", errors="replace")
     header = next((line for line in text.splitlines() if line.strip(" ,\t") and not line.lstrip().startswith("#")), "")

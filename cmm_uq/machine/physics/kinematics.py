@@ -25,8 +25,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.points import AXES, Floats
 
-SQUARENESSES = ("xy", "yz", "zx")
-"""Pairs of axes in the order in which every squareness array here keeps them."""
+SQUARENESSES = ("xy", "yz", "zx")  # pairs of axes in the order in which every squareness array here keeps them
 
 
 @dataclass(frozen=True)
@@ -102,25 +101,14 @@ def _squareness(a: str, b: str) -> ParametricError | None:
 
 @dataclass(frozen=True)
 class Chain:
-    """Carriages from the workpiece to the probe.
+    """Carriages from the workpiece to the probe."""
 
-    Parameters
-    ----------
-    order : indices of the axes, workpiece side first.
-    workpiece : how many of them, from the first, move the workpiece; the others move the probe.
-    """
-
-    order: tuple[int, int, int] = (0, 1, 2)
-    workpiece: int = 0
+    order: tuple[int, int, int] = (0, 1, 2)  # indices of the axes, workpiece side first
+    workpiece: int = 0  # how many of them, from the first, move the workpiece; the others move the probe
 
     @staticmethod
     def of(text: str | Chain) -> Chain:
-        """Chain from its letters: ``XYZ``, all carriages move the probe; ``XFYZ``, X moves the workpiece (F = frame).
-
-        Raises
-        ------
-        CmmUqError : not the three axes once each, with F at most once.
-        """
+        """Chain from its letters: ``XYZ``, all carriages move the probe; ``XFYZ``, X moves the workpiece (F = frame)."""
         return text if isinstance(text, Chain) else _chain(text)
 
     @property
@@ -321,13 +309,9 @@ def position_errors(errors: Floats) -> Floats:
 def axis_directions(squareness: Floats | None) -> Floats:
     """Unit vectors of the motions of carriages x, y, z that enclose 90° + S with each other.
 
-    Parameters
-    ----------
-    squareness : (..., 3) Sxy, Syz, Szx, rad.
+    ``squareness``: (..., 3) Sxy, Syz, Szx, rad.
 
-    Returns
-    -------
-    (..., 3, 3), a row for each carriage.
+    Returns (..., 3, 3), a row for each carriage.
     """
     s_xy, s_yz, s_zx = np.moveaxis(np.sin(np.zeros(3) if squareness is None else squareness), -1, 0)
     y_y = np.sqrt(1 - s_xy**2)
@@ -340,13 +324,9 @@ def axis_directions(squareness: Floats | None) -> Floats:
 def direction_derivatives(squareness: Floats) -> Floats:
     """Derivative of :func:`axis_directions` with respect to Sxy, Syz, Szx, per rad.
 
-    Parameters
-    ----------
-    squareness : (..., 3) rad.
+    ``squareness``: (..., 3) rad.
 
-    Returns
-    -------
-    (3, ..., 3, 3), the squarenesses first.
+    Returns (3, ..., 3, 3), the squarenesses first.
     """
     axes = axis_directions(squareness)
     (s_xy, c_xy), (_, c_yz), (s_zx, c_zx) = ((np.sin(s), np.cos(s)) for s in np.moveaxis(squareness, -1, 0))

@@ -19,28 +19,17 @@ from cmm_uq.base.points import AXES, Floats, Ints
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap
 
 Beyond = Literal["refuse", "extrapolate"]
-
-POSITION_MARGIN = 1e-6
-"""A position this far beyond the map, mm, is on its edge: it comes from rounding."""
-
-TEMPERATURE_MARGIN = 1.0
-"""Up to this far beyond the calibrated temperatures, K, the nearest map holds as it is."""
+POSITION_MARGIN = 1e-6  # A position this far beyond the map, mm, is on its edge: it comes from rounding
+TEMPERATURE_MARGIN = 1.0  # up to this far beyond the calibrated temperatures, K, the nearest map holds as it is
 
 
 @dataclass(frozen=True, eq=False)
 class LookedUp:
-    """Errors at n points.
+    """Errors at n points."""
 
-    Parameters
-    ----------
-    errors : (n, 3, 6) of carriages x, y, z, mm and rad.
-    squareness : (3,) or (n, 3), rad.
-    extrapolated : (n,) whether a point lies beyond the mapped positions or temperatures.
-    """
-
-    errors: Floats
-    squareness: Floats
-    extrapolated: NDArray[np.bool_]
+    errors: Floats  # (n, 3, 6) of carriages x, y, z, mm and rad
+    squareness: Floats  # (3,) or (n, 3), rad
+    extrapolated: NDArray[np.bool_]  # (n,) whether a point lies beyond the mapped positions or temperatures
 
 
 @dataclass(frozen=True, eq=False)

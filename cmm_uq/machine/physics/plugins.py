@@ -17,8 +17,7 @@ from cmm_uq.base.plugins import EFFECTS, Plugin, offered
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.physics.effect import Amount, Effect, Parameter, Shape
 
-OWN = "cmm-uq"
-"""The package that the built-in effects belong to."""
+OWN = "cmm-uq"  # the package that the built-in effects belong to
 
 
 class EffectPlugin(Plugin):
@@ -26,12 +25,7 @@ class EffectPlugin(Plugin):
 
     @cached_property
     def effect(self) -> Effect:
-        """The effect itself; its package is imported now.
-
-        Raises
-        ------
-        BrokenPluginError : it cannot be imported, or is no effect of this name.
-        """
+        """The effect itself; its package is imported now."""
         made = self.loaded(Effect)  # type: ignore[type-abstract]
         for field in ("title", "formula", "mechanism", "points_to", "coefficients"):
             if not getattr(made, field, None):
@@ -51,7 +45,6 @@ class _Outside(Effect):
         self.along_motion, self.plane, self.stands_for = effect.along_motion, effect.plane, effect.stands_for
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         found = np.asarray(self._plugin.attempt(lambda: self._effect.basis(points, shape)))
         wanted = (len(points), 3, len(self.coefficients))
         if found.shape != wanted or found.dtype != np.float64 or not np.isfinite(found).all():
@@ -59,52 +52,35 @@ class _Outside(Effect):
         return found
 
     def lean(self, points: Points) -> Floats:
-        """See :meth:`Effect.lean`."""
         return np.asarray(self._plugin.attempt(lambda: self._effect.lean(points)), dtype=np.float64)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         return foreign(self._plugin.attempt(lambda: self._effect.meaning(amounts)))
 
     def course(self, points: Points) -> Floats | None:
-        """See :meth:`Effect.course`."""
         found = self._plugin.attempt(lambda: self._effect.course(points))
         return None if found is None else np.asarray(found, dtype=np.float64)
 
     def trials(self) -> Iterator[tuple[float, ...]]:
-        """See :meth:`Effect.trials`."""
         return self._effect.trials()
 
     @property
     def prior_weight(self) -> float:
-        """See :attr:`Effect.prior_weight`."""
         return self._effect.prior_weight
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
-        """See :attr:`Effect.reported`."""
         return self._effect.reported
 
     def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
-        """See :meth:`Effect.to_reported`."""
         return self._effect.to_reported(coefficients, shape)
 
     def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
-        """See :meth:`Effect.from_reported`."""
         return self._effect.from_reported(parameters)
 
 
 def outside_effects(own: Container[str]) -> dict[str, EffectPlugin]:
-    """Effects that the installed packages offer, by name; none is imported.
-
-    Parameters
-    ----------
-    own : names of the built-in effects.
-
-    Raises
-    ------
-    CmmUqError : two packages offer an effect of the same name.
-    """
+    """Effects that the installed packages offer, by name; none is imported."""
     found: dict[str, EffectPlugin] = {}
     for plugin in offered(EFFECTS, EffectPlugin):
         name = plugin.name

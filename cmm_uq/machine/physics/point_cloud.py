@@ -26,19 +26,12 @@ from cmm_uq.base.files.limits import COLUMNS, LINE
 from cmm_uq.base.files.numbers import numbers
 from cmm_uq.base.points import Floats
 
-CHUNK = 2**20
-"""Bytes read at a time, some 20 000 lines."""
-
+CHUNK = 2**20  # bytes read at a time, some 20 000 lines
 _FIX = "Save the cloud as CSV in UTF-8: a line of names, then one line a point"
 
 
 def csv_header(path: Path) -> tuple[str, ...]:
-    """Names of the columns.
-
-    Raises
-    ------
-    CmmUqError : there are none, or one is there twice.
-    """
+    """Names of the columns."""
     with _opened(path) as file:
         return _header(file, path)[0]
 
@@ -51,12 +44,7 @@ def csv_length(path: Path) -> float:
 
 
 def csv_blocks(path: Path, columns: Sequence[str], block: int) -> Iterator[Floats]:
-    """Rows (b, k) of some columns, b ≤ ``block``; empty lines and those that begin with # are passed over.
-
-    Raises
-    ------
-    CmmUqError : a column is missing, a line has another number of cells, or a cell is no number; with its line.
-    """
+    """Rows (b, k) of some columns, b ≤ ``block``; empty lines and those that begin with # are passed over."""
     with _opened(path) as file:
         header, number = _header(file, path)
         missing = [name for name in columns if name not in header]
@@ -171,9 +159,7 @@ def _line(file: BinaryIO, path: Path, number: int) -> str:
 
 DIGITIZER_COLUMNS = ("u_mm", "v_mm", "d_mm", "e_mm", "f_mm")
 COORDINATES = ("x_mm", "y_mm", "z_mm")
-
-BLOCK = 262_144
-"""Rows read at a time."""
+BLOCK = 262_144  # rows read at a time
 
 
 def transform_cloud(
@@ -237,12 +223,7 @@ def transform_cloud(
 
 
 def cloud_blocks(source: Path, columns: Sequence[str] = DIGITIZER_COLUMNS, *, block: int = BLOCK) -> Iterator[Floats]:
-    """Rows (b, k) of a cloud, b ≤ ``block``, one block after another.
-
-    Raises
-    ------
-    CmmUqError : the source is no cloud of these columns.
-    """
+    """Rows (b, k) of a cloud, b ≤ ``block``, one block after another."""
     for file in cloud_files(source):
         if source.suffix == ".parquet":
             yield from _parquet_blocks(file, columns, block)
@@ -253,12 +234,7 @@ def cloud_blocks(source: Path, columns: Sequence[str] = DIGITIZER_COLUMNS, *, bl
 
 
 def cloud_files(source: Path) -> list[Path]:
-    """Files of a cloud, in the order in which they are read.
-
-    Raises
-    ------
-    CmmUqError : there is none, or one is no regular file.
-    """
+    """Files of a cloud, in the order in which they are read."""
     files = sorted(source.glob("*.npy")) if source.is_dir() else [source]
     if not files:
         raise CmmUqError("no .npy files in this folder", where=str(source), fix="Name the folder that holds the cloud")
@@ -268,12 +244,7 @@ def cloud_files(source: Path) -> list[Path]:
 
 
 def cloud_header(source: Path) -> tuple[str, ...] | None:
-    """Names of the columns of a cloud; ``None`` for arrays, which have none.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read.
-    """
+    """Names of the columns of a cloud; ``None`` for arrays, which have none."""
     (first, *_) = cloud_files(source)
     if source.suffix == ".csv":
         return csv_header(first)

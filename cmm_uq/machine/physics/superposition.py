@@ -23,23 +23,16 @@ from cmm_uq.machine.physics.kinematics import (
     leaning,
 )
 
-_SETTLED = 1e-9
-"""mm."""
-
+_SETTLED = 1e-9  # mm
 _ROUNDS = 50
 
 
 @dataclass(frozen=True, eq=False)
 class About:
-    """Where the columns of effects that act together are taken, found once for all of them.
+    """Where the columns of effects that act together are taken, found once for all of them."""
 
-    Parameters
-    ----------
-    points : as indicated, with the directions of the motions where they lean.
-    change : (3, ..., 3, 3) of those directions by the squarenesses; ``None`` where columns of these are to first order.
-    """
-
-    points: Points
+    points: Points  # as indicated, with the directions of the motions where they lean
+    # (3, ..., 3, 3) of those directions by the squarenesses; ``None`` where columns of these are to first order.
     change: Floats | None = None
 
     def columns(self, effect: Effect, shape: Sequence[float] = ()) -> Floats:
@@ -55,15 +48,10 @@ class About:
 
 @dataclass(frozen=True, eq=False)
 class Superposition:
-    """Effects that act together.
+    """Effects that act together."""
 
-    Parameters
-    ----------
-    effects : in the order of their coefficients.
-    shapes : nonlinear parameters of the effects that have some, by the effect's name.
-    """
-
-    effects: tuple[Effect, ...]
+    effects: tuple[Effect, ...]  # in the order of their coefficients
+    # nonlinear parameters of the effects that have some, by the effect's name
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def errors(self, points: Points, coefficients: Floats) -> Floats:
@@ -79,10 +67,8 @@ class Superposition:
     def about(self, true: Points, coefficients: Floats) -> About:
         """Where columns are linear about coefficients (k,).
 
-        Parameters
-        ----------
-        true : points where they truly are; their columns are taken where a machine would indicate them that has these
-            squarenesses and no other error. The columns of three scale errors then add up to the place itself.
+        ``true``: points where they truly are; their columns are taken where a machine would indicate them that has these
+        squarenesses and no other error. The columns of three scale errors then add up to the place itself.
         """
         squareness = self._squareness(true, coefficients)
         if squareness is None:

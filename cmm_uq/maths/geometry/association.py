@@ -20,49 +20,36 @@ from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed
 
 Association = Literal["least_squares", "minimum_zone", "maximum_inscribed", "minimum_circumscribed", "tangent"]
 ASSOCIATIONS: tuple[Association, ...] = get_args(Association)
-
-ALONG = 0.05
-"""Cosine of the angle between a normal and ``outward`` below which the latter names no side."""
-
+ALONG = 0.05  # cosine of the angle between a normal and ``outward`` below which the latter names no side
 _WITH_SIZE = (CIRCLE, SPHERE, CYLINDER)
 _STRAIGHT = (PLANE, LINE_IN_PLANE)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Associated:
-    """A feature associated with n points.
+    """A feature associated with n points."""
 
-    Parameters
-    ----------
-    feature : its kind.
-    association : the criterion.
-    position : (d,) centre; or where the axis pierces the plane across the least-squares axis through the least-squares point;
-        of a plane, and of a line in a plane, the point of it above the centroid. mm.
-    direction : (d,) unit direction of the axis or line, of a plane its normal (outward where the material was told); None of a
-        sphere and of a circle, whose plane is that of least squares.
-    size : diameter, mm; of a minimum zone that of its middle, of a cone at its position; None where there is none.
-    half_angle : of a cone, rad; None of others.
-    form : form deviation against this feature, mm: range of the signed distances; of a line in space the diameter of the
-        cylinder about it that holds all points.
-    deviations : (n,) signed orthogonal distances, mm: positive outside, of a plane on the side of its normal.
-    contacts : (p,) points that hold the feature; none of least squares.
-    multipliers : (p,) of sum 1, none negative: the proof that the contacts hold it.
-    condition : of the least-squares problem with columns of unit length: large where the points cover little of the feature.
-    gap : no feature of this kind meets the criterion better by more than this, mm. Zero where all others were excluded;
-        infinite where only a local optimum is proved, as of cylinders and cones; ``nan`` of least squares.
-    """
-
-    feature: FeatureKind
-    association: Association
+    feature: FeatureKind  # its kind
+    association: Association  # the criterion
+    # (d,) centre; or where the axis pierces the plane across the least-squares axis through the least-squares point; of a
+    # plane, and of a line in a plane, the point of it above the centroid. mm.
     position: Floats
+    # (d,) unit direction of the axis or line, of a plane its normal (outward where the material was told); None of a sphere
+    # and of a circle, whose plane is that of least squares
     direction: Floats | None
+    # diameter, mm; of a minimum zone that of its middle, of a cone at its position; None where there is none
     size: float | None
-    half_angle: float | None
+    half_angle: float | None  # of a cone, rad; None of others
+    # form deviation against this feature, mm: range of the signed distances; of a line in space the diameter of the cylinder
+    # about it that holds all points
     form: float
-    deviations: Floats
-    contacts: Ints
-    multipliers: Floats
+    deviations: Floats  # (n,) signed orthogonal distances, mm: positive outside, of a plane on the side of its normal
+    contacts: Ints  # (p,) points that hold the feature; none of least squares
+    multipliers: Floats  # (p,) of sum 1, none negative: the proof that the contacts hold it
+    # of the least-squares problem with columns of unit length: large where the points cover little of the feature
     condition: float
+    # no feature of this kind meets the criterion better by more than this, mm. Zero where all others were excluded; infinite
+    # where only a local optimum is proved, as of cylinders and cones; ``nan`` of least squares.
     gap: float
 
 

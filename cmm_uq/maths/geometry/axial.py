@@ -30,8 +30,7 @@ from cmm_uq.maths.geometry.feature import (
 )
 from cmm_uq.maths.geometry.orthogonal_distance import Minimum, axis_candidates, minimise, minimum_at, section
 
-SAMPLE = 1500
-"""Points on which the candidates for the axis are tried; the fit itself takes all."""
+SAMPLE = 1500  # points on which the candidates for the axis are tried; the fit itself takes all
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,14 +56,8 @@ class Cone(Feature):
 def fit_cone(points: ArrayLike, *, u_point: float | None = None) -> Cone:
     """Cone through at least six points, not all in one plane.
 
-    Parameters
-    ----------
-    points : (n, 3) in mm.
-    u_point : standard uncertainty of a point along the normal, mm; estimated from the residuals when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points, points in one plane, or points that lie on a cylinder within their scatter.
+    ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
+    when left out.
     """
     array = checked_points(points, "cone", 6)
     about, centroid, extent = centred(array)
@@ -183,14 +176,8 @@ class Cylinder(Feature):
 def fit_cylinder(points: ArrayLike, *, u_point: float | None = None) -> Cylinder:
     """Cylinder through at least five points, not all in one plane.
 
-    Parameters
-    ----------
-    points : (n, 3) in mm.
-    u_point : standard uncertainty of a point along the normal, mm; estimated from the residuals when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points, points in one plane, or an arc so short that the radius is not determined.
+    ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
+    when left out.
     """
     array = checked_points(points, "cylinder", 5)
     about, centroid, extent = centred(array)

@@ -16,20 +16,14 @@ import numpy as np
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.minimax import Shape
 
+# steps, mm, below which a zone is where its contact points hold it; Newton's steps before it were their square root
 SETTLED = 1e-11
-"""Steps, mm, below which a zone is where its contact points hold it; Newton's steps before it were their square root."""
-
 MOST_EXCHANGES = 200
 MOST_STEPS = 12
-SCREENED = 1000
-"""Points from which on only those that stand out in their neighbourhood are looked at together."""
-
-RUNS = 64
-"""Parts of these, one after the other, whose highest and lowest points are looked at."""
-
+SCREENED = 1000  # points from which on only those that stand out in their neighbourhood are looked at together
+RUNS = 64  # parts of these, one after the other, whose highest and lowest points are looked at
 MOST_ROUNDS = 40
-ROUNDING = 1e-13
-"""Share of the coordinates by which a point may lie outside by rounding."""
+ROUNDING = 1e-13  # share of the coordinates by which a point may lie outside by rounding
 
 
 @dataclass(eq=False)
@@ -49,10 +43,7 @@ def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tu
 
     A draw does not settle where fewer contact points than k + 1 hold the zone by its curvature.
 
-    Parameters
-    ----------
-    start : (N, k) the least-squares features.
-    units : (k,) see :meth:`Placed.units`.
+    ``start``: (N, k) the least-squares features. ``units``: (k,) see :meth:`Placed.units`.
     """
     if local.shape[2] >= SCREENED:
         return _screened(shape, start, local, units)
@@ -152,9 +143,7 @@ def _signed(A: Floats, index: Ints) -> _Basis:
 def _exchange(A: Floats, b: Floats, basis: _Basis, floor: float) -> tuple[Floats, Floats]:
     """Exchange until no point lies outside; ``basis`` becomes that of the answer.
 
-    Returns
-    -------
-    x (N, k) and t (N,) with the least t ≥ |b + A·x| for all points; t is ``nan`` where exchanges find no end.
+    Returns x (N, k) and t (N,) with the least t ≥ |b + A·x| for all points; t is ``nan`` where exchanges find no end.
     """
     N, _, k = A.shape
     x, t = np.zeros((N, k)), np.empty(N)

@@ -20,18 +20,12 @@ from cmm_uq.maths.geometry.placed import Placed
 from cmm_uq.maths.geometry.round import largest_empty, narrower, safe_radius
 from cmm_uq.maths.geometry.straight import narrowest
 
-ROUNDING = 4 * float(np.finfo(np.float64).eps)
-"""Of distances, as a share of the coordinates."""
-
+ROUNDING = 4 * float(np.finfo(np.float64).eps)  # of distances, as a share of the coordinates
+# form, as a share of the coordinates, below which contact points cannot be told from their neighbours
 PERFECT = 1e4 * ROUNDING
-"""Form, as a share of the coordinates, below which contact points cannot be told from their neighbours."""
-
-SAME = 1e-9
-"""mm: two ways to the same optimum agree within this."""
-
+SAME = 1e-9  # mm: two ways to the same optimum agree within this
+# cosine between the least-squares normal and that of the narrowest zone below which they are across each other
 LEANING = 1e-6
-"""Cosine between the least-squares normal and that of the narrowest zone below which they are across each other."""
-
 _BALLS = (CIRCLE, SPHERE)
 _NONE = np.zeros(0, dtype=np.int64)
 
@@ -85,12 +79,7 @@ def _problem(of: Placed, local: Floats, sides: tuple[float, ...], *, sized: bool
 
 
 def _solved(problem: _Problem, starts: Iterator[Floats]) -> Extremum:
-    """The first that is proved.
-
-    Raises
-    ------
-    CmmUqError : none is: the points do not hold such a feature.
-    """
+    """The first that is proved."""
     rounding = ROUNDING * float(np.abs(problem.local).max()) / problem.scale
     for start in starts:
         found = least_largest(problem.rows, start, rounding)
@@ -113,9 +102,7 @@ def _starts(k: int) -> Iterator[Floats]:
 def least_zone(of: Placed, local: Floats, near: Floats | None = None) -> Extreme:
     """The minimum zone: of a line in space the narrowest cylinder.
 
-    Parameters
-    ----------
-    near : (k,) a state that is thought near it, of cylinders, cones and lines in space.
+    ``near``: (k,) a state that is thought near it, of cylinders, cones and lines in space.
     """
     if of.shape in (PLANE, LINE_IN_PLANE):
         return _least_slab(of, local)

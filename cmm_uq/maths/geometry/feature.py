@@ -20,9 +20,7 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.orthogonal_distance import Minimum, extents
 
 State = TypeVar("State")
-
-DEGENERATE = 1e-9
-"""Ratio of extents below which points count as lying on one line or in one plane."""
+DEGENERATE = 1e-9  # ratio of extents below which points count as lying on one line or in one plane
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,12 +71,7 @@ class Feature:
 
 
 def checked_points(points: ArrayLike, what: str, least: int, dimensions: tuple[int, ...] = (3,)) -> Floats:
-    """Points as an (n, d) array of finite numbers, n ≥ ``least``.
-
-    Raises
-    ------
-    CmmUqError : wrong shape, numbers missing, or too few points.
-    """
+    """Points as an (n, d) array of finite numbers, n ≥ ``least``."""
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] not in dimensions:
         wanted = " or ".join(f"(n, {d})" for d in dimensions)
@@ -143,13 +136,8 @@ def fit_figures(
 ) -> FitFigures:
     """Fields of a feature from the minimum found in data of unit extent.
 
-    Parameters
-    ----------
-    found : the minimum.
-    extent : unit of its data, mm.
-    natural : (len(names), k) derivatives of the parameters in mm and rad with respect to the step's k parameters.
-    u_point : as the fit was asked.
-    components : of each orthogonal distance; the distances come component by component.
+    ``extent``: unit of its data, mm. ``natural``: (len(names), k) derivatives of the parameters in mm and rad with respect
+    to the step's k parameters.
     """
     distances = extent * found.distances
     freedom = len(distances) - natural.shape[1]
@@ -176,12 +164,7 @@ def determined_radius(feature: Feature, radius: float, what: str) -> None:
 
 
 def point_uncertainty(residuals: Floats, degrees_of_freedom: int, u_point: float | None, what: str) -> float:
-    """Standard uncertainty of a point, mm: given, or from the residuals and their degrees of freedom.
-
-    Raises
-    ------
-    CmmUqError : a given one is not positive, or none is given and the points leave no degree of freedom.
-    """
+    """Standard uncertainty of a point, mm: given, or from the residuals and their degrees of freedom."""
     if u_point is not None:
         if not (np.isfinite(u_point) and u_point > 0):
             raise CmmUqError(
@@ -223,9 +206,7 @@ def upward(direction: Floats) -> Floats:
 def nearest_rotations(moments: Floats) -> Floats:
     """Rotations (q, 3, 3) R with the largest tr(Rᵀ·moment), proper ones.
 
-    Parameters
-    ----------
-    moments : (q, 3, 3) sums of found · ownᵀ, both about their means. Where these lie on a line, the turn about it is any.
+    ``moments``: (q, 3, 3) sums of found · ownᵀ, both about their means. Where these lie on a line, the turn about it is any.
     """
     U, _, Vt = np.linalg.svd(moments)
     U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
@@ -241,7 +222,7 @@ class BallForm:
     sphericity : largest less smallest diameter, mm (200 µin, that is 5.08e-3 mm, for a ball of grade 200).
     """
 
-    sphericity: float
+    sphericity: float  # largest less smallest diameter, mm (200 µin, that is 5.08e-3 mm, for a ball of grade 200).
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.sphericity) and self.sphericity >= 0):
@@ -279,12 +260,7 @@ class BallForm:
 
 
 def _projection(directions: Floats) -> Floats:
-    """(4, n) of the least-squares fit of n·δc + δr to radial deviations.
-
-    Raises
-    ------
-    CmmUqError : the directions do not determine centre and radius.
-    """
+    """(4, n) of the least-squares fit of n·δc + δr to radial deviations."""
     if len(directions) < 4 or np.linalg.matrix_rank(np.column_stack([directions, np.ones(len(directions))])) < 4:
         raise CmmUqError("the directions do not determine a sphere", fix="Give at least four, not all in one plane")
     return np.asarray(np.linalg.pinv(np.column_stack([directions, np.ones(len(directions))])))

@@ -25,43 +25,27 @@ import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
 
+# from a state (k,): values (m,) and derivatives (m, k), in units in which states and values are about one
 Rows = Callable[[Floats], tuple[Floats, Floats]]
-"""From a state (k,): values (m,) and derivatives (m, k), in units in which states and values are about one."""
-
+# of values, stationarity and step: where the conditions are met, unless the rounding of the coordinates is coarser
 EXACT = 1e-11
-"""Of values, stationarity and step: where the conditions are met, unless the rounding of the coordinates is coarser."""
-
-WORKING = 16
-"""Rows a parameter that the descent looks at together; others join when they come out above."""
+WORKING = 16  # rows a parameter that the descent looks at together; others join when they come out above
 
 
 @dataclass(frozen=True, eq=False)
 class Extremum:
-    """A state with its proof.
+    """A state with its proof."""
 
-    Parameters
-    ----------
-    state : (k,).
-    value : the largest c_i.
-    contacts : (p,) rows that hold it.
-    multipliers : (p,) of sum 1, none negative but for rounding.
-    proved : contacts, multipliers and, where the contacts alone do not hold the state, curvature prove a local minimum.
-    """
-
-    state: Floats
-    value: float
-    contacts: Ints
-    multipliers: Floats
+    state: Floats  # (k,)
+    value: float  # the largest c_i
+    contacts: Ints  # (p,) rows that hold it
+    multipliers: Floats  # (p,) of sum 1, none negative but for rounding
+    # contacts, multipliers and, where the contacts alone do not hold the state, curvature prove a local minimum
     proved: bool
 
 
 def least_largest(rows: Rows, start: Floats, rounding: float = 0.0) -> Extremum:
-    """The local minimum of the largest row below a start (k,), and whether it is proved.
-
-    Parameters
-    ----------
-    rounding : of the values, in their own unit.
-    """
+    """The local minimum of the largest row below a start (k,), and whether it is proved."""
     exact = max(EXACT, 100 * rounding)
     state = start
     found = _polished(rows, state, exact)
@@ -220,22 +204,15 @@ Distances = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 @dataclass(frozen=True)
 class Shape:
-    """A kind of feature in its own frame.
+    """A kind of feature in its own frame."""
 
-    Parameters
-    ----------
-    name : as messages call it.
-    least : points that determine it.
-    slopes : places in the state of slopes of axis or normal, which belong to a length; the others are mm.
-    size : place in the state of the radius (of a cone the distance of its surface), None where there is no size.
-    distances : of a state (N, k) and local points (d, N, n): distances (N, n) and derivatives (k, N, n).
-    """
-
-    name: str
-    least: int
+    name: str  # as messages call it
+    least: int  # points that determine it
+    # places in the state of slopes of axis or normal, which belong to a length; the others are mm
     slopes: tuple[int, ...]
+    # place in the state of the radius (of a cone the distance of its surface), None where there is no size
     size: int | None
-    distances: Distances
+    distances: Distances  # of a state (N, k) and local points (d, N, n): distances (N, n) and derivatives (k, N, n)
 
     def normal_matrix(self, state: Floats, local: Floats) -> Floats:
         """(k, k) of the least-squares problem at the nominal state (k,) of points (d, n)."""

@@ -16,15 +16,12 @@ from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.exchange import MOST_EXCHANGES, ROUNDING
 from cmm_uq.maths.geometry.minimax import Shape
 
+# mm: what may be left to be gained in a step; and after the most of them, where they wind along a curved valley
 SETTLED, ENOUGH = 1e-10, 1e-7
-"""mm: what may be left to be gained in a step; and after the most of them, where they wind along a curved valley."""
-
 MOST_STEPS = 50
-_WIDE = 10.0
-"""Times the form: the half width of the first box."""
-
+_WIDE = 10.0  # times the form: the half width of the first box
+# parts of the gain foretold below which the box shrinks and above which it grows, and by how much
 _POOR, _GOOD, _WIDER, _NARROWER = 0.25, 0.75, 2.0, 0.25
-"""Parts of the gain foretold below which the box shrinks and above which it grows, and by how much."""
 
 
 def held(shape: Shape, start: Floats, local: Floats, units: Floats, side: float) -> tuple[Floats, Ints]:
@@ -32,10 +29,7 @@ def held(shape: Shape, start: Floats, local: Floats, units: Floats, side: float)
 
     Of several features that points hold it is the one that is reached from the start, as it is of one measurement alone.
 
-    Parameters
-    ----------
-    start : (N, k) the least-squares features, whose size stands last.
-    units : (k,) see :meth:`Placed.units`.
+    ``start``: (N, k) the least-squares features, whose size stands last. ``units``: (k,) see :meth:`Placed.units`.
     """
     state, free = start.copy(), start.shape[1] - 1
     floor = ROUNDING * float(np.abs(local).max(initial=0.0))

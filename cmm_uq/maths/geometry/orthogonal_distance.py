@@ -25,34 +25,21 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
 State = TypeVar("State")
-
 MAX_ITERATIONS = 200
-SETTLED = 1e-13
-"""Step, in units of the extent of the data, below which nothing is left to gain."""
-SHRINKING = 1e-7
-"""Steps below this that no longer shrink are rounding."""
-SINGULAR = 1e12
-"""Condition number from which the points do not determine the feature."""
+SETTLED = 1e-13  # step, in units of the extent of the data, below which nothing is left to gain
+SHRINKING = 1e-7  # steps below this that no longer shrink are rounding
+SINGULAR = 1e12  # condition number from which the points do not determine the feature
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum(Generic[State]):
-    """Where the sum of squares is least.
+    """Where the sum of squares is least."""
 
-    Parameters
-    ----------
-    state : the feature, in the units of the data given.
-    distances : (m,) orthogonal distances there.
-    root : (k, k) upper triangular R of the Jacobian: (RᵀR)⁻¹ is the covariance for distances of unit variance.
-    condition : of the Jacobian with columns of unit length.
-    iterations : steps taken.
-    """
-
-    state: State
-    distances: Floats
-    root: Floats
-    condition: float
-    iterations: int
+    state: State  # the feature, in the units of the data given
+    distances: Floats  # (m,) orthogonal distances there
+    root: Floats  # (k, k) upper triangular R of the Jacobian: (RᵀR)⁻¹ is the covariance for distances of unit variance
+    condition: float  # of the Jacobian with columns of unit length
+    iterations: int  # steps taken
 
     @property
     def cost(self) -> float:
@@ -92,16 +79,8 @@ def minimise(
 ) -> Minimum[State]:
     """Descend from a start to the least sum of squared distances.
 
-    Parameters
-    ----------
-    start : where to begin.
-    linearise : (k + 1, m) derivatives of the distances with respect to the step's k parameters, and the distances last.
-    move : the state after a step (k,).
-    what : the feature's name, for messages.
-
-    Raises
-    ------
-    CmmUqError : the points do not determine the feature, or no minimum is found.
+    ``linearise``: (k + 1, m) derivatives of the distances with respect to the step's k parameters, and the distances last.
+    ``move``: the state after a step (k,).
     """
     state, rows = start, linearise(start)
     k = len(rows) - 1
@@ -142,12 +121,7 @@ def _step(R: Floats, damping: float) -> tuple[Floats, float]:
 
 
 def minimum_at(state: State, rows: Floats, what: str, iterations: int = 0) -> Minimum[State]:
-    """The minimum, given that ``state`` is it, from its linearisation ``rows`` (see :func:`minimise`).
-
-    Raises
-    ------
-    CmmUqError : the points do not determine the feature.
-    """
+    """The minimum, given that ``state`` is it, from its linearisation ``rows`` (see :func:`minimise`)."""
     R = triangle(rows)[:-1, :-1]
     scale = np.linalg.norm(R, axis=0)
     s = np.linalg.svd(R / np.where(scale > 0, scale, 1.0), compute_uv=False)
@@ -159,9 +133,7 @@ def minimum_at(state: State, rows: Floats, what: str, iterations: int = 0) -> Mi
 def cap_directions(polar_angle: float, n: int = 20_000) -> Floats:
     """Unit directions (n, 3) spread evenly over the cap of a sphere about +z, as a digitizer sees it from above.
 
-    Parameters
-    ----------
-    polar_angle : of the cap's edge from +z, rad: π/2 for a hemisphere.
+    ``polar_angle``: of the cap's edge from +z, rad: π/2 for a hemisphere.
     """
     i = np.arange(n)
     z = 1 - (1 - np.cos(polar_angle)) * (i + 0.5) / n
@@ -172,17 +144,11 @@ def cap_directions(polar_angle: float, n: int = 20_000) -> Floats:
 
 DIRECTIONS = 600
 CANDIDATES = 6
-APART = np.cos(np.radians(12))
-"""Candidates nearer to each other than this descend to the same minimum."""
+APART = np.cos(np.radians(12))  # candidates nearer to each other than this descend to the same minimum
 
 
 def axis_candidates(about: Floats, *, tapered: bool) -> list[Floats]:
-    """A few unit directions (3,): the principal ones, then the most promising, for centred points (3, n) of unit extent.
-
-    Parameters
-    ----------
-    tapered : True for a cone, False for a cylinder.
-    """
+    """A few unit directions (3,): the principal ones, then the most promising, for centred points (3, n) of unit extent."""
     x, y, z = about
     monomials = np.array([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, x * z, y * z])
     directions = np.vstack([principal(about), cap_directions(np.pi / 2, DIRECTIONS)])

@@ -22,25 +22,17 @@ KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A shape in a frame near which the points lie.
+    """A shape in a frame near which the points lie."""
 
-    Parameters
-    ----------
-    shape : the kind of feature.
-    origin : (d,) of the frame, mm.
-    frame : (m, d) orthonormal rows; the last is the axis or normal, of a line in a plane the direction across it. Of a
-        circle in space there are two, so that its points are projected along the normal.
-    state : (k,) of the least-squares feature.
-    extent : root mean square distance of the points from their centroid, mm: the length that slopes are multiplied by.
-    condition : of the least-squares problem with columns of unit length.
-    """
-
-    shape: Shape
-    origin: Floats
+    shape: Shape  # the kind of feature
+    origin: Floats  # (d,) of the frame, mm
+    # (m, d) orthonormal rows; the last is the axis or normal, of a line in a plane the direction across it. Of a circle in
+    # space there are two, so that its points are projected along the normal.
     frame: Floats
-    state: Floats
+    state: Floats  # (k,) of the least-squares feature
+    # root mean square distance of the points from their centroid, mm: the length that slopes are multiplied by
     extent: float
-    condition: float
+    condition: float  # of the least-squares problem with columns of unit length
 
     def local(self, points: Floats) -> Floats:
         """(m, …, n) coordinates in the frame of points (…, n, d)."""
@@ -82,12 +74,7 @@ class Placed:
 
 
 def placed(kind: FeatureKind, points: ArrayLike) -> Placed:
-    """The least-squares feature of points (n, d), and its frame.
-
-    Raises
-    ------
-    CmmUqError : an unknown kind, or points that do not determine the feature (see the fit of each).
-    """
+    """The least-squares feature of points (n, d), and its frame."""
     if kind not in KINDS:
         raise CmmUqError(f"{kind!r} is no feature", fix=f"Features are {', '.join(KINDS)}")
     return _PLACING[kind](np.asarray(points, dtype=np.float64))
@@ -129,9 +116,7 @@ def _cone(points: Floats) -> Placed:
     return _about(CONE, points, fit.point, frame_about(fit.direction), state, fit.condition)
 
 
-_PLACING = {
-    "line": _line, "plane": _plane, "circle": _circle, "sphere": _sphere, "cylinder": _cylinder, "cone": _cone,
-}  # fmt: skip
+_PLACING = {"line": _line, "plane": _plane, "circle": _circle, "sphere": _sphere, "cylinder": _cylinder, "cone": _cone}
 
 
 def _scatter(points: Floats, shape: Shape) -> float | None:

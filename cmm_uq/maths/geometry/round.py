@@ -114,14 +114,8 @@ class Circle(Feature):
 def fit_circle(points: ArrayLike, *, u_point: float | None = None) -> Circle:
     """Circle through at least three points, not on one line.
 
-    Parameters
-    ----------
-    points : (n, 2), or (n, 3) for a circle in space, mm.
-    u_point : standard uncertainty of a point radially, and in space along the normal, mm; estimated when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points, points on one line, or an arc so short that the radius is not determined.
+    ``points``: (n, 2), or (n, 3) for a circle in space, mm. ``u_point``: standard uncertainty of a point radially, and in
+    space along the normal, mm; estimated when left out.
     """
     array = checked_points(points, "circle", 3, (2, 3))
     about, centroid, extent = centred(array)
@@ -194,10 +188,8 @@ def safe_radius(gradients: Floats, nearest: float) -> float:
     of the hull of the contacts' gradients; against their curvature, below 1/(nearest − δ), that suffices up to
     δ = 2κ·(nearest − δ).
 
-    Parameters
-    ----------
-    gradients : (p, d + 1) of the contacts with respect to centre and mean radius, signed as they hold the zone.
-    nearest : distance of the nearest point from the centre, mm.
+    ``gradients``: (p, d + 1) of the contacts with respect to centre and mean radius, signed as they hold the zone.
+    ``nearest``: distance of the nearest point from the centre, mm.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -215,11 +207,7 @@ def narrower(
 ) -> tuple[bool, Floats | None]:
     """Whether the search came to an end, and a centre (d,) with a ring narrower than ``width``, mm, if there is one.
 
-    Parameters
-    ----------
-    points : (n, d).
-    centre : (d,) of the ring found, within ``safe`` of which there is no narrower one.
-    contacts : rows of the points that hold it.
+    ``points``: (n, d). ``centre``: (d,) of the ring found, within ``safe`` of which there is no narrower one.
     """
     sample = points[:: len(points) // SAMPLE + 1]
     if contacts is not None:

@@ -42,14 +42,8 @@ class Line(Feature):
 def fit_line(points: ArrayLike, *, u_point: float | None = None) -> Line:
     """Line through at least two points that do not coincide.
 
-    Parameters
-    ----------
-    points : (n, 3) or (n, 2) in mm.
-    u_point : standard uncertainty of a point across the line in each direction, mm; estimated when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points, or all in one place.
+    ``points``: (n, 3) or (n, 2) in mm. ``u_point``: standard uncertainty of a point across the line in each direction, mm;
+    estimated when left out.
     """
     array = checked_points(points, "line", 2, (2, 3))
     about, centroid, extent = centred(array)
@@ -92,14 +86,8 @@ class Plane(Feature):
 def fit_plane(points: ArrayLike, *, u_point: float | None = None) -> Plane:
     """Plane through at least three points, not on one line.
 
-    Parameters
-    ----------
-    points : (n, 3) in mm.
-    u_point : standard uncertainty of a point along the normal, mm; estimated from the residuals when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points, or points on one line.
+    ``points``: (n, 3) in mm. ``u_point``: standard uncertainty of a point along the normal, mm; estimated from the residuals
+    when left out.
     """
     array = checked_points(points, "plane", 3)
     about, centroid, extent = centred(array)
@@ -117,15 +105,11 @@ def fit_plane(points: ArrayLike, *, u_point: float | None = None) -> Plane:
     )
 
 
+# edges count as facing each other within this: a pair too many is looked at in vain, a pair too few would be missed
 LENIENT = 1e-9
-"""Edges count as facing each other within this: a pair too many is looked at in vain, a pair too few would be missed."""
-
-FLAT = 1e-13
-"""Share of the extent below which the points lie in the plane or on the line to rounding."""
-
+FLAT = 1e-13  # share of the extent below which the points lie in the plane or on the line to rounding
 CHUNK = 256
-MOST_EDGES = 5000
-"""Of a hull: points about a plane have a few hundred."""
+MOST_EDGES = 5000  # of a hull: points about a plane have a few hundred
 
 
 def narrowest(points: Floats) -> tuple[Floats, float]:

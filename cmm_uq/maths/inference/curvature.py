@@ -33,44 +33,29 @@ from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.posterior import SIGMA_BOUNDS, NoisyPosterior, Posterior
 from cmm_uq.maths.inference.proposals import Proposal
 
-NEGLIGIBLE = 0.02
-"""Of a standard uncertainty."""
-
-FARTHEST = 4.0
-"""Posterior standard deviations."""
-
+NEGLIGIBLE = 0.02  # of a standard uncertainty
+FARTHEST = 4.0  # posterior standard deviations
+# posterior standard deviations over which the second derivatives are taken: the middle of the range that counts
 _STEP = 2.0
-"""Posterior standard deviations over which the second derivatives are taken: the middle of the range that counts."""
-
-_ROUNDS = 4
-"""Fixed-point rounds of bending; each gains the factor by which the model bends within a standard deviation."""
-
-_BLOCK = 2_000_000
-"""Numbers at a time."""
-
+_ROUNDS = 4  # fixed-point rounds of bending; each gains the factor by which the model bends within a standard deviation
+_BLOCK = 2_000_000  # numbers at a time
+# what parameters (k,) explain of the observations, (m,) mm, beyond the linear model
 Remainder = Callable[[Floats], Floats]
-"""What parameters (k,) explain of the observations, (m,) mm, beyond the linear model."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bend:
-    """The second-order model in units of posterior standard deviations z, whitened by the noise.
+    """The second-order model in units of posterior standard deviations z, whitened by the noise."""
 
-    Parameters
-    ----------
-    centre, axes : z = 0 and (k, k) columns: parameters = centre + axes · z; the linear posterior is N(z₀, 1).
-    design : (m, k) of z.
-    first, second : (m, k) and (m, k, k) derivatives of what the linear model leaves out: a design need not be exact.
-    left : (m,) what z = 0 leaves unexplained.
-    prior, prior_at : (p, k) and (p,): priors as observations, ``prior``·z − ``prior_at``.
-    """
-
+    # centre, axes: z = 0 and (k, k) columns: parameters = centre + axes · z; the linear posterior is N(z₀, 1)
     centre: Floats
     axes: Floats
-    design: Floats
+    design: Floats  # (m, k) of z
+    # first, second: (m, k) and (m, k, k) derivatives of what the linear model leaves out: a design need not be exact
     first: Floats
     second: Floats
-    left: Floats
+    left: Floats  # (m,) what z = 0 leaves unexplained
+    # prior, prior_at: (p, k) and (p,): priors as observations, ``prior``·z − ``prior_at``
     prior: Floats
     prior_at: Floats
 
@@ -122,12 +107,8 @@ class Bend:
 def bend(model: LinearModel, about: Floats, sigma: float, remainder: Remainder) -> Bend:
     """Measure how the model bends within its posterior.
 
-    Parameters
-    ----------
-    model : linear about ``about``; its observations without correlation, see :meth:`LinearModel.uncorrelated`.
-    about : (k,) where it is linear.
-    sigma : mm, of the noise.
-    remainder : in the observations of ``model``.
+    ``model``: linear about ``about``; its observations without correlation, see :meth:`LinearModel.uncorrelated`. ``about``:
+    (k,) where it is linear. ``sigma``: mm, of the noise. ``remainder``: in the observations of ``model``.
     """
     reduced = model.reduced
     design, left = reduced.design / sigma, (reduced.observed - reduced.design @ about) / sigma
@@ -186,32 +167,20 @@ def _metropolis(log_weight: Floats, steps: int, seed: int) -> Ints:
     return np.asarray(held.ravel(), dtype=np.int64)
 
 
-_ANYWHERE = 0.02
-"""Part of a shape's proposal that is spread over the whole grid."""
-
+_ANYWHERE = 0.02  # part of a shape's proposal that is spread over the whole grid
 _NEGLIGIBLE = 1e-9
 _BATCH = 512
-_COLUMNS = 256
-"""Columns that are reduced at once: few enough for a processor's cache."""
-
-_MANY = 4
-"""Columns, over rows, from which on they are made a triangle before their span is sought."""
+_COLUMNS = 256  # columns that are reduced at once: few enough for a processor's cache
+_MANY = 4  # columns, over rows, from which on they are made a triangle before their span is sought
 
 
 @dataclass(frozen=True, eq=False)
 class Shaped:
-    """Columns that a nonlinear parameter shapes.
+    """Columns that a nonlinear parameter shapes."""
 
-    Parameters
-    ----------
-    where : (r,) their place in the design.
-    nodes : (N,) values of the parameter, sorted; uniform probability over them in their logarithm.
-    table : (N, m, r) the columns at the nodes, mm.
-    """
-
-    where: Sequence[int]
-    nodes: Floats
-    table: Floats
+    where: Sequence[int]  # (r,) their place in the design
+    nodes: Floats  # (N,) values of the parameter, sorted; uniform probability over them in their logarithm
+    table: Floats  # (N, m, r) the columns at the nodes, mm
 
 
 def sample_shaped(
@@ -219,12 +188,7 @@ def sample_shaped(
 ) -> Posterior:
     """Sample the posterior; its ``shapes`` (N, q) belong to ``shaped`` in order.
 
-    Parameters
-    ----------
-    model : linear, at any value of the shapes.
-    shaped : what shapes its columns.
-    seed : the same seed gives the same draws.
-    progress : told the part done, from 0 to 1.
+    ``progress``: told the part done, from 0 to 1.
     """
     density = _Density(model, shaped)
     centre, factor = density.start

@@ -24,20 +24,14 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """One cause of errors of m observations.
+    """One cause of errors of m observations."""
 
-    Parameters
-    ----------
-    name : in words.
-    common : (m, r) change of each observation, mm, for one standard uncertainty of each of r independent parts.
-    apart : the same where each block of observations errs by itself; ``None`` where all are known to err together.
-    included : (m,) change for one standard uncertainty of what is in the draws already, as that of a certified size is: it
-        stands for ``common``, which is then zero, and of ``apart`` only what is more counts.
-    """
-
-    name: Text
-    common: Floats
+    name: Text  # in words
+    common: Floats  # (m, r) change of each observation, mm, for one standard uncertainty of each of r independent parts
+    # the same where each block of observations errs by itself; ``None`` where all are known to err together
     apart: Freedoms | None = None
+    # (m,) change for one standard uncertainty of what is in the draws already, as that of a certified size is: it stands for
+    # ``common``, which is then zero, and of ``apart`` only what is more counts
     included: Floats | None = None
 
     @classmethod
@@ -76,13 +70,9 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """What is in doubt about k estimates by causes that the residuals do not show.
+    """What is in doubt about k estimates by causes that the residuals do not show."""
 
-    Parameters
-    ----------
-    carried : of each cause the changes of the estimates, all observations erring together (k, r) and apart (k, q).
-    """
-
+    # of each cause the changes of the estimates, all observations erring together (k, r) and apart (k, q)
     carried: tuple[tuple[Floats, Floats], ...]
 
     @classmethod

@@ -28,24 +28,17 @@ from cmm_uq.maths.inference.slow import root
 if TYPE_CHECKING:
     import pandas as pd
 
+# date of the members of an archive, the first that the format knows: the clock is never read
 EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Date of the members of an archive, the first that the format knows: the clock is never read."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Draws(Mapping[str, Floats]):
-    """Draws of named quantities; by its name, each is an array (chain, draw).
+    """Draws of named quantities; by its name, each is an array (chain, draw)."""
 
-    Parameters
-    ----------
-    units : of each quantity, as printed, by its name; in the order of ``array``.
-    array : (chain, draw, quantity). Chains of one ensemble follow each other.
-    every : which of the draws were kept: each, or each second, …
-    """
-
-    units: Mapping[str, str]
-    array: Floats
-    every: int = 1
+    units: Mapping[str, str]  # of each quantity, as printed, by its name; in the order of ``array``
+    array: Floats  # (chain, draw, quantity). Chains of one ensemble follow each other.
+    every: int = 1  # which of the draws were kept: each, or each second, …
 
     def __getitem__(self, name: str) -> Floats:
         if name not in self.units:
@@ -120,12 +113,7 @@ class Draws(Mapping[str, Floats]):
 
     @classmethod
     def of_npz(cls, content: bytes, where: str) -> Draws:
-        """Draws as :meth:`as_npz` wrote them.
-
-        Raises
-        ------
-        CmmUqError : it is no such archive, or a draw in it is no finite number.
-        """
+        """Draws as :meth:`as_npz` wrote them."""
         fix = "Give posterior.npz as cmm-uq report wrote it"
         try:
             with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -179,12 +167,6 @@ def by_ensemble(values: Floats, steps: int, count: int) -> Floats:
 
     Along a chain the walkers' paths follow each other, each in the order of its steps: what two draws of a walker have in
     common stays to be seen, as it would not where walkers take turns.
-
-    Parameters
-    ----------
-    values : one a kept draw; N is a multiple of the number of ensembles.
-    steps : of each walker, before some were kept.
-    count : of all draws, before some were kept.
     """
     walkers = count // (ENSEMBLES * steps)
     kept = evenly(count, len(values))
@@ -207,12 +189,8 @@ def uncertainty_of_sum(
 
     Given the sizes the sum is normal; over their draws it is a mixture of normal distributions about one value.
 
-    Parameters
-    ----------
-    components : of the noise of the observations.
-    sizes : in each of w draws.
-    weights : (m,) of the observations.
-    beside : standard uncertainty of a normal contribution that is no noise, in the unit of the sum.
+    ``weights``: (m,) of the observations. ``beside``: standard uncertainty of a normal contribution that is no noise, in the
+    unit of the sum.
     """
     variances, _ = components.variances(sizes)
     squares = components.shares.T @ np.asarray(components.turn @ weights) ** 2

@@ -32,11 +32,8 @@ from scipy import special
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.proposals import LogDensity, Numbers, Proposes
 
-SHARES = (0.9, 0.1)
-"""How often the step is an independence proposal, and one of differential evolution."""
-
-_AHEAD = 40
-"""Most steps that are drawn ahead."""
+SHARES = (0.9, 0.1)  # how often the step is an independence proposal, and one of differential evolution
+_AHEAD = 40  # most steps that are drawn ahead
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +54,7 @@ class _Independent:
     def together(cls, steps: Sequence[_Independent], log_before: Floats) -> _Independent:
         """Those of several ensembles as those of one.
 
-        Parameters
-        ----------
-        log_before : (w,) of what is proposed, where the walkers are.
+        ``log_before``: (w,) of what is proposed, where the walkers are.
         """
         each = ((step.proposed, step.log_proposal, step.log_density, step.uniform) for step in steps)
         proposed, log_proposal, log_density, uniform = (np.concatenate(of) for of in zip(*each, strict=True))
@@ -69,10 +64,7 @@ class _Independent:
 class SideBySide:
     """A move of emcee's.
 
-    Parameters
-    ----------
-    proposal : roughly the density.
-    randoms : random numbers of each ensemble, of which the walkers follow one another.
+    ``proposal``: roughly the density. ``randoms``: random numbers of each ensemble, of which the walkers follow one another.
     """
 
     def __init__(self, proposal: Proposes, randoms: Sequence[Any]) -> None:
@@ -146,40 +138,29 @@ STEPS_AT_ONCE = 300
 MOST_STEPS = 6000
 BURN_IN = 60
 WALKERS = 32
+# asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed
 EFFECTIVE_SAMPLES = 4000
-"""Asked of every parameter: the interval's ends are then stable to about 3 % of u, below the last digit printed."""
-
 LEAST_EFFECTIVE_SAMPLES = 1000
 LARGEST_RHAT = 1.01
-
-_WINDOW = 5.0
-"""Autocorrelation times that are summed over."""
-
+_WINDOW = 5.0  # autocorrelation times that are summed over
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True, eq=False)
 class Chains:
-    """Draws from a density, and whether they can be trusted.
+    """Draws from a density, and whether they can be trusted."""
 
-    Attributes
-    ----------
-    draws : (N, d) in the density's own parameters: ensembles, steps and walkers in this order.
-    sampler : program and version.
-    ess_min, rhat_max : effective samples and rank-normalised R-hat, worst over all parameters.
-    steps, autocorrelation_time : length of each chain, and the longest time.
-    """
-
-    draws: Floats
-    sampler: str
+    draws: Floats  # (N, d) in the density's own parameters: ensembles, steps and walkers in this order
+    sampler: str  # program and version
+    # ess_min, rhat_max: effective samples and rank-normalised R-hat, worst over all parameters
     ess_min: float
     rhat_max: float
+    # steps, autocorrelation_time: length of each chain, and the longest time
     steps: int
     autocorrelation_time: float
 
     @property
     def converged(self) -> bool:
-        """See :func:`converged`."""
         return converged(self.ess_min, self.rhat_max, self.steps, self.autocorrelation_time)
 
     def thinning(self, most: int) -> int:
@@ -210,16 +191,7 @@ def run_ensembles(
 ) -> Chains:
     """Sample a density with emcee.
 
-    Parameters
-    ----------
-    density : its logarithm.
-    proposal : roughly the density.
-    seed : the same seed gives the same draws.
-    progress : told the part done, from 0 to 1.
-    effective_samples : to reach in every parameter.
-    steps_at_once : between two looks at how many there are.
-    walkers : in each ensemble; by default 32, or four for each dimension.
-    burn_in : steps that are left out.
+    ``progress``: told the part done, from 0 to 1. ``walkers``: in each ensemble; by default 32, or four for each dimension.
     """
     import emcee
 
@@ -288,10 +260,7 @@ def autocorrelation_time(chains: Floats) -> float:
 def rhat(chains: Floats, scores: Floats | None = None) -> float:
     """Largest rank-normalised split R-hat of the parameters, bulk or tail (Vehtari et al. 2021, section 4).
 
-    Parameters
-    ----------
-    chains : (c, n, d) independent chains.
-    scores : of the chains' halves, where they are known already.
+    ``chains``: (c, n, d) independent chains.
     """
     halves = split(chains)
     folded = np.abs(halves - np.median(halves, axis=(0, 1)))
@@ -329,10 +298,7 @@ def _split_rhat(values: Floats) -> Floats:
 def bulk_ess(chains: Floats, scores: Floats | None = None) -> float:
     """Smallest bulk effective sample size of the parameters.
 
-    Parameters
-    ----------
-    chains : (c, n, d) draws, n at least 8.
-    scores : of the chains' halves, where they are known already.
+    ``chains``: (c, n, d) draws, n at least 8.
     """
     scores = normal_scores(split(chains)) if scores is None else scores
     return min(_effective(scores[:, :, i]) for i in range(scores.shape[2]))

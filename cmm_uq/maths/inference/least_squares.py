@@ -15,64 +15,42 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 
+# singular values below this part of the largest are zero: rounding leaves about 1e-13, fitted placings of spheres 1e-8
 RANK_TOLERANCE = 1e-7
-"""Singular values below this part of the largest are zero: rounding leaves about 1e-13, fitted placings of spheres 1e-8."""
-
-_NOTHING = 1e-8
-"""Part of a parameter in a free combination, over its typical size, that is rounding."""
-
+_NOTHING = 1e-8  # part of a parameter in a free combination, over its typical size, that is rounding
+# up to how many times its singular value over the largest noise turns a combination that only noise shows
 _ROUGHLY = 100.0
-"""Up to how many times its singular value over the largest noise turns a combination that only noise shows."""
 
 
 @dataclass(frozen=True, eq=False)
 class LeastSquares:
-    """A least-squares estimate.
+    """A least-squares estimate."""
 
-    Attributes
-    ----------
-    unknowns : k parameters; certified ones keep their certified value.
-    value : (k,) estimates; for an undetermined parameter the one nearest to its prior mean of many that fit equally well.
-    covariance : (k, k), with the certificates' uncertainty propagated (JCGM 100, 5.1.2); infinite variance where
-        undetermined.
-    determined : (k,) whether the observations (or a certificate) determine the parameter by itself.
-    null_space : (k, f) combinations, one a column and in the parameters' units, that leave every observation as it is.
-    rank, condition : of the design in units of the parameters' typical sizes; condition of its determined part.
-    residuals : (m,) mm, observed minus explained.
-    degrees_of_freedom : observations minus what was fitted to them.
-    residual_sd : mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom.
-    sigma : mm, standard uncertainty of one coordinate that the covariance uses.
-    sigma_of_residuals : mm, the same from the residuals alone; that in use where no degrees of freedom are left.
-    spread : (k,) standard deviation that the noise gives to ``value``, of undetermined parameters too.
-    """
-
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[Unknown, ...]  # k parameters; certified ones keep their certified value
+    # (k,) estimates; for an undetermined parameter the one nearest to its prior mean of many that fit equally well
     value: Floats
+    # (k, k), with the certificates' uncertainty propagated (JCGM 100, 5.1.2); infinite variance where undetermined.
     covariance: Floats
+    # (k,) whether the observations (or a certificate) determine the parameter by itself
     determined: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    # (k, f) combinations, one a column and in the parameters' units, that leave every observation as it is
     null_space: Floats
+    # rank, condition: of the design in units of the parameters' typical sizes; condition of its determined part
     rank: int
     condition: float
-    residuals: Floats
-    degrees_of_freedom: int
-    residual_sd: float | None
-    sigma: float
-    sigma_of_residuals: float
-    spread: Floats
+    residuals: Floats  # (m,) mm, observed minus explained
+    degrees_of_freedom: int  # observations minus what was fitted to them
+    residual_sd: float | None  # mm, √(sum of squares / degrees of freedom); ``None`` without degrees of freedom
+    sigma: float  # mm, standard uncertainty of one coordinate that the covariance uses
+    sigma_of_residuals: float  # mm, the same from the residuals alone; that in use where no degrees of freedom are left
+    spread: Floats  # (k,) standard deviation that the noise gives to ``value``, of undetermined parameters too
 
 
 def solve(model: LinearModel, most: int | None = None) -> LeastSquares:
     """Least-squares estimate; certified parameters are held, physical priors are not used.
 
-    Parameters
-    ----------
-    model : linear in its parameters.
-    most : combinations to take as determined; fewer than the design's rank where the design itself is not known well enough
-        for the last of them, as where it follows the noise of fitted placings.
-
-    Raises
-    ------
-    CmmUqError : fewer observations than parameters, or none left to estimate the noise from.
+    ``most``: combinations to take as determined; fewer than the design's rank where the design itself is not known well
+    enough for the last of them, as where it follows the noise of fitted placings.
     """
     unknowns, reduced = model.unknowns, model.reduced
     held = np.array([u.known for u in unknowns], dtype=bool)

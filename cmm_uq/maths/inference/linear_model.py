@@ -21,24 +21,16 @@ from scipy import linalg, sparse
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
 
-_DEPENDENT = 1e-10
-"""Part of the largest diagonal element below which another counts as zero."""
+_DEPENDENT = 1e-10  # part of the largest diagonal element below which another counts as zero
 
 
 @dataclass(frozen=True, eq=False)
 class Freedoms:
-    """Columns (m, blocks·j), of which every observation has those of its own block.
+    """Columns (m, blocks·j), of which every observation has those of its own block."""
 
-    Parameters
-    ----------
-    columns : (m, j) of each observation's own block.
-    index : (m,) its block.
-    blocks : how many there are; one that no observation belongs to is free altogether.
-    """
-
-    columns: Floats
-    index: Ints
-    blocks: int
+    columns: Floats  # (m, j) of each observation's own block
+    index: Ints  # (m,) its block
+    blocks: int  # how many there are; one that no observation belongs to is free altogether
 
     @classmethod
     def of(cls, columns: Floats | Freedoms) -> Freedoms:
@@ -144,45 +136,27 @@ Whiten = Callable[[Floats], Floats]
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter of a linear model.
+    """A parameter of a linear model."""
 
-    Parameters
-    ----------
-    key : effect (or ``artefact``) and parameter name, as in results.json.
-    unit : as printed.
-    prior_mean, prior_sd : what is known beforehand; an infinite standard deviation means nothing.
-    scale : a typical size, for columns of comparable length.
-    known : whether the prior comes from a certificate, so that least squares may use it too.
-    """
-
-    key: tuple[str, str]
-    unit: Unit
+    key: tuple[str, str]  # effect (or ``artefact``) and parameter name, as in results.json.
+    unit: Unit  # as printed
+    # prior_mean, prior_sd: what is known beforehand; an infinite standard deviation means nothing
     prior_mean: float
     prior_sd: float
-    scale: float
-    known: bool = False
+    scale: float  # a typical size, for columns of comparable length
+    known: bool = False  # whether the prior comes from a certificate, so that least squares may use it too
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """See the module's docstring.
+    """See the module's docstring."""
 
-    Parameters
-    ----------
-    observed : (m,) mm.
-    design : (m, k) mm per unit of each parameter.
-    unknowns : k of them.
-    placing : (m, q) columns to be projected out, or those of each placing by itself.
-    noise_scale : (m,) positive.
-    sigma : standard uncertainty of one coordinate, mm; ``None`` when it is to be estimated.
-    """
-
-    observed: Floats
-    design: Floats
-    unknowns: tuple[Unknown, ...]
-    placing: Floats | Freedoms
-    noise_scale: Floats
-    sigma: float | None
+    observed: Floats  # (m,) mm
+    design: Floats  # (m, k) mm per unit of each parameter
+    unknowns: tuple[Unknown, ...]  # k of them
+    placing: Floats | Freedoms  # (m, q) columns to be projected out, or those of each placing by itself
+    noise_scale: Floats  # (m,) positive
+    sigma: float | None  # standard uncertainty of one coordinate, mm; ``None`` when it is to be estimated
 
     @cached_property
     def reduced(self) -> Reduced:
@@ -219,9 +193,7 @@ class LinearModel:
     def uncorrelated(self, whiten: Whiten) -> LinearModel:
         """The same model in observations without correlation.
 
-        Parameters
-        ----------
-        whiten : what turns columns (m, r) of noise, mm, into white noise of one coordinate's standard deviation.
+        ``whiten``: what turns columns (m, r) of noise, mm, into white noise of one coordinate's standard deviation.
         """
         observed = whiten(self.observed[:, None])[:, 0]
         return replace(

@@ -18,37 +18,23 @@ from cmm_uq.maths.inference.linear_model import Freedoms, LinearModel
 from cmm_uq.maths.inference.noise import GROWING, Components, Sizes, slow_variances
 from cmm_uq.maths.inference.slow import SlowFirst, groups, products
 
+# mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm
 SIGMA_BOUNDS = (1e-6, 10.0)
-"""mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
-
-_JITTER = 1e-11
-"""Relative; a recording that a model explains to the last digit leaves nothing to factorise."""
-
-_NUMBERS = 500_000
-"""In one batch of matrices; the random numbers of draws follow batch by batch."""
-
+_JITTER = 1e-11  # relative; a recording that a model explains to the last digit leaves nothing to factorise
+_NUMBERS = 500_000  # in one batch of matrices; the random numbers of draws follow batch by batch
+# numbers in the matrices that are reckoned with at once: as many as a processor's cache holds beside what makes them
 _CACHED = 220_000
-"""Numbers in the matrices that are reckoned with at once: as many as a processor's cache holds beside what makes them."""
-_MOST_FREE = 150
-"""Columns of placings up to which slow noise is eliminated before them."""
-
-_NUMBERS_DRAWN = 100_000_000
-"""In the matrices that all draws of the parameters take."""
+_MOST_FREE = 150  # columns of placings up to which slow noise is eliminated before them
+_NUMBERS_DRAWN = 100_000_000  # in the matrices that all draws of the parameters take
 
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """Log density of the sizes of the noise, and exact draws of the model's parameters for each.
+    """Log density of the sizes of the noise, and exact draws of the model's parameters for each."""
 
-    Parameters
-    ----------
-    model : linear about its estimate.
-    noise : its components; observations as in the model.
-    estimate : least squares of the model: deviations from it leave digits that lengths of half a metre would not.
-    """
-
-    model: LinearModel
-    noise: Components
+    model: LinearModel  # linear about its estimate
+    noise: Components  # its components; observations as in the model
+    # least squares of the model: deviations from it leave digits that lengths of half a metre would not
     estimate: LeastSquares
 
     @cached_property
@@ -180,9 +166,7 @@ class Marginal:
     def _of_slow(self, sizes: Sizes) -> tuple[Floats, Floats, Floats]:
         """What is known beforehand of slow noise' coefficients.
 
-        Returns
-        -------
-        Precision (w, c) of all but walks; by what that of a walk is multiplied (w,), zero of what is none; half the
+        Returns Precision (w, c) of all but walks; by what that of a walk is multiplied (w,), zero of what is none; half the
         logarithm of the determinant (w,).
         """
         variances = np.maximum(self.noise.variances(sizes)[1], (1e-6 * self._scale) ** 2)
@@ -254,12 +238,7 @@ class Marginal:
         return rows.transpose(0, 2, 1) @ rows, logs
 
     def _batches(self, sizes: Sizes, most: int = _NUMBERS) -> Iterator[Ints]:
-        """Which sizes to reckon with at once: those without slow noise or growth, which need less, apart.
-
-        Parameters
-        ----------
-        most : numbers in the matrices of those where slow noise comes first.
-        """
+        """Which sizes to reckon with at once: those without slow noise or growth, which need less, apart."""
         j, c = self._freedoms.columns.shape[1], self.noise.slow.shape[1]
         slow, even = sizes.slow > 0, sizes.growth == 0
         whole = (slow,) if self._slow_first is None else (slow & even, slow & ~even)

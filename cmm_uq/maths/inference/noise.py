@@ -29,68 +29,40 @@ from scipy import sparse, special
 from cmm_uq.base.points import Floats, Ints
 
 AXES, PLACING, GROWTH, SLOW = "axes", "placing", "growth", "slow"
-
-ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}
-"""Probability, beforehand, that a component is absent."""
-
+ABSENT = {AXES: 0.5, PLACING: 0.5, GROWTH: 0.8, SLOW: 0.6}  # probability, beforehand, that a component is absent
+# scale (half-normal) of the spread of the logarithms of the axes' noise, where they differ. Two contrasts of them, normal
+# with that spread, are then exponentially distributed as far as their distance from zero goes (∫ 2·φ(s)·exp(−r²/2s²) ds =
+# exp(−r)), and that distance and a direction are sampled: what is known well of two numbers is no curved ridge in three.
 AXES_SPREAD = 0.7
-"""Scale (half-normal) of the spread of the logarithms of the axes' noise, where they differ.
-
-Two contrasts of them, normal with that spread, are then exponentially distributed as far as their distance from zero goes
-(∫ 2·φ(s)·exp(−r²/2s²) ds = exp(−r)), and that distance and a direction are sampled: what is known well of two numbers is no
-curved ridge in three.
-"""
-
+# scale (half-Cauchy) of a component's standard deviation over that of a reading
 RATIO = {PLACING: 1.0, GROWTH: 1.0, SLOW: 1.0}
-"""Scale (half-Cauchy) of a component's standard deviation over that of a reading."""
-
 LARGEST_RATIO = 300.0
-
+# cosines of slow noise that one observation may see, of all axes together: as many as are used where it is quick, and where
+# it is not; what is faster counts as independent
 FREQUENCIES, FEWER = 72, 24
-"""Cosines of slow noise that one observation may see, of all axes together: as many as are used where it is quick, and
-where it is not; what is faster counts as independent."""
-
+# variance of what is faster than the cosines, over that of a reading, up to which it may count as independent
 NEGLIGIBLE = 0.05
-"""Variance of what is faster than the cosines, over that of a reading, up to which it may count as independent."""
-
-FASTEST = 200.0
-"""Largest rate of slow noise, over the duration of the recording."""
-
+FASTEST = 200.0  # largest rate of slow noise, over the duration of the recording
+# probability, beforehand, that slow noise is a random walk; its rate is then zero. A process that returns to its mean within
+# the recording, of which a walk of few readings cannot be told, leaves a constant behind that is up to four times too small.
 WALK = 0.5
-"""Probability, beforehand, that slow noise is a random walk; its rate is then zero.
-
-A process that returns to its mean within the recording, of which a walk of few readings cannot be told, leaves a constant
-behind that is up to four times too small.
-"""
-
 _CONTRASTS = np.array([[2.0, -1.0, -1.0], [0.0, 1.0, -1.0]]).T / np.sqrt([6.0, 2.0])
-_FARTHEST = 5.0
-"""Largest logarithm of an axis' noise over the mean of all."""
-
+_FARTHEST = 5.0  # largest logarithm of an axis' noise over the mean of all
 _MOST_CLASSES, _STEPS = 48, 20
+# columns of ``shares``: reading noise along x, y, z; what repeats share; growing noise; what each observation has alone
 _VARIANCES = 6
-"""Columns of ``shares``: reading noise along x, y, z; what repeats share; growing noise; what each observation has alone."""
-GROWING = 4
-"""The column of growing noise."""
+GROWING = 4  # the column of growing noise
 
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Sizes of the components in each of w draws, mm.
+    """Sizes of the components in each of w draws, mm."""
 
-    Parameters
-    ----------
-    reading : (w, 3) standard deviation of a reading along each axis.
-    placing : (w,) of a set-up offset.
-    growth : (w,) of the growing part, at the longest length.
-    slow : (w,) of slow noise, root mean square over the recording.
-    rate : (w,) at which it returns to its mean, in units of one over the duration of the recording; 0 of a random walk.
-    """
-
-    reading: Floats
-    placing: Floats
-    growth: Floats
-    slow: Floats
+    reading: Floats  # (w, 3) standard deviation of a reading along each axis
+    placing: Floats  # (w,) of a set-up offset
+    growth: Floats  # (w,) of the growing part, at the longest length
+    slow: Floats  # (w,) of slow noise, root mean square over the recording
+    # (w,) at which it returns to its mean, in units of one over the duration of the recording; 0 of a random walk
     rate: Floats
 
     @property
@@ -120,32 +92,19 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """The components that a recording could show.
+    """The components that a recording could show."""
 
-    Parameters
-    ----------
-    turn : (m, m) T, orthonormal.
-    shares : (m, 6) of each variance in that of each turned observation.
-    slow : (m, 3·…) columns S of the unturned observations, (m, 0) where no time is recorded.
-    frequency : of each of those columns, in half turns over the recording; 0 is a constant.
-    possible : which components could show here.
-    stated : standard uncertainty of a coordinate, mm, as the job states it.
-    gap : typical time between neighbouring readings, over the duration of the recording.
-    display : step in which coordinates are displayed, mm; 0 where it is too fine to matter.
-    time : (m,) of the unturned observations, from 0 to 1; (0,) where none is recorded.
-    known : what is not known of a coordinate in any case, mm: the reading noise is not taken for less.
-    """
-
-    turn: sparse.csr_array
-    shares: Floats
-    slow: Floats
-    frequency: Floats
-    possible: tuple[str, ...]
-    stated: float | None = None
-    gap: float = 0.0
-    display: float = 0.0
+    turn: sparse.csr_array  # (m, m) T, orthonormal
+    shares: Floats  # (m, 6) of each variance in that of each turned observation
+    slow: Floats  # (m, 3·…) columns S of the unturned observations, (m, 0) where no time is recorded
+    frequency: Floats  # of each of those columns, in half turns over the recording; 0 is a constant
+    possible: tuple[str, ...]  # which components could show here
+    stated: float | None = None  # standard uncertainty of a coordinate, mm, as the job states it
+    gap: float = 0.0  # typical time between neighbouring readings, over the duration of the recording
+    display: float = 0.0  # step in which coordinates are displayed, mm; 0 where it is too fine to matter
+    # (m,) of the unturned observations, from 0 to 1; (0,) where none is recorded
     time: Floats = field(default_factory=lambda: np.zeros(0))
-    known: float = 0.0
+    known: float = 0.0  # what is not known of a coordinate in any case, mm: the reading noise is not taken for less
     names: tuple[str, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -255,12 +214,7 @@ class Components:
         return np.asarray(self.slow - np.sqrt(2.0) * np.where(self.frequency == 0, 0.0, constants[:, self._axis]))
 
     def waves(self, sizes: Sizes) -> Floats:
-        """Columns (m, c), mm, of slow noise as far as the cosines go, with standard normal coefficients.
-
-        Parameters
-        ----------
-        sizes : of a single draw.
-        """
+        """Columns (m, c), mm, of slow noise as far as the cosines go, with standard normal coefficients."""
         columns = self.slow if sizes.rate[0] else self._anchored
         return np.asarray(columns * np.sqrt(self.variances(sizes)[1][0]))
 
@@ -326,12 +280,7 @@ class Components:
         return self.turn.nnz == m and bool(np.all(self.turn.data == 1) and np.all(self.turn.indices == np.arange(m)))
 
     def white(self, sizes: Sizes) -> Callable[[Floats], Floats]:
-        """What turns columns (m, r), mm, of such noise into white noise with the standard deviation of a reading.
-
-        Parameters
-        ----------
-        sizes : of a single draw.
-        """
+        """What turns columns (m, r), mm, of such noise into white noise with the standard deviation of a reading."""
         variances, _ = self.variances(sizes)
         scale = float(sizes.coordinate[0]) / np.sqrt((variances @ self.shares.T)[0])[:, None]
         waves = scale * np.asarray(self.turn @ self.waves(sizes)) / float(sizes.coordinate[0])

@@ -18,42 +18,29 @@ from cmm_uq.maths.inference.presence import beginning, present
 from cmm_uq.maths.inference.proposals import Proposal, Proposes, tempered, weights
 
 __all__ = ["SIGMA_BOUNDS", "Density", "Posterior", "Progress", "sample"]
-
+# mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm
 SIGMA_BOUNDS = (1e-6, 10.0)
-"""mm: from a nanometre to a centimetre; between them an unknown noise is uniform in its logarithm."""
-
+# of ln σ: how near to the end of the range searched is at its end, and the step through the whole range
 _EDGE, _STEP = 0.01, 0.5
-"""Of ln σ: how near to the end of the range searched is at its end, and the step through the whole range."""
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Draws from a posterior, and whether they can be trusted.
+    """Draws from a posterior, and whether they can be trusted."""
 
-    Attributes
-    ----------
-    unknowns : k parameters.
-    draws : (N, k) in the parameters' units.
-    sigma : (N,) standard uncertainty of one coordinate, mm; constant when it was stated.
-    seed : of the random numbers.
-    sampler : program and version.
-    ess_min, rhat_max : worst over all parameters and the noise.
-    steps, autocorrelation_time : length of each chain, and the longest time.
-    every : of how many steps one was kept as a draw.
-    shapes : (N, q) of what shapes columns, if anything does.
-    """
-
-    unknowns: tuple[Unknown, ...]
-    draws: Floats
-    sigma: Floats
-    seed: int
-    sampler: str
+    unknowns: tuple[Unknown, ...]  # k parameters
+    draws: Floats  # (N, k) in the parameters' units
+    sigma: Floats  # (N,) standard uncertainty of one coordinate, mm; constant when it was stated
+    seed: int  # of the random numbers
+    sampler: str  # program and version
+    # ess_min, rhat_max: worst over all parameters and the noise
     ess_min: float
     rhat_max: float
+    # steps, autocorrelation_time: length of each chain, and the longest time
     steps: int
     autocorrelation_time: float
-    shapes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    every: int = 1
+    shapes: Floats = field(default_factory=lambda: np.zeros((0, 0)))  # (N, q) of what shapes columns, if anything does
+    every: int = 1  # of how many steps one was kept as a draw
 
     @property
     def converged(self) -> bool:
@@ -181,11 +168,7 @@ def _lower(covariance: Floats) -> Floats:
 def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> Posterior:
     """Sample the posterior of a linear model with emcee.
 
-    Parameters
-    ----------
-    model : with proper priors or data on every parameter.
-    seed : the same seed gives the same draws.
-    progress : told the part done, from 0 to 1.
+    ``progress``: told the part done, from 0 to 1.
     """
     density = Density(model)
     centre, factor = density.laplace()
@@ -198,11 +181,9 @@ def sample(model: LinearModel, seed: int, progress: Progress | None = None) -> P
     )  # fmt: skip
 
 
-_LOOKED_AT = 2000
-"""Draws by which it is judged whether slow noise is quicker than a few cosines."""
-
+_LOOKED_AT = 2000  # draws by which it is judged whether slow noise is quicker than a few cosines
+# steps that are left out where what is proposed knows which components are present: about every other one is taken
 _BURN_IN = 30
-"""Steps that are left out where what is proposed knows which components are present: about every other one is taken."""
 
 
 def sample_with_noise(
@@ -210,13 +191,7 @@ def sample_with_noise(
 ) -> NoisyPosterior:
     """Sample the posterior.
 
-    Parameters
-    ----------
-    model : linear about its estimate.
-    noise : the components that its observations could show.
-    estimate : least squares of the model.
-    seed : the same seed gives the same draws.
-    progress : told the part done, from 0 to 1.
+    ``progress``: told the part done, from 0 to 1.
     """
     marginal, proposal = sufficient(Marginal(model, noise, estimate), seed)
     noise = marginal.noise
@@ -241,13 +216,7 @@ def sample_with_noise(
 
 
 def sufficient(marginal: Marginal, seed: int) -> tuple[Marginal, Proposes]:
-    """The density with as many cosines as slow noise of this recording takes, and what to propose for it.
-
-    Parameters
-    ----------
-    marginal : with all cosines.
-    seed : of the draws.
-    """
+    """The density with as many cosines as slow noise of this recording takes, and what to propose for it."""
     centre, factor = start(marginal)
     if SLOW not in marginal.noise.possible:
         return marginal, tempered(marginal.log_density, centre, factor, seed)

@@ -26,37 +26,23 @@ from cmm_uq.maths.inference.noise import ABSENT, AXES, GROWTH, PLACING, SLOW, WA
 from cmm_uq.maths.inference.proposals import LogDensity, Proposal, chosen, cumulative, highest_power, moments, weights
 from cmm_uq.maths.inference.proposals import Numbers as RandomNumbers
 
+# numbers that say whether something is present, and the probability that it is not
 _SWITCHES = {"spread": ABSENT[AXES], PLACING: ABSENT[PLACING], GROWTH: ABSENT[GROWTH], SLOW: ABSENT[SLOW], "rate": WALK}
-"""Numbers that say whether something is present, and the probability that it is not."""
-
-_LEAST = -8.0
-"""Of a standard normal number: what is less probable is not told from it."""
-
-TRIED, _BY_PRIOR = 1500, 0.03
-"""Draws of a round; part of what is proposed that goes by the prior of what is present."""
-
+_LEAST = -8.0  # of a standard normal number: what is less probable is not told from it
+TRIED, _BY_PRIOR = 1500, 0.03  # draws of a round; part of what is proposed that goes by the prior of what is present
+# part of each set's draws that come from as wide a distribution, in units of the usual one
 _OUTER, _FARTHER = 0.15, 2.0
-"""Part of each set's draws that come from as wide a distribution, in units of the usual one."""
-
-_ROUNDS, _LOOKS, _RECALLED = 30, 3, 3
-"""At most; to the density itself; whose draws count together."""
-
+_ROUNDS, _LOOKS, _RECALLED = 30, 3, 3  # at most; to the density itself; whose draws count together
+# part of the draws that must count, to begin with and at least; times the last power below which they count too much
 _ENOUGH, _LEAST_ENOUGH, _STUCK = 0.2, 0.02, 1.01
-"""Part of the draws that must count, to begin with and at least; times the last power below which they count too much."""
-
 _NEVER = -1e30
 
 
 @dataclass(frozen=True)
 class Numbers:
-    """The numbers that say the sizes of noise, and what they mean.
+    """The numbers that say the sizes of noise, and what they mean."""
 
-    Parameters
-    ----------
-    names : as in :attr:`cmm_uq.maths.inference.noise.Components.names`, or but for the first.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # as in :attr:`cmm_uq.maths.inference.noise.Components.names`, or but for the first.
 
     @cached_property
     def switches(self) -> tuple[str, ...]:
@@ -127,9 +113,7 @@ class Numbers:
     def latent(self, number: Ints, coordinates: Floats, normal: Floats, uniform: Floats) -> Floats:
         """Numbers (w, d) of sets (w,) and their coordinates (w, D).
 
-        Parameters
-        ----------
-        normal, uniform : (w, d) and (w, switches) random numbers, from which what does not matter is drawn by its prior.
+        ``normal, uniform``: (w, d) and (w, switches) random numbers, from which what does not matter is drawn by its prior.
         """
         on = self.sets[number]
         column = dict(zip((name for name in self.names if name != "spread"), coordinates.T, strict=True))
@@ -158,18 +142,11 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Present:
-    """What is proposed: probabilities of the sets of components, and distributions of what then matters.
+    """What is proposed: probabilities of the sets of components, and distributions of what then matters."""
 
-    Parameters
-    ----------
-    numbers : what they mean.
-    probability : (S,) of each set.
-    each : (S,) of the coordinates that matter in it.
-    """
-
-    numbers: Numbers
-    probability: Floats
-    each: Sequence[Proposal]
+    numbers: Numbers  # what they mean
+    probability: Floats  # (S,) of each set
+    each: Sequence[Proposal]  # (S,) of the coordinates that matter in it
 
     @property
     def centre(self) -> Floats:
@@ -239,16 +216,7 @@ def beginning(names: Sequence[str], log_sigma: float = 0.0, width: float = 1.0) 
 
 
 def present(density: LogDensity, begin: Present, seed: int, looks: int = _LOOKS, tried: int = TRIED) -> Present:
-    """An approximation of a density of the numbers that say the sizes of noise.
-
-    Parameters
-    ----------
-    density : to be approximated.
-    begin : from where to look.
-    seed : of the draws.
-    looks : how often to draw where the density itself is looked at.
-    tried : draws of each round.
-    """
+    """An approximation of a density of the numbers that say the sizes of noise."""
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed, spawn_key=(17,))))
     proposals: list[Present] = [begin]
     draws: list[Floats] = []

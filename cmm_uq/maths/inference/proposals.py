@@ -17,28 +17,19 @@ from scipy import special
 
 from cmm_uq.base.points import Floats
 
-Numbers = tuple[NDArray[Any], ...]
-"""Random numbers, of which the first axis are draws."""
-
-LogDensity = Callable[[Floats], Floats]
-"""Of (w, d) parameters, up to a constant: (w,)."""
-
+Numbers = tuple[NDArray[Any], ...]  # random numbers, of which the first axis are draws
+LogDensity = Callable[[Floats], Floats]  # of (w, d) parameters, up to a constant: (w,)
 _DOF = 6.0
+# times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail
 _WIDER = 2.0
-"""Times the curvature's width at which a skewed density is first looked at: too wide costs draws, too narrow misses a tail."""
-
 _LOOKS = 3
+# letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with
 _ENOUGH, _MOST_LOOKS, _NEVER = 0.2, 25, -1e30
-"""Letting in by degrees: part of the draws that must count, rounds at most, least gain that is reckoned with."""
-
-_STUCK = 1.01
-"""Times the power from round to round below which one distribution does not do."""
-
+_STUCK = 1.01  # times the power from round to round below which one distribution does not do
+# distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with
 _PARTS, _WIDE, _NARROWER = 8, 0.1, 0.3
-"""Distributions of a mixture; weight of one more as wide as all; their variance over that of all to begin with."""
 _REFITS, _RECALLED, _LEAST_ENOUGH = 5, 3, 0.02
-_FITS = 8
-"""Mixtures fitted to the density itself from which the best is taken."""
+_FITS = 8  # mixtures fitted to the density itself from which the best is taken
 
 
 class Proposes(Protocol):
@@ -66,16 +57,12 @@ class Proposes(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Student's t distributions with six degrees of freedom in whitened coordinates z; x = centre + factor @ z.
+    """Student's t distributions with six degrees of freedom in whitened coordinates z; x = centre + factor @ z."""
 
-    Parameters
-    ----------
-    centre, factor : (d,) and (d, d).
-    weights, centres, factors : (K,), (K, d) and (K, d, d) in z.
-    """
-
+    # centre, factor: (d,) and (d, d)
     centre: Floats
     factor: Floats
+    # weights, centres, factors: (K,), (K, d) and (K, d, d) in z
     weights: Floats
     centres: Floats
     factors: Floats
@@ -194,11 +181,7 @@ def tempered(density: LogDensity, centre: Floats, factor: Floats, seed: int) -> 
 
     What is looked for goes from where the search begins to the density, in each round as far as enough draws count.
 
-    Parameters
-    ----------
-    density : to be approximated.
-    centre, factor : where to begin, (d,) and (d, d), wide enough for the density to be somewhere within.
-    seed : of the draws.
+    ``centre, factor``: where to begin, (d,) and (d, d), wide enough for the density to be somewhere within.
     """
     random, d = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))), len(centre)
     begin, back = centre, np.linalg.inv(factor)

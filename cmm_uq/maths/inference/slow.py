@@ -21,34 +21,20 @@ from scipy import linalg
 
 from cmm_uq.base.points import Floats, Ints
 
-_NOTHING = 1e-9
-"""Part of the largest below which a cosine is zero for an observation."""
-
-_NONE = 1e-13
-"""Part of the largest below which another column's value is zero."""
-
-_ALIKE = 1e-12
-"""Relative difference up to which variances are the same."""
+_NOTHING = 1e-9  # part of the largest below which a cosine is zero for an observation
+_NONE = 1e-13  # part of the largest below which another column's value is zero
+_ALIKE = 1e-12  # relative difference up to which variances are the same
 
 
 @dataclass(frozen=True, eq=False)
 class SlowFirst:
-    """Inner products of the cosines with each other and with all other columns, by class of the observations.
+    """Inner products of the cosines with each other and with all other columns, by class of the observations."""
 
-    Parameters
-    ----------
-    cosines : (m, c), turned.
-    others : (m, R), turned.
-    classes : (m,) the class of each observation, 0 to ``count`` − 1.
-    base : (count,) variance of each class, of any size, where the noise is alike in all observations.
-    walk : (c, c) precision beforehand of the cosines of a random walk of some size.
-    """
-
-    cosines: Floats
-    others: Floats
-    classes: Ints
-    base: Floats
-    walk: Floats
+    cosines: Floats  # (m, c), turned
+    others: Floats  # (m, R), turned
+    classes: Ints  # (m,) the class of each observation, 0 to ``count`` − 1
+    base: Floats  # (count,) variance of each class, of any size, where the noise is alike in all observations
+    walk: Floats  # (c, c) precision beforehand of the cosines of a random walk of some size
 
     @property
     def count(self) -> int:
@@ -106,19 +92,16 @@ class SlowFirst:
     def precision(self, v: Floats, prior: Floats, known: Floats, walks: Floats) -> tuple[Floats, Floats]:
         """What is left of the other columns' precision (w, R, R), and half the logarithm of the cosines' determinant (w,).
 
-        Parameters
-        ----------
-        v : (w, classes) variance of the observations of each class.
-        prior : (R²,) precision of the other columns beforehand.
-        known : (w, c) precision of the cosines beforehand, but for walks.
-        walks : (w,) by what that of a walk is to be multiplied; zero of what is none.
+        ``v``: (w, classes) variance of the observations of each class. ``prior``: (R²,) precision of the other columns
+        beforehand. ``known``: (w, c) precision of the cosines beforehand, but for walks. ``walks``: (w,) by what that of a
+        walk is to be multiplied; zero of what is none.
         """
         w, R = len(v), self.others.shape[1]
         left = ((1 / v) @ self._others + prior).reshape(w, R, R)
         logs = np.zeros(w)
         for (columns, own, of_cosines, across), near, turned in zip(
             self._products, self._near, self._turned, strict=True
-        ):  # fmt: skip
+        ):
             times = v[:, own] / self.base[own]
             alike = (walks > 0) & (np.ptp(times, axis=1) <= _ALIKE * times[:, 0])
             if alike.any():
@@ -146,18 +129,11 @@ class SlowFirst:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Cosines of a walk in coordinates in which they are independent of each other, before and after noise that is alike.
+    """Cosines of a walk in coordinates in which they are independent of each other, before and after noise that is alike."""
 
-    Parameters
-    ----------
-    known : (c,) precision that noise of variance one leaves of each, where that beforehand is one.
-    taken : (c, r²) what each takes from the precision of the other columns.
-    log : half the logarithm of the determinant of the walk's precision.
-    """
-
-    known: Floats
-    taken: Floats
-    log: float
+    known: Floats  # (c,) precision that noise of variance one leaves of each, where that beforehand is one
+    taken: Floats  # (c, r²) what each takes from the precision of the other columns
+    log: float  # half the logarithm of the determinant of the walk's precision
 
     @classmethod
     def of(cls, products: Floats, walk: Floats) -> _Turned:
@@ -172,10 +148,7 @@ class _Turned:
     def lost(self, variance: Floats, times: Floats) -> tuple[Floats, Floats]:
         """What other columns' precision loses (w, r, r), and half the logarithm of the cosines' determinant (w,).
 
-        Parameters
-        ----------
-        variance : (w,) of the noise.
-        times : (w,) by what the precision of the walk is multiplied.
+        ``variance``: (w,) of the noise. ``times``: (w,) by what the precision of the walk is multiplied.
         """
         each = self.known / variance[:, None] + times[:, None]
         size = int(np.sqrt(self.taken.shape[1]))
@@ -203,9 +176,8 @@ def products(first: Floats, second: Floats, classes: Ints, count: int) -> Floats
     return np.stack([(first[rows].T @ second[rows]).ravel() for rows in parts])
 
 
+# part of the root to which it is found at best: four times the spacing of floats at one
 _RELATIVE = 8.881784197001252e-16
-"""Part of the root to which it is found at best: four times the spacing of floats at one."""
-
 _ROUNDS = 100
 
 
@@ -214,11 +186,6 @@ def root(function: Callable[[float], float], low: float, high: float, tolerance:
 
     Brent's method (R. P. Brent 1973, Algorithms for Minimization without Derivatives, chapter 4) in the steps of
     ``scipy.optimize.brentq``, whose package takes longer to import than most commands run.
-
-    Raises
-    ------
-    ValueError : the signs are alike, or the function is not a number somewhere.
-    ArithmeticError : a hundred rounds do not find it.
     """
     before, now, far = float(low), float(high), 0.0
     at_before, at_now, at_far = _value(function, before), _value(function, now), 0.0

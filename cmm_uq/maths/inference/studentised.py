@@ -13,11 +13,9 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
 
+# part of its variance that must be left of an observation: a smaller one is mostly what the model lacks, made large
 _LEAST_LEFT = 0.1
-"""Part of its variance that must be left of an observation: a smaller one is mostly what the model lacks, made large."""
-
-_DEPENDENT = 1e-9
-"""Part of the largest singular value below which another counts as zero."""
+_DEPENDENT = 1e-9  # part of the largest singular value below which another counts as zero
 
 
 def studentised(model: LinearModel, noise: Components, sizes: Sizes, residuals: Floats) -> Floats:
@@ -26,12 +24,7 @@ def studentised(model: LinearModel, noise: Components, sizes: Sizes, residuals: 
     The design's columns and the placings are projected out under the noise without its slow part (Cook & Weisberg 1982,
     Residuals and Influence in Regression, 2.2.1).
 
-    Parameters
-    ----------
-    model : whose observations they are.
-    noise : its components.
-    sizes : of a single draw.
-    residuals : (m,) of least squares, mm.
+    ``residuals``: (m,) of least squares, mm.
     """
     variance = (noise.variances(sizes)[0] @ noise.shares.T)[0]
     scale = np.sqrt(variance) / float(sizes.coordinate[0])

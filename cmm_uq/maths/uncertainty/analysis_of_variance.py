@@ -19,18 +19,13 @@ from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, Line
 
 @dataclass(frozen=True)
 class OneWay:
-    """Variances of readings in groups.
+    """Variances of readings in groups."""
 
-    Parameters
-    ----------
-    groups, repeats : number of groups, and of readings in each.
-    mean : of all readings.
-    between, within : mean squares, of ``groups − 1`` and ``groups · (repeats − 1)`` degrees of freedom.
-    """
-
+    # groups, repeats: number of groups, and of readings in each
     groups: int
     repeats: int
-    mean: float
+    mean: float  # of all readings
+    # between, within: mean squares, of ``groups − 1`` and ``groups · (repeats − 1)`` degrees of freedom
     between: float
     within: float
 
@@ -92,12 +87,7 @@ class OneWay:
 
 
 def one_way(readings: Sequence[float] | Floats, group: Sequence[int] | Ints) -> OneWay:
-    """Analysis of variance of readings (n,) by the group of each (n,).
-
-    Raises
-    ------
-    CmmUqError : fewer than two groups, fewer than two readings in each, or not as many in each.
-    """
+    """Analysis of variance of readings (n,) by the group of each (n,)."""
     values, of = np.asarray(readings, dtype=np.float64), np.asarray(group)
     names, counts = np.unique(of, return_counts=True)
     if len(names) < 2 or counts.min() < 2 or counts.min() != counts.max():

@@ -28,43 +28,28 @@ if TYPE_CHECKING:
     from cmm_uq.maths.uncertainty.propagation import Propagated
 
 CERTIFICATE, SPECIFICATION = say("certificate"), say("specification")
+# where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)
 REPEATS, JUDGEMENT = say("repeats"), say("judgement")
-"""Where a figure comes from, in the fewest words; a line may say more (``"certificate 4711"``)."""
-
-
 _ROUNDING = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One source of uncertainty.
+    """One source of uncertainty."""
 
-    Parameters
-    ----------
-    name : the quantity.
-    u : its standard uncertainty, in ``unit``; None for a line that is no quantity (a correlation).
-    origin : where the figure comes from.
-    value : its estimate, where it has one.
-    unit : of value and u, as text.
-    distribution : by its name in JCGM 101 table 1.
-    dof : degrees of freedom of u.
-    sensitivity : change of the measurand by a change of the quantity; None where there is no single one.
-    variance : what the line adds to the variance of the measurand, where that is not (sensitivity × u)².
-    parts : the budget that ``u`` comes from.
-    shared : whether repetitions share it, so that it does not average out.
-    """
-
-    name: Text
-    u: float | None
-    origin: Text
-    value: float | None = None
-    unit: Text = NOTHING
-    distribution: str = "normal"
-    dof: float = inf
+    name: Text  # the quantity
+    u: float | None  # its standard uncertainty, in ``unit``; None for a line that is no quantity (a correlation)
+    origin: Text  # where the figure comes from
+    value: float | None = None  # its estimate, where it has one
+    unit: Text = NOTHING  # of value and u, as text
+    distribution: str = "normal"  # by its name in JCGM 101 table 1
+    dof: float = inf  # degrees of freedom of u
+    # change of the measurand by a change of the quantity; None where there is no single one
     sensitivity: float | None = 1.0
+    # what the line adds to the variance of the measurand, where that is not (sensitivity × u)²
     variance: float | None = None
-    parts: Budget | None = None
-    shared: bool = False
+    parts: Budget | None = None  # the budget that ``u`` comes from
+    shared: bool = False  # whether repetitions share it, so that it does not average out
 
     def __post_init__(self) -> None:
         if self.u is not None and not (isfinite(self.u) and self.u >= 0):
@@ -109,28 +94,17 @@ def line_of(name: str, given: Distribution, labels: Labels | None = None, sensit
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """What is known of a measurand, line by line.
+    """What is known of a measurand, line by line."""
 
-    Parameters
-    ----------
-    measurand : what is measured.
-    lines : its sources of uncertainty.
-    value : estimate; None where the budget is of an uncertainty alone.
-    unit : of the measurand, as text.
-    coverage : probability of the expanded uncertainty.
-    effective_dof : where the lines alone do not tell them (correlated inputs).
-    factor : coverage factor where a standard prescribes one; None takes that of the degrees of freedom.
-    statement : what kind of uncertainty this is and what it is not, for the reader.
-    """
-
-    measurand: Text
-    lines: Sequence[Line]
-    value: float | None = None
-    unit: Text = NOTHING
-    coverage: float = 0.95
-    effective_dof: float | None = None
+    measurand: Text  # what is measured
+    lines: Sequence[Line]  # its sources of uncertainty
+    value: float | None = None  # estimate; None where the budget is of an uncertainty alone
+    unit: Text = NOTHING  # of the measurand, as text
+    coverage: float = 0.95  # probability of the expanded uncertainty
+    effective_dof: float | None = None  # where the lines alone do not tell them (correlated inputs)
+    # coverage factor where a standard prescribes one; None takes that of the degrees of freedom
     factor: float | None = None
-    statement: Text = NOTHING
+    statement: Text = NOTHING  # what kind of uncertainty this is and what it is not, for the reader
 
     @property
     def variance(self) -> float:

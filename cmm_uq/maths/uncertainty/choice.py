@@ -31,19 +31,13 @@ _OF_TOLERANCE = 5.0
 
 @dataclass(frozen=True)
 class Comparison:
-    """Interval of the law of propagation against that of Monte Carlo, for one output.
+    """Interval of the law of propagation against that of Monte Carlo, for one output."""
 
-    Parameters
-    ----------
-    low, high : differences of the lower and the upper ends.
-    tolerance : δ.
-    error : standard error of Monte Carlo's ends, the larger of the two.
-    """
-
+    # low, high: differences of the lower and the upper ends
     low: float
     high: float
-    tolerance: float
-    error: float
+    tolerance: float  # δ
+    error: float  # standard error of Monte Carlo's ends, the larger of the two
 
     @property
     def agrees(self) -> bool:
@@ -67,12 +61,7 @@ class Comparison:
 
 
 def compare(propagated: Propagated, simulated: Simulated, row: int, digits: int) -> Comparison:
-    """Clause 8.1 for one output; ``digits`` of u are regarded as meaningful.
-
-    Raises
-    ------
-    CmmUqError : the law of propagation has no interval (fewer than one effective degree of freedom).
-    """
+    """Clause 8.1 for one output; ``digits`` of u are regarded as meaningful."""
     low, high = (float(end[row]) for end in propagated.interval(simulated.coverage))
     drawn_low, drawn_high = simulated.symmetric_interval[row]
     u = simulated.u[row]
@@ -113,7 +102,6 @@ def _has_interval(propagated: Propagated) -> bool:
 
 Method = Literal["first", "second", "monte_carlo"]
 _ROUNDING = 4e-16
-
 PROPAGATION: tuple[Method, ...] = ("first", "second")
 NAMES: Mapping[Method, Text] = {
     "first": say("first order"),
@@ -149,12 +137,7 @@ def by_propagation(model: MeasurementModel) -> Ways:
 
 
 def must_be_possible(model: MeasurementModel, ways: Ways, method: Method) -> None:
-    """Refuse a method that was asked for by name and does not give an uncertainty.
-
-    Raises
-    ------
-    CmmUqError : the derivatives are not finite, or an output has u = 0 although inputs are uncertain.
-    """
+    """Refuse a method that was asked for by name and does not give an uncertainty."""
     found = ways.propagated(method)
     if found is None:
         raise CmmUqError(ways.problems[method], where=f"method = {method!r}", fix="Use method 'auto' or 'monte_carlo'")

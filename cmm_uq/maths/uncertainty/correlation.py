@@ -20,18 +20,11 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.distributions import Distribution
 
 Correlations = Mapping[tuple[str, str], float]
-
 _ROUNDING = 1e-9
 
 
 def correlation_matrix(names: Sequence[str], correlations: Correlations) -> Floats:
-    """Matrix (m, m) from the coefficients of pairs; pairs that are not given are uncorrelated.
-
-    Raises
-    ------
-    CmmUqError : an unknown input, a pair given twice, a coefficient beyond ±1, or coefficients that no joint
-        distribution can have (the matrix is not positive semidefinite).
-    """
+    """Matrix (m, m) from the coefficients of pairs; pairs that are not given are uncorrelated."""
     matrix = np.eye(len(names))
     for (a, b), r in correlations.items():
         where = f"correlation {a},{b}"
@@ -90,18 +83,11 @@ def correlation_of(covariance: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance of several estimates.
+    """Covariance of several estimates."""
 
-    Parameters
-    ----------
-    parameters : k names.
-    units : of each, as printed.
-    matrix : (k, k); an element is in the product of the units of its row and column.
-    """
-
-    parameters: tuple[str, ...]
-    units: tuple[str, ...]
-    matrix: Floats
+    parameters: tuple[str, ...]  # k names
+    units: tuple[str, ...]  # of each, as printed
+    matrix: Floats  # (k, k); an element is in the product of the units of its row and column
 
     @classmethod
     def of_draws(cls, draws: Mapping[str, tuple[Floats, str]]) -> Covariance:
@@ -112,19 +98,13 @@ class Covariance:
 
 
 Draw = Callable[[np.random.Generator, int], list[Floats]]
-
 _HERMITE_NODES = 80
 _SEARCH_STEPS = 60
 _SERIES_REMAINDER = 2e-3
 
 
 def joint_draws(inputs: Mapping[str, Distribution], matrix: Floats) -> Draw:
-    """Function that draws all inputs together: ``draw(rng, n)`` gives one array (n,) an input.
-
-    Raises
-    ------
-    CmmUqError : a correlation that the two distributions cannot have, or inputs tied in a way that has no joint form.
-    """
+    """Function that draws all inputs together: ``draw(rng, n)`` gives one array (n,) an input."""
     names, given = list(inputs), list(inputs.values())
     groups = [(group, _group_draw([names[i] for i in group], [given[i] for i in group], matrix[np.ix_(group, group)]))
               for group in _groups(given, matrix)]  # fmt: skip

@@ -182,15 +182,10 @@ class Rectangle:
 
 @dataclass(frozen=True, eq=False)
 class SmallestRegion:
-    """Cells of a mesh that hold the coverage probability in the smallest area.
+    """Cells of a mesh that hold the coverage probability in the smallest area."""
 
-    Parameters
-    ----------
-    inside : (k, l) which cells belong to it.
-    x, y : edges (k + 1,) and (l + 1,) of the cells.
-    """
-
-    inside: NDArray[np.bool_]
+    inside: NDArray[np.bool_]  # (k, l) which cells belong to it
+    # x, y: edges (k + 1,) and (l + 1,) of the cells
     x: Floats
     y: Floats
 
@@ -209,12 +204,7 @@ def elliptical_factor(outputs: int, coverage: float = 0.95) -> float:
 
 
 def elliptical_region(draws: Floats, coverage: float = 0.95) -> Ellipsoid:
-    """Ellipsoid about the mean that holds the coverage probability of draws (p, n) (7.7.2).
-
-    Raises
-    ------
-    CmmUqError : the outputs are bound to a line or a plane, where no ellipsoid has a volume.
-    """
+    """Ellipsoid about the mean that holds the coverage probability of draws (p, n) (7.7.2)."""
     check_coverage(coverage)
     centre, covariance = draws.mean(axis=1), np.atleast_2d(np.cov(draws))
     if np.linalg.matrix_rank(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))) < len(draws):
@@ -233,14 +223,7 @@ def rectangular_region(draws: Floats, coverage: float = 0.95) -> Rectangle:
 def smallest_region(draws: Floats, coverage: float = 0.95, cells: int = 60) -> SmallestRegion:
     """Smallest region of two outputs, on a mesh (7.7.4): the fullest cells first, until they hold the probability.
 
-    Parameters
-    ----------
-    draws : (2, n); a hundred times as many as there are cells, or more.
-    cells : along each output.
-
-    Raises
-    ------
-    CmmUqError : not two outputs, or too few draws for the mesh.
+    ``draws``: (2, n); a hundred times as many as there are cells, or more.
     """
     check_coverage(coverage)
     if len(draws) != 2 or draws.shape[1] < 100 * cells:
@@ -267,27 +250,20 @@ def _quantile(distances: Floats, coverage: float) -> float:
     return float(np.sort(distances)[int(np.ceil(coverage * len(distances))) - 1])
 
 
-NO_VARIANCE = 0.5
-"""Shape from which on the second moment does not exist."""
-
+NO_VARIANCE = 0.5  # shape from which on the second moment does not exist
 _CANDIDATES = 30
 _PRIOR_WEIGHT, _PRIOR_SHAPE = 10, 0.5
+# standard errors of the shape by which it is taken for heavier than it was found, when what was not drawn is judged
 _ERRORS = 2.0
-"""Standard errors of the shape by which it is taken for heavier than it was found, when what was not drawn is judged."""
 
 
 @dataclass(frozen=True)
 class Tail:
-    """One tail of the draws of an output.
+    """One tail of the draws of an output."""
 
-    Parameters
-    ----------
-    shape : k of the generalised Pareto distribution.
-    unseen : what the draws beyond the largest one of so many would add to the mean square about the mean; infinite where there
-        is none.
-    """
-
-    shape: float
+    shape: float  # k of the generalised Pareto distribution
+    # what the draws beyond the largest one of so many would add to the mean square about the mean; infinite where there is
+    # none
     unseen: float
 
 
@@ -297,14 +273,7 @@ def draws_in_tail(trials: int) -> int:
 
 
 def tail_of(largest: Floats, mean: float, trials: int) -> Tail:
-    """The upper tail of draws.
-
-    Parameters
-    ----------
-    largest : the largest draws, ascending; the first is the threshold of the others.
-    mean : of all draws.
-    trials : number of all draws.
-    """
+    """The upper tail of draws."""
     excess = largest[1:] - largest[0]
     if len(excess) < 5 or not excess[-1] > 0 or not np.isfinite(excess[-1]):
         return Tail(-np.inf, 0.0)

@@ -37,7 +37,6 @@ from cmm_uq.maths.uncertainty.quantity import rounded
 from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
 
 METHODS = ("first", "second", "monte_carlo", "auto")
-
 _TRIALS_FOR_SENSITIVITY = 100_000
 
 
@@ -54,11 +53,11 @@ class Request:
     largest : trials that the adaptive Monte Carlo makes at most.
     """
 
-    method: str = "auto"
-    coverage: float = 0.95
-    digits: int = 2
-    seed: int = 0
-    largest: int = LARGEST
+    method: str = "auto"  # ``first``, ``second``, ``monte_carlo`` or ``auto``
+    coverage: float = 0.95  # probability of the intervals
+    digits: int = 2  # significant digits of u that Monte Carlo must support, and to which clause 8 compares
+    seed: int = 0  # of the random numbers
+    largest: int = LARGEST  # trials that the adaptive Monte Carlo makes at most
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -72,43 +71,28 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """One output: its result by the method chosen.
+    """One output: its result by the method chosen."""
 
-    Parameters
-    ----------
-    method, reason : how the result was obtained, and why so.
-    value, u : estimate and standard uncertainty.
-    dof : effective degrees of freedom; infinite for Monte Carlo, whose intervals need none.
-    interval : coverage interval; the shortest one for Monte Carlo.
-    coverage_factor : half the interval's length over u.
-    budget : what contributes.
-    """
-
+    # method, reason: how the result was obtained, and why so
     method: Method
     reason: Text
+    # value, u: estimate and standard uncertainty
     value: float
     u: float
-    dof: float
-    interval: tuple[float, float]
-    coverage_factor: float
-    budget: Budget
+    dof: float  # effective degrees of freedom; infinite for Monte Carlo, whose intervals need none
+    interval: tuple[float, float]  # coverage interval; the shortest one for Monte Carlo
+    coverage_factor: float  # half the interval's length over u
+    budget: Budget  # what contributes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
-    """All outputs of a model.
-
-    Parameters
-    ----------
-    stated : result of each output by name.
-    correlation : (p, p) of the outputs; ``nan`` where one has no uncertainty.
-    ways : results of every method that was asked for and possible.
-    """
+    """All outputs of a model."""
 
     request: Request
-    stated: Mapping[str, Stated]
-    correlation: Floats
-    ways: Ways
+    stated: Mapping[str, Stated]  # result of each output by name
+    correlation: Floats  # (p, p) of the outputs; ``nan`` where one has no uncertainty
+    ways: Ways  # results of every method that was asked for and possible
 
     @property
     def stable(self) -> bool:

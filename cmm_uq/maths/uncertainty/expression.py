@@ -74,16 +74,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression.
+    """A parsed expression."""
 
-    Parameters
-    ----------
-    text : as written.
-    steps : in the order of a stack.
-    """
-
-    text: str
-    steps: tuple[Step, ...]
+    text: str  # as written
+    steps: tuple[Step, ...]  # in the order of a stack
 
     @property
     def names(self) -> set[str]:
@@ -109,15 +103,7 @@ class Expression:
 def parse(text: str, known: Collection[str], where: str | None = None) -> Expression:
     """Parse an expression of known quantities.
 
-    Parameters
-    ----------
-    text : such as ``"sqrt(x1**2 + x2**2)"``.
-    known : names that it may use.
-    where : file and key, for messages.
-
-    Raises
-    ------
-    CmmUqError : what is written is no such expression, or uses an unknown name.
+    ``text``: such as ``"sqrt(x1**2 + x2**2)"``.
     """
     if len(text) > LONGEST:
         raise CmmUqError(f"an expression of {len(text)} characters", where=where, fix=f"{LONGEST} are the most")

@@ -27,9 +27,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from cmm_uq.base.errors import CmmUqError
 
-Operand = Any
-"""A float or an array, real or complex."""
-
+Operand = Any  # A float or an array, real or complex
 Partial = Callable[..., Operand]
 
 
@@ -174,11 +172,8 @@ Second = dict[tuple[int, int], Operand]
 class Jet(NDArrayOperatorsMixin):
     """A quantity with its derivatives by numbered inputs.
 
-    Parameters
-    ----------
-    value : float or array (n,).
-    first : derivative by input k, for the inputs that the quantity depends on.
-    second : second derivative by inputs (k, l), k ≤ l; ``None`` when only first derivatives are carried.
+    ``value``: float or array (n,). ``first``: derivative by input k, for the inputs that the quantity depends on.
+    ``second``: second derivative by inputs (k, l), k ≤ l; ``None`` when only first derivatives are carried.
     """
 
     __slots__ = ("first", "second", "value")

@@ -42,8 +42,7 @@ from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.ready import KEY, READY, ReadyBudget, read_ready_budget, ready_model
 from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
 
-Figure = float | str
-"""A number, or a text of a number and its unit, such as ``"25 nm"``."""
+Figure = float | str  # A number, or a text of a number and its unit, such as ``"25 nm"``
 
 
 class ModelTable(Table):
@@ -118,33 +117,20 @@ class ModelFileTable(Table):
 
 TOP, MODEL = tuple(ModelFileTable.model_fields), tuple(ModelTable.model_fields)
 TEXTS = tuple(name for name in InputTable.model_fields if name not in NUMERIC)
-
-
 _SMALLEST, _LARGEST = 1e-70, 1e70
 
 
 @dataclass(frozen=True, eq=False)
 class ModelFile:
-    """What a model file says.
+    """What a model file says."""
 
-    Parameters
-    ----------
-    title : of the page; the file's name when the file has none.
-    expressions : the outputs as written.
-    model : inputs, outputs and correlations.
-    request : method, coverage, digits and seed asked for.
-    labels : units and origins.
-    descriptions : of the inputs, where given.
-    content : the file's bytes.
-    """
-
-    title: str
-    expressions: Mapping[str, Expression]
-    model: MeasurementModel
-    request: Request
-    labels: Labels
-    descriptions: Mapping[str, str]
-    content: bytes
+    title: str  # of the page; the file's name when the file has none
+    expressions: Mapping[str, Expression]  # the outputs as written
+    model: MeasurementModel  # inputs, outputs and correlations
+    request: Request  # method, coverage, digits and seed asked for
+    labels: Labels  # units and origins
+    descriptions: Mapping[str, str]  # of the inputs, where given
+    content: bytes  # the file's bytes
 
     @property
     def how(self) -> Text:

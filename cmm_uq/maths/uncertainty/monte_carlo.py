@@ -21,9 +21,7 @@ from cmm_uq.maths.uncertainty.type_a import check_coverage
 
 BLOCK = 10_000
 LARGEST = 20_000_000
-HIGHEST_COVERAGE = 0.9999
-"""Of the adaptive procedure, whose blocks have 100/(1 − p) trials (JCGM 101 7.9.4 b)."""
-
+HIGHEST_COVERAGE = 0.9999  # of the adaptive procedure, whose blocks have 100/(1 − p) trials (JCGM 101 7.9.4 b).
 _FEWEST_BLOCKS = 10
 _FEWEST_TRIALS = 1_000_000
 _BINS = 200
@@ -31,53 +29,34 @@ _BINS = 200
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Where trials come from: a measurement model with its inputs, or any other way to draw outputs.
+    """Where trials come from: a measurement model with its inputs, or any other way to draw outputs."""
 
-    Parameters
-    ----------
-    outputs : p names.
-    draw : outputs (p, n) of n trials.
-    """
-
-    outputs: Sequence[str]
-    draw: Callable[[np.random.Generator, int], Floats]
+    outputs: Sequence[str]  # p names
+    draw: Callable[[np.random.Generator, int], Floats]  # outputs (p, n) of n trials
 
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """Outputs of a measurement model by Monte Carlo.
+    """Outputs of a measurement model by Monte Carlo."""
 
-    Parameters
-    ----------
-    outputs : p names.
-    trials : number of draws.
-    coverage : probability of the intervals.
-    seed : of the random numbers.
-    value : (p,) means.
-    covariance : (p, p).
-    interval : (p, 2) shortest coverage intervals.
-    symmetric_interval : (p, 2) probabilistically symmetric coverage intervals.
-    standard_error : (p, 6) standard deviations of value, u, and the ends of both intervals, from the scatter of blocks;
-        ``nan`` for fewer than two blocks.
-    stable : whether every figure is known to its numerical tolerance, rare draws that did not come included; None when no
-        digits were asked for.
-    shape : (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
-    unseen : (p,) by how much u would be larger with draws that are too rare to have come; infinite where it does not exist.
-    edges, density : (p, b + 1) and (p, b) histogram of the output, for pictures.
-    """
-
-    outputs: Sequence[str]
-    trials: int
-    coverage: float
-    seed: int
-    value: Floats
-    covariance: Floats
-    interval: Floats
-    symmetric_interval: Floats
+    outputs: Sequence[str]  # p names
+    trials: int  # number of draws
+    coverage: float  # probability of the intervals
+    seed: int  # of the random numbers
+    value: Floats  # (p,) means
+    covariance: Floats  # (p, p)
+    interval: Floats  # (p, 2) shortest coverage intervals
+    symmetric_interval: Floats  # (p, 2) probabilistically symmetric coverage intervals
+    # (p, 6) standard deviations of value, u, and the ends of both intervals, from the scatter of blocks; ``nan`` for fewer
+    # than two blocks
     standard_error: Floats
+    # whether every figure is known to its numerical tolerance, rare draws that did not come included; None when no digits
+    # were asked for
     stable: bool | None
-    shape: Floats
+    shape: Floats  # (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
+    # (p,) by how much u would be larger with draws that are too rare to have come; infinite where it does not exist
     unseen: Floats
+    # edges, density: (p, b + 1) and (p, b) histogram of the output, for pictures
     edges: Floats
     density: Floats
 
@@ -88,23 +67,12 @@ class Simulated:
 
 
 def simulate(model: MeasurementModel, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-    """Make a given number of trials.
-
-    Raises
-    ------
-    CmmUqError : too few trials for the coverage probability, an input without standard deviation (t with ν ≤ 2), or a
-        model that gives no finite value for some trials.
-    """
+    """Make a given number of trials."""
     return from_source(_source(model), trials, coverage, seed)
 
 
 def from_source(source: Source, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
-    """Make a given number of trials of any source.
-
-    Raises
-    ------
-    CmmUqError : too few trials for the coverage probability, or outputs beyond what floating-point numbers hold.
-    """
+    """Make a given number of trials of any source."""
     check_coverage(coverage)
     fewest = int(np.ceil(2 / (1 - coverage)))
     if trials < fewest:
@@ -129,16 +97,8 @@ def simulate_adaptively(
 
     At least a million are made (7.2.2), since the first few blocks can agree by chance and they cost little.
 
-    Parameters
-    ----------
-    digits : significant digits of u regarded as meaningful.
-    largest : trials after which it stops whether or not the figures are stable.
-    settled : further condition on the figures (p, 6) and their standard errors (p, 6), in the order of
-        :class:`Simulated`; a validation asks here for more.
-
-    Raises
-    ------
-    CmmUqError : as for :func:`simulate`.
+    ``largest``: trials after which it stops whether or not the figures are stable. ``settled``: further condition on the
+    figures (p, 6) and their standard errors (p, 6), in the order of :class:`Simulated`; a validation asks here for more.
     """
     return settled_source(_source(model), coverage, digits, seed, largest, settled)
 
@@ -154,9 +114,7 @@ def settled_source(
 ) -> Simulated:
     """The same of any source: see :func:`simulate_adaptively`.
 
-    Parameters
-    ----------
-    fewest_trials : before it may stop; fewer than a million where each costs more than arithmetic.
+    ``fewest_trials``: before it may stop; fewer than a million where each costs more than arithmetic.
     """
     check_coverage(coverage)
     if coverage > HIGHEST_COVERAGE:
@@ -186,12 +144,7 @@ def settled_source(
 
 
 def draw_outputs(model: MeasurementModel, trials: int, seed: int = 0) -> Floats:
-    """Draws (p, trials) of the outputs themselves, for regions and pictures; memory grows with the trials.
-
-    Raises
-    ------
-    CmmUqError : as for :func:`simulate`.
-    """
+    """Draws (p, trials) of the outputs themselves, for regions and pictures; memory grows with the trials."""
     source, rng = _source(model), np.random.default_rng(seed)
     return np.concatenate([source.draw(rng, min(BLOCK, trials - k)) for k in range(0, trials, BLOCK)], axis=1)
 

@@ -29,32 +29,21 @@ from cmm_uq.maths.uncertainty.type_a import coverage_factor, effective_dof
 
 @dataclass(frozen=True, eq=False)
 class Propagated:
-    """Outputs of a measurement model by the law of propagation.
+    """Outputs of a measurement model by the law of propagation."""
 
-    Parameters
-    ----------
-    inputs, outputs : names, m and p of them.
-    value : (p, ...) estimates.
-    covariance : (p, p, ...) of the outputs.
-    dof : (p, ...) effective degrees of freedom.
-    sensitivity : (p, m, ...) derivatives at the estimates.
-    contribution : (p, m, ...) sensitivity × standard uncertainty, with its sign.
-    correlation : (m, m) of the inputs.
-    bending : (p, m, m, ...) parts of the variance that pairs of inputs add together by second derivatives, one entry a
-        pair (above the diagonal) or input (on it); zero for first order.
-    cubic : (p, ...) part of the variance from third derivatives; zero for first order.
-    """
-
+    # inputs, outputs: names, m and p of them
     inputs: Sequence[str]
     outputs: Sequence[str]
-    value: Floats
-    covariance: Floats
-    dof: Floats
-    sensitivity: Floats
-    contribution: Floats
-    correlation: Floats
+    value: Floats  # (p, ...) estimates.
+    covariance: Floats  # (p, p, ...) of the outputs.
+    dof: Floats  # (p, ...) effective degrees of freedom.
+    sensitivity: Floats  # (p, m, ...) derivatives at the estimates.
+    contribution: Floats  # (p, m, ...) sensitivity × standard uncertainty, with its sign.
+    correlation: Floats  # (m, m) of the inputs
+    # (p, m, m, ...) parts of the variance that pairs of inputs add together by second derivatives, one entry a pair (above
+    # the diagonal) or input (on it); zero for first order.
     bending: Floats
-    cubic: Floats
+    cubic: Floats  # (p, ...) part of the variance from third derivatives; zero for first order.
 
     @cached_property
     def u(self) -> Floats:
@@ -84,12 +73,7 @@ def first_order(model: MeasurementModel) -> Propagated:
 
 
 def second_order(model: MeasurementModel) -> Propagated:
-    """Propagate by first and second derivatives, with the third ones where they belong to the same order.
-
-    Raises
-    ------
-    CmmUqError : the model or a derivative is not finite at the estimates, or the series gives a negative variance.
-    """
+    """Propagate by first and second derivatives, with the third ones where they belong to the same order."""
     if model.differentiation == "complex_step":
         raise CmmUqError(
             "second derivatives by complex steps are not exact",

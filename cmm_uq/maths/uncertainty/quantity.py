@@ -38,19 +38,13 @@ def expanded_of(draws: Floats, value: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity with its uncertainty.
+    """A quantity with its uncertainty."""
 
-    Parameters
-    ----------
-    value, u : estimate and standard uncertainty, in ``unit``.
-    interval95 : probabilistically symmetric 95 % coverage interval.
-    unit : as printed.
-    """
-
+    # value, u: estimate and standard uncertainty, in ``unit``
     value: float
     u: float
-    interval95: tuple[float, float]
-    unit: Unit
+    interval95: tuple[float, float]  # probabilistically symmetric 95 % coverage interval
+    unit: Unit  # as printed
 
     @classmethod
     def of_draws(cls, draws: Floats, unit: Unit, value: float | None = None) -> Quantity:
@@ -103,14 +97,8 @@ _LARGEST_LOSS = Decimal("0.05")
 def significant(u: float, digits: int = 2) -> Number:
     """An uncertainty to some significant digits.
 
-    Parameters
-    ----------
-    u : standard or expanded uncertainty, not negative; infinite gives ``∞``.
-    digits : significant digits, 1 or 2 for what a certificate states.
-
-    Raises
-    ------
-    CmmUqError : ``u`` is negative or not a number.
+    ``u``: standard or expanded uncertainty, not negative; infinite gives ``∞``. ``digits``: significant digits, 1 or 2 for
+    what a certificate states.
     """
     return rounded(0.0, u, digits)[1]
 
@@ -118,28 +106,11 @@ def significant(u: float, digits: int = 2) -> Number:
 def rounded(value: float, u: float, digits: int = 2) -> tuple[Number, Number]:
     """A value and its uncertainty, both to the decimal place that the uncertainty supports.
 
-    Parameters
-    ----------
-    value : the estimate.
-    u : its standard or expanded uncertainty, same unit, not negative. Zero leaves the value as it is; infinite leaves
-        it with ``digits`` significant digits.
-    digits : significant digits of ``u``.
+    ``u``: its standard or expanded uncertainty, same unit, not negative. Zero leaves the value as it is; infinite leaves it
+    with ``digits`` significant digits. ``digits``: significant digits of ``u``.
 
-    Returns
-    -------
-    value and uncertainty with the Unicode minus sign; a common power of ten is split off only where the decimals would
-    run past twelve places or fifteen integer digits.
-
-    Raises
-    ------
-    CmmUqError : ``u`` is negative or not a number, or ``value`` is not finite.
-
-    Examples
-    --------
-    >>> rounded(838.03, 71.62)
-    ('838', '72')
-    >>> rounded(12345.6, 123)
-    ('12350', '120')
+    Returns value and uncertainty with the Unicode minus sign; a common power of ten is split off only where the decimals
+    would run past twelve places or fifteen integer digits.
     """
     _check(value, u, digits)
     exact = _decimal(value)
@@ -156,13 +127,6 @@ def alike(*values: float, decimals: int = 1) -> tuple[Number, ...]:
     """Numbers without uncertainties of their own, side by side: with so many decimals, or more where the largest is small.
 
     A step of the last decimal is never more than a third of the largest modulus, unless that is zero.
-
-    Examples
-    --------
-    >>> alike(78.6, 18.04)
-    ('78.6', '18.0')
-    >>> alike(0.0474, 0.0208)
-    ('0.05', '0.02')
     """
     largest = max(abs(value) for value in values)
     _check(largest, 0.0, 1)
@@ -171,25 +135,13 @@ def alike(*values: float, decimals: int = 1) -> tuple[Number, ...]:
 
 
 def nominal(length: float) -> Number:
-    """A length that is given, not measured, in full: no digit of it is left out, and none is made up.
-
-    Examples
-    --------
-    >>> nominal(1080.0012)
-    '1080.0012'
-    """
+    """A length that is given, not measured, in full: no digit of it is left out, and none is made up."""
     _check(length, 0.0, 1)
     return _plain(Decimal(f"{length:.6f}").normalize())
 
 
 def limit_in_full(limit: float) -> Number:
-    """A limit that is stated, in full; what a formula makes of a length, to four digits and at least two decimals.
-
-    Examples
-    --------
-    >>> limit_in_full(1080.0012), limit_in_full(2.5 + 800 / 300)
-    ('1080.0012', '5.167')
-    """
+    """A limit that is stated, in full; what a formula makes of a length, to four digits and at least two decimals."""
     if not limit or abs(limit - round(limit, 6)) <= 1e-12 * abs(limit):
         return nominal(limit)
     return nominal(round(limit, max(2, 3 - floor(log10(abs(limit))))))
@@ -257,13 +209,7 @@ _NO_WIDTH = 1e-200
 
 
 def averaged(quantities: Sequence[Quantity], weights: Sequence[float]) -> Quantity:
-    """The quantity over all models.
-
-    Parameters
-    ----------
-    quantities : as each model gives it, in one unit.
-    weights : probability of each, up to a factor.
-    """
+    """The quantity over all models."""
     p = np.array(weights) / np.sum(weights)
     value, u, low, high = (
         np.array(each) for each in zip(*((q.value, q.u, *q.interval95) for q in quantities), strict=True)
@@ -277,11 +223,7 @@ def averaged(quantities: Sequence[Quantity], weights: Sequence[float]) -> Quanti
 def mixed(draws: Sequence[Floats], weights: Sequence[float], random: np.random.Generator) -> Floats:
     """Draws (N, k) of the mixture: row i is row i of one of the models, each as often as its probability has it.
 
-    Parameters
-    ----------
-    draws : (N, k) under each model, of the same quantities in the same order; row after row independent.
-    weights : probability of each, up to a factor.
-    random : which row is of which model.
+    ``draws``: (N, k) under each model, of the same quantities in the same order; row after row independent.
     """
     count = len(draws[0])
     wanted = count * np.array(weights) / np.sum(weights)

@@ -40,26 +40,15 @@ Built = tuple[MeasurementModel, Labels]
 
 @dataclass(frozen=True)
 class ReadyModel:
-    """A model by its name.
+    """A model by its name."""
 
-    Parameters
-    ----------
-    title : what it gives, in words.
-    inputs : names, and whether each is needed.
-    build : of the inputs and the correlations: the model, and units and origins of its quantities.
-    """
-
-    title: Text
-    inputs: Mapping[str, bool]
+    title: Text  # what it gives, in words
+    inputs: Mapping[str, bool]  # names, and whether each is needed
+    # of the inputs and the correlations: the model, and units and origins of its quantities
     build: Callable[[Mapping[str, Distribution], Correlations], Built]
 
     def of(self, given: Mapping[str, Distribution], correlation: Correlations) -> Built:
-        """The model of these inputs.
-
-        Raises
-        ------
-        CmmUqError : an input is missing, or not one of its.
-        """
+        """The model of these inputs."""
         for name in given:
             if name not in self.inputs:
                 raise CmmUqError(f"{name!r} is no input of this model", fix=suggestion(name, self.inputs))
@@ -118,15 +107,7 @@ def ready_model(
 ) -> Built:
     """The ready model that ``[model]`` of a file names.
 
-    Parameters
-    ----------
-    model : ``[model]``.
-    inputs, units : of the file, by name; a unit may be left out.
-    correlation : of the inputs.
-
-    Raises
-    ------
-    CmmUqError : there is no such model, the inputs are not its, or ``[model]`` has outputs as well.
+    ``model``: ``[model]``.
     """
     for key in ("outputs", "units"):
         if key in model:
@@ -157,19 +138,13 @@ class _BudgetFile(Table):
 class ReadyBudget:
     """What a file with a ready budget says.
 
-    Parameters
-    ----------
-    title : of the page.
-    table : the method and its figures.
-    content : the file's bytes.
-    expressions : none; the method is the model.
-    how : it is evaluated.
+    ``how``: it is evaluated.
     """
 
-    title: str
-    table: BudgetTable
-    content: bytes
-    expressions: Mapping[str, Expression] = field(default_factory=dict)
+    title: str  # of the page
+    table: BudgetTable  # the method and its figures
+    content: bytes  # the file's bytes
+    expressions: Mapping[str, Expression] = field(default_factory=dict)  # none; the method is the model
 
     @property
     def how(self) -> Text:
@@ -215,12 +190,7 @@ def _stated(budget: Budget) -> Stated:
 
 
 def read_ready_budget(content: bytes, path: Path) -> ReadyBudget:
-    """Read and check a file with a ready budget.
-
-    Raises
-    ------
-    CmmUqError : an unknown method, or a key that is unknown, missing or of the wrong kind; with its line.
-    """
+    """Read and check a file with a ready budget."""
     found = checked(content, path, lambda data: _file_of(data, path))
     return ReadyBudget(found.budget.title or path.stem, found.budget, content)
 

@@ -22,23 +22,15 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Outcome:
-    """One figure of a reference case.
+    """One figure of a reference case."""
 
-    Parameters
-    ----------
-    case : title and figure.
-    expected, tolerance : what must come out, and how near.
-    got : what came out.
-    source : where the expected figure is from.
-    passed : whether it is near enough.
-    """
-
-    case: str
+    case: str  # title and figure
+    # expected, tolerance: what must come out, and how near
     expected: float
     tolerance: float
-    got: float
-    source: str
-    passed: bool
+    got: float  # what came out
+    source: str  # where the expected figure is from
+    passed: bool  # whether it is near enough
 
 
 def run(cases: Iterable[ReferenceCase] = REFERENCE_CASES) -> list[Outcome]:

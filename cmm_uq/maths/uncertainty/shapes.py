@@ -32,9 +32,7 @@ def _normal_inverse(p: Floats) -> Floats:
 
 
 POINT = Shape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
-
 NORMAL = Shape(1.0, lambda rng, n: rng.standard_normal(n), _normal_inverse)
-
 RECTANGULAR = Shape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
 
 TRIANGULAR = Shape(

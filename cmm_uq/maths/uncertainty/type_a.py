@@ -37,13 +37,7 @@ class JointInputs:
 
 
 def repeated_readings(readings: Sequence[float] | Floats) -> Distribution:
-    """Mean of n independent readings of one quantity: u = s/√n with n − 1 degrees of freedom (JCGM 100 4.2).
-
-    Raises
-    ------
-    CmmUqError : fewer than two readings, one that is not finite, or all the same (their scatter is then below the
-        resolution, which has to be stated as an input of its own).
-    """
+    """Mean of n independent readings of one quantity: u = s/√n with n − 1 degrees of freedom (JCGM 100 4.2)."""
     return simultaneous_readings({"the quantity": readings}).inputs["the quantity"]
 
 
@@ -63,12 +57,7 @@ def simultaneous_readings(readings: Mapping[str, Sequence[float] | Floats]) -> J
 
 
 def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) -> JointInputs:
-    """Normal quantities with a covariance matrix (JCGM 101 6.4.8); mean (m,), covariance (m, m).
-
-    Raises
-    ------
-    CmmUqError : a matrix that is not symmetric or has a variance that is not positive.
-    """
+    """Normal quantities with a covariance matrix (JCGM 101 6.4.8); mean (m,), covariance (m, m)."""
     matrix = np.asarray(covariance, dtype=np.float64)
     if matrix.shape != (len(names), len(names)) or not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0):
         raise CmmUqError("the covariance matrix is not symmetric with one row a quantity", where=", ".join(names))
@@ -81,19 +70,13 @@ def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """Straight line y = intercept + slope (x − reference) by least squares (JCGM 100 annex H.3).
-
-    Parameters
-    ----------
-    covariance : (2, 2) of intercept and slope.
-    residual_sd : standard deviation of the residuals, n − 2 degrees of freedom.
-    """
+    """Straight line y = intercept + slope (x − reference) by least squares (JCGM 100 annex H.3)."""
 
     reference: float
     intercept: float
     slope: float
-    covariance: Floats
-    residual_sd: float
+    covariance: Floats  # (2, 2) of intercept and slope
+    residual_sd: float  # standard deviation of the residuals, n − 2 degrees of freedom
     dof: int
 
     def at(self, x: Floats | float) -> tuple[Floats, Floats]:
@@ -115,12 +98,7 @@ class Line:
 
 
 def straight_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats, reference: float = 0.0) -> Line:
-    """Fit a line to readings y of equal, unknown uncertainty at positions x that are known (JCGM 100 annex H.3).
-
-    Raises
-    ------
-    CmmUqError : fewer than three points, or all at the same x.
-    """
+    """Fit a line to readings y of equal, unknown uncertainty at positions x that are known (JCGM 100 annex H.3)."""
     table = _table({"x": x, "y": y})
     n = table.shape[1]
     step, readings = table[0] - reference, table[1]
@@ -166,21 +144,14 @@ _ROUNDING = 1e-9
 def effective_dof(contributions: Floats, matrix: Floats, dof: Sequence[Floats | float], variance: Floats) -> Floats:
     """Effective degrees of freedom of the outputs.
 
-    Parameters
-    ----------
-    contributions : (p, m, ...) sensitivity × standard uncertainty of each input, with its sign.
-    matrix : (m, m) correlation of the inputs.
-    dof : m degrees of freedom, floats or (...).
-    variance : (p, ...) combined variance, which may hold further terms of infinite degrees of freedom.
+    ``contributions``: (p, m, ...) sensitivity × standard uncertainty of each input, with its sign. ``matrix``: (m, m)
+    correlation of the inputs. ``dof``: m degrees of freedom, floats or (...). ``variance``: (p, ...) combined variance,
+    which may hold further terms of infinite degrees of freedom.
 
-    Returns
-    -------
-    (p, ...) degrees of freedom, infinite where all that contributes is known.
+    Returns (p, ...) degrees of freedom, infinite where all that contributes is known.
 
-    Notes
-    -----
-    A set of correlated inputs whose degrees of freedom differ was not read simultaneously; the formula does not cover
-    it, and the smallest of them is taken for the whole set.
+    A set of correlated inputs whose degrees of freedom differ was not read simultaneously; the formula does not cover it,
+    and the smallest of them is taken for the whole set.
     """
     # fourth powers leave a double's range long before u does; a power of two in common changes no digit of the ratio
     _, exponent = np.frexp(np.max(np.abs(contributions), initial=0.0))
@@ -200,12 +171,7 @@ def effective_dof(contributions: Floats, matrix: Floats, dof: Sequence[Floats | 
 
 
 def coverage_factor(dof: Floats | float, coverage: float) -> Floats:
-    """K for a symmetric interval: the t quantile for ν truncated to an integer (JCGM 100 G.4.1, G.6.4), shape of ``dof``.
-
-    Raises
-    ------
-    CmmUqError : fewer than one degree of freedom, or a probability that is not between 0 and 1.
-    """
+    """K for a symmetric interval: the t quantile for ν truncated to an integer (JCGM 100 G.4.1, G.6.4), shape of ``dof``."""
     from scipy import special
 
     check_coverage(coverage)
@@ -223,13 +189,7 @@ def coverage_factor(dof: Floats | float, coverage: float) -> Floats:
 
 
 def factor_of_noise(noise: Quantity, u_noise: float = 1.0, u_known: float = 0.0) -> float:
-    """K for 95 % of what is uncertain by a noise whose size is itself uncertain, and besides by what is known well.
-
-    Parameters
-    ----------
-    noise : its standard deviation, with the standard uncertainty of that.
-    u_noise, u_known : standard uncertainties by the noise, and by all else, in one unit.
-    """
+    """K for 95 % of what is uncertain by a noise whose size is itself uncertain, and besides by what is known well."""
     more = float(np.hypot(u_noise, u_known)) / u_noise if u_noise > 0 else np.inf
     return float(coverage_factor(noise.degrees_of_freedom * more**4, 0.95))
 

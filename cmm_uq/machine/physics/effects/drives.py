@@ -30,7 +30,6 @@ class PeriodicScale(Harmonic):
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amplitude = amounts[self.amplitude.name].size
         if self.shape[0].name not in amounts:
             return say(
@@ -44,7 +43,6 @@ class PeriodicScale(Harmonic):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
         (period,) = shape
         angle = 2 * np.pi * points.readings[self.axis] / period
         return np.concatenate(
@@ -70,7 +68,6 @@ class Hysteresis(Effect):
         self.imitated_by = (Nonparametric(f"approach_{axis}"),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when "
@@ -79,7 +76,6 @@ class Hysteresis(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
 
 
@@ -100,7 +96,6 @@ class Drift(Effect):
         self.title = say("Drift of {axis} with time", axis=Verbatim(axis.upper()))
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "at the same reading {axis} moves towards {side} by {size}",
@@ -108,7 +103,6 @@ class Drift(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, MICROMETRE * points.hours)
 
 

@@ -14,40 +14,25 @@ import numpy as np
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.maths.geometry.feature import nearest_rotations
 
-_DECIMALS = 3
-"""Of mm, by which one place is told from another."""
+_DECIMALS = 3  # of mm, by which one place is told from another
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """How an artefact lay: the place of each point is ``origin`` + ``rotation`` · its place on the artefact.
+    """How an artefact lay: the place of each point is ``origin`` + ``rotation`` · its place on the artefact."""
 
-    Parameters
-    ----------
-    node : (n,) which of the body's places each point is.
-    rotation : (n, 3, 3) from the artefact's axes to the machine's.
-    origin : (n, 3) where the zero of the artefact's axes lies, mm.
-    """
-
-    node: Ints
-    rotation: Floats
-    origin: Floats
+    node: Ints  # (n,) which of the body's places each point is
+    rotation: Floats  # (n, 3, 3) from the artefact's axes to the machine's
+    origin: Floats  # (n, 3) where the zero of the artefact's axes lies, mm
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The places of an artefact: balls, holes, faces.
+    """The places of an artefact: balls, holes, faces."""
 
-    Parameters
-    ----------
-    by : columns that tell one place from another; empty where the number of a point does.
-    keys : (N, j) their values at each place.
-    places : (N, 3) in the artefact's own axes, mm.
-    """
-
-    by: tuple[str, ...]
-    keys: Floats
-    places: Floats
+    by: tuple[str, ...]  # columns that tell one place from another; empty where the number of a point does
+    keys: Floats  # (N, j) their values at each place
+    places: Floats  # (N, 3) in the artefact's own axes, mm
 
     @classmethod
     def of(cls, points: Points, places: Floats, by: tuple[str, ...] = ()) -> Body:

@@ -23,32 +23,20 @@ from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENES
 from cmm_uq.machine.physics.effects.scales import EFFECTS as FURTHER_OF_SCALES
 from cmm_uq.machine.physics.effects.scales import ScaleCurvature
 
-_FEWEST = 3
-"""Places that were met in two set-ups, for a pattern."""
+_FEWEST = 3  # places that were met in two set-ups, for a pattern
 
 
 @dataclass(frozen=True, eq=False)
 class Owner:
-    """An artefact as its faults know it.
+    """An artefact as its faults know it."""
 
-    Parameters
-    ----------
-    body : its places.
-    points : as recorded.
-    size : plausible standard deviation of what a fault does, in the unit of the fault.
-    weight : how readily the fault is thought of, beside effects of the machine.
-    axes : how many of its own axes are seen: all three, or the first, along which its faces lie.
-    mostly : part of that size that it mostly keeps to (see :attr:`Effect.mostly`).
-    cte : its coefficient of thermal expansion, 1/K.
-    """
-
-    body: Body
-    points: Points
-    size: float
-    weight: float
-    axes: int = 3
-    cte: float = 0.0
-    mostly: float = 1.0
+    body: Body  # its places
+    points: Points  # as recorded
+    size: float  # plausible standard deviation of what a fault does, in the unit of the fault
+    weight: float  # how readily the fault is thought of, beside effects of the machine
+    axes: int = 3  # how many of its own axes are seen: all three, or the first, along which its faces lie
+    cte: float = 0.0  # its coefficient of thermal expansion, 1/K
+    mostly: float = 1.0  # part of that size that it mostly keeps to (see :attr:`Effect.mostly`).
 
 
 class OwnFault(Effect):
@@ -61,7 +49,6 @@ class OwnFault(Effect):
 
     @property
     def prior_weight(self) -> float:
-        """See :attr:`Effect.prior_weight`: by what is known of the artefact."""
         return PRIOR_WEIGHT[OWN] if self.owner is None else self.owner.weight
 
     def made(self, owner: Owner) -> OwnFault:
@@ -80,12 +67,7 @@ class OwnFault(Effect):
         return self.owner is not None and self.owner.body.covers(points)
 
     def whose(self) -> Owner:
-        """The artefact.
-
-        Raises
-        ------
-        CmmUqError : it is none's.
-        """
+        """The artefact."""
         if self.owner is None:
             raise CmmUqError(
                 f"this kind of artefact has no {self.name}", where="job.toml [model] effects", fix="Leave it out"
@@ -114,7 +96,6 @@ class OwnGeometry(OwnFault):
         self.everywhere = effect.everywhere
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnFault.sized`: it deforms by the plausible size where it does so most, or as far as physics allows."""
         (c,) = self.coefficients
         _, rows = np.unique(owner.body.poses(owner.points).node, return_index=True)
         field = self.effect.basis(self._there(owner.points))[rows, :, 0] @ self._rotation
@@ -125,7 +106,6 @@ class OwnGeometry(OwnFault):
         return (Parameter(c.name, c.unit, sd),)
 
     def made(self, owner: Owner) -> OwnFault:
-        """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.mostly = owner, owner.mostly
         found._lies(owner)
@@ -133,14 +113,12 @@ class OwnGeometry(OwnFault):
         return found
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         poses = self.whose().body.poses(points)
         field = self.effect.basis(self._there(points))
         back = np.einsum("nij,kj->nik", poses.rotation, self._rotation)
         return -np.asarray(np.einsum("nij,njk->nik", back, field), dtype=np.float64)
 
     def course(self, points: Points) -> Floats | None:
-        """See :meth:`Effect.course`: in the reference set-up."""
         return self.effect.course(self._there(points))
 
     def _lies(self, owner: Owner) -> None:
@@ -179,11 +157,9 @@ class OwnPattern(OwnFault, CommonSize):
     _shown: Floats
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnFault.sized`: one for every deformation."""
         return tuple(Parameter(f"c{i + 1}_um", unit("µm"), owner.size) for i in range(deformations(owner).shape[1]))
 
     def made(self, owner: Owner) -> OwnFault:
-        """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found._shown = deformations(owner)
@@ -191,19 +167,16 @@ class OwnPattern(OwnFault, CommonSize):
         return found
 
     def shown_in(self, points: Points) -> bool:
-        """See :meth:`Effect.shown_in`: half of the places, and three at least, in two set-ups."""
         node = self.whose().body.nodes(points)
         pairs = np.unique(np.column_stack([node, points.measurement]), axis=0)
         again = int(np.sum(np.bincount(pairs[:, 0]) > 1))
         return again >= max(_FEWEST, 0.5 * len(np.unique(node)))
 
     def errors(self, coefficients: Floats) -> Floats:
-        """See :meth:`CommonSize.errors`: deviations of every place along every axis."""
         self.whose()
         return np.asarray(coefficients @ self._shown.T, dtype=np.float64)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         owner = self.whose()
         poses = owner.body.poses(points)
         own = self._shown.reshape(-1, owner.axes, len(self.coefficients))[poses.node]
@@ -237,12 +210,9 @@ GEOMETRY = MappingProxyType(
 )  # fmt: skip
 """By the name of the machine's error that it looks like."""
 
+# what faces along one line can look like, and that is no scale
 ALONG_A_LINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[effect.name] for effect in _CURVATURE)
-"""What faces along one line can look like, and that is no scale."""
-
+# what three corners can look like
 AFFINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[e.name] for e in (*SCALE.values(), *SQUARENESS.values()))
-"""What three corners can look like."""
-
 PATTERN = OwnPattern()
-
 EFFECTS: tuple[OwnFault, ...] = (PATTERN, *GEOMETRY.values())

@@ -16,12 +16,8 @@ from cmm_uq.machine.physics.effects.own_errors import Owner, OwnFault
 from cmm_uq.maths.geometry.feature import frame_about, upward
 
 KELVIN = Parameter("k", unit("K"), 1.0)
-
-TURNED = "turned_deg"
-"""Column: by how much a sphere was turned about Z against its first set-up."""
-
-_DEGREES = (2, 3, 4, 5)
-"""Of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1."""
+TURNED = "turned_deg"  # column: by how much a sphere was turned about Z against its first set-up
+_DEGREES = (2, 3, 4, 5)  # of the harmonics of a sphere's form: the size and the place of the ball are those of 0 and 1
 
 
 class ArtefactTemperature(OwnFault):
@@ -40,7 +36,6 @@ class ArtefactTemperature(OwnFault):
     coefficients = (KELVIN,)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return (-self.whose().cte * _about_set_up(points))[:, :, None]
 
 
@@ -50,7 +45,6 @@ class OfSetUps(OwnFault, CommonSize):
     each: tuple[str, ...]
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnFault.sized`: those of each set-up."""
         (c,) = self.coefficients
         return tuple(
             Parameter(f"{name}_{m}_{c.name}", c.unit, owner.size) for m in self.numbered(owner) for name in self.each
@@ -61,14 +55,12 @@ class OfSetUps(OwnFault, CommonSize):
         return np.unique(owner.points.measurement)
 
     def made(self, owner: Owner) -> OwnFault:
-        """See :meth:`OwnFault.made`."""
         found = copy(self)
         found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found.size = Parameter(self.size.name, self.size.unit, owner.size)
         return found
 
     def shown_in(self, points: Points) -> bool:
-        """See :meth:`Effect.shown_in`: in two set-ups."""
         return len(np.unique(points.measurement)) > 1
 
     def by_set_up(self, points: Points, each: Floats) -> Floats:
@@ -93,16 +85,13 @@ class SetUpTemperature(OfSetUps):
     each = ("t",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         each = self.by_set_up(points, (-self.whose().cte * _about_set_up(points))[:, :, None])
         return np.asarray(each @ self._contrasts())
 
     def numbered(self, owner: Owner) -> Ints:
-        """See :meth:`OfSetUps.numbered`: one less, as the mean of all is the artefact's temperature in all of them."""
         return np.arange(1, len(np.unique(owner.points.measurement)))
 
     def errors(self, coefficients: Floats) -> Floats:
-        """See :meth:`CommonSize.errors`: temperatures about the mean of all set-ups."""
         return np.asarray(coefficients @ self._contrasts().T)
 
     def _contrasts(self) -> Floats:
@@ -122,7 +111,6 @@ class ArtefactBending(OwnFault):
     coefficients = (Parameter("um", unit("µm"), 10.0),)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         normal, across = _flat(self.whose(), points)
         rho2 = np.sum(across**2, axis=1)
         return np.asarray((MICROMETRE * (normal[:, 2] * (1 - rho2))[:, None] * normal)[:, :, None])
@@ -142,7 +130,6 @@ class ArtefactFixture(OfSetUps):
     each = ("u", "v", "uv")
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         normal, across = _flat(self.whose(), points)
         u, v = across.T
         bends = np.column_stack([u**2, v**2, u * v])
@@ -161,11 +148,9 @@ class OwnLobes(OwnFault, Harmonic):
     columns = ("nx", "ny", "nz")
 
     def belongs_to(self, points: Points) -> bool:
-        """See :meth:`OwnFault.belongs_to`: a sphere has no places."""
         return self.owner is not None
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
         self.whose()
         angle = 3 * (np.arctan2(points.column("ny"), points.column("nx")) - _turned(points))
         lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
@@ -184,11 +169,9 @@ class OwnForm(OwnFault, CommonSize):
     columns = ("nx", "ny", "nz")
 
     def belongs_to(self, points: Points) -> bool:
-        """See :meth:`OwnFault.belongs_to`: a sphere has no places."""
         return self.owner is not None
 
     def sized(self, owner: Owner) -> tuple[Parameter, ...]:
-        """See :meth:`OwnFault.sized`: one for every harmonic."""
         return tuple(
             Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size)
             for degree in _DEGREES
@@ -196,11 +179,9 @@ class OwnForm(OwnFault, CommonSize):
         )
 
     def errors(self, coefficients: Floats) -> Floats:
-        """See :meth:`CommonSize.errors`: harmonics of mean square one over the sphere; their sum is that of the form."""
         return np.asarray(coefficients * np.sqrt(coefficients.shape[-1]), dtype=np.float64)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         self.whose()
         normals = _normals(points)
         azimuth = np.arctan2(normals[:, 1], normals[:, 0]) - _turned(points)
@@ -251,5 +232,4 @@ def _turned(points: Points) -> Floats:
 TEMPERATURE, SET_UP_TEMPERATURE = ArtefactTemperature(), SetUpTemperature()
 BENDING, FIXTURE = ArtefactBending(), ArtefactFixture()
 LOBES, FORM = OwnLobes(), OwnForm()
-
 EFFECTS: tuple[Effect, ...] = (TEMPERATURE, SET_UP_TEMPERATURE, BENDING, FIXTURE, LOBES, FORM)

@@ -31,7 +31,6 @@ class ProbeRadius(Effect):
     columns = ("nx", "ny", "nz")
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "probed surfaces are indicated {size} too {wrong}",
@@ -39,7 +38,6 @@ class ProbeRadius(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return MICROMETRE * normals_of(points)[:, :, None]
 
 
@@ -56,20 +54,18 @@ class ProbeLobing(Harmonic):
     columns = ("nx", "ny", "nz")
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         size = amounts[self.amplitude.name].size
         return say("the probing error swings to either side by {size}, three times in a turn about Z", size=size)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`; the coefficients are A·cos φ and A·sin φ."""
         normals = normals_of(points)
         angle = 3 * np.arctan2(normals[:, 1], normals[:, 0])
         lobes = np.column_stack([np.cos(angle), -np.sin(angle)])
         return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
 
 
+# of its length, by which the points of a bar or a gauge may lie beside the line from its first to its farthest
 _OFF_LINE = 0.05
-"""Of its length, by which the points of a bar or a gauge may lie beside the line from its first to its farthest."""
 
 
 class ArtefactSag(Effect):
@@ -89,7 +85,6 @@ class ArtefactSag(Effect):
     coefficients = (Parameter("um", unit("µm"), 10.0),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "lying level the artefact is {size} {wrong} than upright",
@@ -97,7 +92,6 @@ class ArtefactSag(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`: nothing of points that do not lie on one line."""
         basis = np.zeros((len(points), 3, 1))
         for rows in points.rows_of_groups:
             bar, about = _bar(points, rows)
@@ -108,7 +102,6 @@ class ArtefactSag(Effect):
         return basis
 
     def unfit(self, points: Points) -> CmmUqError | None:
-        """See :meth:`Effect.unfit`: of a plate, a triangle, a sphere, also one that is seen from a carriage's mount."""
         beside = [rows[0] for rows in points.rows_of_groups if not _on_line(*_bar(points, rows))]
         if not beside:
             return None

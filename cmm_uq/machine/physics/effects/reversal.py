@@ -15,8 +15,7 @@ from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, unit
 from cmm_uq.machine.physics.effect import FURTHER, Amount, Effect, Parameter, along
 from cmm_uq.machine.physics.effects.rigid_body import turned
 
-_MILLISECOND = 1e-3
-"""1 ms in s."""
+_MILLISECOND = 1e-3  # 1 ms in s
 
 
 class Play(Effect):
@@ -47,7 +46,6 @@ class Play(Effect):
         self.columns = (f"approach_{axis}",)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "at the same reading the probe stands {size} further towards {side} {direction} when {axis} comes "
@@ -56,7 +54,6 @@ class Play(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.direction, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
 
 
@@ -83,7 +80,6 @@ class YawPlay(Effect):
         self.columns = (f"approach_{axis}",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return turned(points, self.axis, "z", 0.5 * ARCSECOND * points.column(f"approach_{self.axis}"))
 
 
@@ -110,7 +106,6 @@ class WindUp(Effect):
         self.columns = (f"approach_{axis}",)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
         place = (points.readings[self.axis] - 0.5 * (low + high)) / METRE
         return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}") * place)
@@ -140,7 +135,6 @@ class SpeedLag(Effect):
         self.columns = ("speed_mm_s", *(f"approach_{a}" for a in AXES))
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         part = travel(points)[:, AXES.index(self.axis)]
         return along(self.axis, _MILLISECOND * points.column("speed_mm_s") * part)
 

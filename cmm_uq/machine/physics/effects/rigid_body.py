@@ -16,8 +16,8 @@ from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 from cmm_uq.machine.physics.effect import Amount, Effect, Nonparametric, Parameter, along
 from cmm_uq.machine.physics.kinematics import Chain, carried_offset
 
+# of each plane the axis along which a point moves, and the one that leans, by whose reading it moves
 LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})
-"""Of each plane the axis along which a point moves, and the one that leans, by whose reading it moves."""
 
 
 class Scale(Effect):
@@ -37,7 +37,6 @@ class Scale(Effect):
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "lengths along {axis} are indicated {size} too {wrong}",
@@ -45,7 +44,6 @@ class Scale(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, PPM * points.readings[self.axis])
 
 
@@ -59,7 +57,6 @@ class Lean(Effect):
         self.moved, self.lever = LEANING[plane]
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`: for small angles; see ``superposition`` for what they do together."""
         return along(self.moved, -self.lean(points) * points.readings[self.lever])
 
 
@@ -79,7 +76,6 @@ class Squareness(Lean):
         self.imitated_by = (Nonparametric(f"{self.lever}_mm", self.moved),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "the angle between {one} and {other} is 90° {side} {size}",
@@ -87,7 +83,6 @@ class Squareness(Lean):
         )  # fmt: skip
 
     def lean(self, points: Points) -> Floats:
-        """See :meth:`Effect.lean`."""
         return np.array(ARCSECOND)
 
 
@@ -112,7 +107,6 @@ class Straightness(Effect):
         self.imitated_by = (Nonparametric(f"{axis}_mm", direction),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} "
@@ -121,7 +115,6 @@ class Straightness(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
         place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
         return along(self.direction, MICROMETRE * (1 - place**2))
@@ -147,7 +140,6 @@ class Rotation(Effect):
         self.idealised_over = axis
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}",
@@ -156,7 +148,6 @@ class Rotation(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel(self.axis)
         angle = ARCSECOND * (points.readings[self.axis] - low) / METRE
         return turned(points, self.axis, self.about, angle)
@@ -179,17 +170,12 @@ def tip_offsets(points: Points) -> Floats:
     return np.column_stack([points.columns.get(f"tip_{a}_mm", np.zeros(len(points))) for a in AXES])
 
 
-SCALE = MappingProxyType({a: Scale(a) for a in AXES})
-"""By axis."""
-
-SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})
-"""By plane."""
-
+SCALE = MappingProxyType({a: Scale(a) for a in AXES})  # by axis
+SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})  # by plane
+# by carriage and direction
 STRAIGHTNESS = MappingProxyType({(a, b): Straightness(a, b) for a in AXES for b in AXES if a != b})
-"""By carriage and direction."""
-
+# by carriage and the axis about which it turns
 ROTATION = MappingProxyType({(a, b): Rotation(a, b) for a in AXES for b in AXES})
-"""By carriage and the axis about which it turns."""
 
 EFFECTS: tuple[Effect, ...] = (
     *SCALE.values(),

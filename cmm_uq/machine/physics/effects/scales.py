@@ -17,7 +17,6 @@ from cmm_uq.machine.physics.effect import FURTHER, Amount, Effect, Parameter, al
 from cmm_uq.maths.uncertainty.air.refractivity import harris_2004
 
 AIR = ("temp_air_c", "pressure_hpa", "humidity_pct")
-
 _PASCAL_PER_HPA = 100.0
 _CO2_PPM, _HENE_NM = 450.0, 632.991
 _STANDARD = (REFERENCE_TEMPERATURE, 101325.0, 50.0)
@@ -45,7 +44,6 @@ class ScaleCurvature(Effect):
         )
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "in the middle of its travel {axis} stands {size} further towards {side} than it reads",
@@ -53,7 +51,6 @@ class ScaleCurvature(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, high = points.machine.travel(self.axis)
         place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
         return along(self.axis, MICROMETRE * (1 - place**2))
@@ -82,7 +79,6 @@ class AirScale(Effect):
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, -index_change(points) * points.readings[self.axis])
 
 
@@ -109,7 +105,6 @@ class DeadPath(Effect):
         )
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         change = index_change(points)
         return along(self.axis, change[0] - change)
 

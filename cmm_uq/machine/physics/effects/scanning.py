@@ -39,7 +39,6 @@ class DigitizerOffset(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return MICROMETRE * attitudes(points)[:, :, :2]
 
 
@@ -58,7 +57,6 @@ class DigitizerDepth(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return MICROMETRE * points.column("depth_mm")[:, None, None] * attitudes(points)[:, :, 1:2]
 
 
@@ -84,7 +82,6 @@ class DigitizerIncidence(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         frame = attitudes(points)
         own = np.einsum("ni,nij->nj", normals_of(points), frame)
         angles = np.degrees(np.arctan2(own[:, [0, 2]], np.abs(own[:, 1:2])))

@@ -16,9 +16,7 @@ from cmm_uq.machine.physics.effect import FURTHER, Effect, Parameter
 from cmm_uq.machine.physics.effects.probing import normals_of
 from cmm_uq.machine.physics.effects.reversal import travel
 
-REFERENCE_LENGTH = 100.0
-"""mm; the length of stylus that bending is stated for."""
-
+REFERENCE_LENGTH = 100.0  # mm; the length of stylus that bending is stated for
 _TIPS = tuple(f"tip_{a}_mm" for a in AXES)
 _MILLISECOND = 1e-3
 
@@ -42,7 +40,6 @@ class PreTravel(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return -MICROMETRE * travel(points)[:, :, None]
 
 
@@ -65,7 +62,6 @@ class ProbeAxial(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         axis = _stylus(points)
         part = np.einsum("ni,ni->n", normals_of(points), axis)
         return np.asarray(MICROMETRE * (part[:, None] * axis)[:, :, None], dtype=np.float64)
@@ -90,7 +86,6 @@ class StylusBending(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         length = np.linalg.norm([points.column(name) for name in _TIPS], axis=0)
         axis, normals = _stylus(points), normals_of(points)
         across = normals - np.einsum("ni,ni->n", normals, axis)[:, None] * axis
@@ -114,7 +109,6 @@ class TriggerDelay(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return _MILLISECOND * (points.column("speed_mm_s")[:, None] * normals_of(points))[:, :, None]
 
 

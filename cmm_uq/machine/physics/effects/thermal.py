@@ -15,8 +15,8 @@ from cmm_uq.base.units import ARCSECOND, METRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.machine.physics.effect import Amount, Effect, Parameter, along
 from cmm_uq.machine.physics.effects.rigid_body import turned
 
+# coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible.
 EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))
-"""Coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible."""
 
 
 class ThermalScale(Effect):
@@ -35,7 +35,6 @@ class ThermalScale(Effect):
         self.columns = (f"temp_{axis}_c",)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "the scale of {axis} expands by {size} {more} than is compensated",
@@ -43,7 +42,6 @@ class ThermalScale(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         excess = points.column(f"temp_{self.axis}_c") - REFERENCE_TEMPERATURE
         return along(self.axis, excess * points.readings[self.axis])
 
@@ -63,7 +61,6 @@ class ThermalArtefact(Effect):
     columns = ("temp_artefact_c",)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "the artefact expands by {size} {more} than is reckoned with",
@@ -71,7 +68,6 @@ class ThermalArtefact(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         excess = points.column("temp_artefact_c") - REFERENCE_TEMPERATURE
         return (-excess[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
 
@@ -88,14 +84,11 @@ class ThermalGradient(Effect):
     columns = ("temp_table_top_c", "temp_table_bottom_c")
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel("x")
         gradient = points.column("temp_table_top_c") - points.column("temp_table_bottom_c")
         angle = ARCSECOND * gradient * (points.readings["x"] - low) / METRE
         return turned(points, "x", "y", angle)
 
 
-SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})
-"""By axis."""
-
+SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})  # by axis
 EFFECTS: tuple[Effect, ...] = (*SCALE_EXPANSION.values(), ThermalArtefact(), ThermalGradient())

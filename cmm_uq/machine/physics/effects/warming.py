@@ -17,11 +17,10 @@ from cmm_uq.machine.physics.effect import FURTHER, Amount, Effect, Parameter, Sh
 from cmm_uq.machine.physics.effects.rigid_body import Lean, turned
 from cmm_uq.machine.physics.effects.thermal import EXPANSION
 
+# time constant of warming: an electric cabinet takes minutes, a granite table a day
 SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0, what=say("time to settle"))
-"""Time constant of warming: an electric cabinet takes minutes, a granite table a day."""
-
+# time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more
 LAG = Shape("lag_h", unit("h"), 0.05, 5.0, what=say("lag"))
-"""Time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more."""
 
 
 class ScaleDrift(Effect):
@@ -45,7 +44,6 @@ class ScaleDrift(Effect):
         )
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "lengths along {axis} are indicated ever {wrong}, by {size}",
@@ -53,7 +51,6 @@ class ScaleDrift(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, PPM * points.hours * points.readings[self.axis])
 
 
@@ -79,7 +76,6 @@ class Settling(Effect):
         )
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}",
@@ -87,7 +83,6 @@ class Settling(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, MICROMETRE * _settled(points, shape))
 
 
@@ -113,7 +108,6 @@ class ScaleSettling(Effect):
         )
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        """See :meth:`Effect.meaning`."""
         amount = amounts[self.coefficients[0].name]
         return say(
             "lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}",
@@ -122,7 +116,6 @@ class ScaleSettling(Effect):
         )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         return along(self.axis, PPM * _settled(points, shape) * points.readings[self.axis])
 
 
@@ -154,7 +147,6 @@ class ThermalSquareness(Lean):
         )
 
     def lean(self, points: Points) -> Floats:
-        """See :meth:`Effect.lean`."""
         excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
         return np.asarray(ARCSECOND * excess)
 
@@ -180,7 +172,6 @@ class CarriageGradient(Effect):
         self.columns = columns
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         low, _ = points.machine.travel(self.axis)
         gradient = points.column(self.columns[0]) - points.column(self.columns[1])
         angle = ARCSECOND * gradient * (points.readings[self.axis] - low) / METRE
@@ -208,7 +199,6 @@ class ArtefactLag(Effect):
     tier = FURTHER
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        """See :meth:`Effect.basis`."""
         (lag,) = shape
         temperature = points.column("temp_artefact_c")
         behind = lagging(points.hours, temperature, lag) - temperature

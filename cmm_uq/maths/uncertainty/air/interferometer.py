@@ -39,13 +39,17 @@ class Interferometer:
     origins : where the figures come from, by the names of the model's inputs.
     """
 
+    # displacement counted in vacuum wavelengths, mm; its uncertainty is that of resolution and noise
     vacuum_mm: Distribution
-    air: Air
-    dead_path_mm: Distribution | None = None
+    air: Air  # at the time of the reading
+    dead_path_mm: Distribution | None = None  # between the interferometer and the place of zeroing, mm
+    # n₀ − 1 when the counter was zeroed; None means the air has not changed since
     zero_refractivity: Distribution | None = None
-    angle_rad: Distribution | None = None
+    angle_rad: Distribution | None = None  # between beam and motion, rad
+    # material_c, cte_per_k: temperature and expansion coefficient of what is measured; None leaves the length as it is
     material_c: Distribution | None = None
     cte_per_k: Distribution | None = None
+    # where the figures come from, by the names of the model's inputs
     origins: Mapping[str, str] = field(default_factory=dict)
 
     @property

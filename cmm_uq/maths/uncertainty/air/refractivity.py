@@ -19,9 +19,7 @@ from typing import Any
 import numpy as np
 
 Quantity = Any
-
-KELVIN = 273.15
-"""0 °C in K."""
+KELVIN = 273.15  # 0 °C in K
 
 _WATER = (
     1.16705214528e3,
@@ -118,8 +116,7 @@ def ciddor(
     return dry_density / standard * dry + vapour_density / _STANDARD_VAPOUR_DENSITY * vapour
 
 
-_TORR = 101325.0 / 760.0
-"""1 mm Hg in Pa."""
+_TORR = 101325.0 / 760.0  # 1 mm Hg in Pa
 
 
 def _dry_updated(temperature_c: Quantity, pressure_pa: Quantity, sigma2: Quantity) -> Quantity:

@@ -31,28 +31,19 @@ from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.propagation import first_order
 
 Range = tuple[float, float]
-
 HELIUM_NEON_NM = 632.9908
 
 
 @dataclass(frozen=True)
 class AirEquation:
-    """An equation for the refractivity of air.
+    """An equation for the refractivity of air."""
 
-    Parameters
-    ----------
-    name : as budgets cite it.
-    refractivity : n − 1 of temperature (°C), pressure (Pa), relative humidity (%), CO2 (ppm), vacuum wavelength (nm).
-    u : standard uncertainty of the equation itself, as its source or NIST's comparison states it.
-    wavelength_nm : range of vacuum wavelengths.
-    temperature_c : range of temperatures.
-    """
-
-    name: str
+    name: str  # as budgets cite it
+    # n − 1 of temperature (°C), pressure (Pa), relative humidity (%), CO2 (ppm), vacuum wavelength (nm)
     refractivity: Callable[..., Any]
-    u: float
-    wavelength_nm: Range = (300.0, 1700.0)
-    temperature_c: Range = (-40.0, 100.0)
+    u: float  # standard uncertainty of the equation itself, as its source or NIST's comparison states it
+    wavelength_nm: Range = (300.0, 1700.0)  # range of vacuum wavelengths
+    temperature_c: Range = (-40.0, 100.0)  # range of temperatures
 
 
 EQUATIONS: Mapping[str, AirEquation] = {
@@ -83,13 +74,13 @@ class Air:
     altitude_m : of the place; the mean pressure there stands in for one that was not measured.
     """
 
-    temperature_c: Distribution
-    pressure_pa: Distribution | None = None
-    humidity_pct: Distribution | None = None
-    dew_point_c: Distribution | None = None
-    co2_ppm: Distribution | None = None
-    wavelength_nm: Distribution | None = None
-    altitude_m: float = 0.0
+    temperature_c: Distribution  # °C
+    pressure_pa: Distribution | None = None  # Pa
+    humidity_pct: Distribution | None = None  # relative humidity, %
+    dew_point_c: Distribution | None = None  # instead of the relative humidity, °C
+    co2_ppm: Distribution | None = None  # carbon dioxide, parts per million by volume
+    wavelength_nm: Distribution | None = None  # vacuum wavelength, nm
+    altitude_m: float = 0.0  # of the place; the mean pressure there stands in for one that was not measured
 
     def __post_init__(self) -> None:
         if self.humidity_pct is not None and self.dew_point_c is not None:
@@ -146,12 +137,7 @@ def standard_pressure(altitude_m: Number) -> Any:
 
 
 def equation_by_name(name: str) -> AirEquation:
-    """Equation of :data:`EQUATIONS`.
-
-    Raises
-    ------
-    CmmUqError : no such equation.
-    """
+    """Equation of :data:`EQUATIONS`."""
     if name not in EQUATIONS:
         raise CmmUqError(
             f"there is no equation {name!r} for the refractive index of air", fix=suggestion(name, EQUATIONS)
@@ -171,12 +157,7 @@ def refractivity_of(equation: AirEquation, values: Mapping[str, Any]) -> Any:
 
 
 def air_model(air: Air, equation: str = "ciddor") -> MeasurementModel:
-    """Measurement model of the refractivity n − 1; the equation's own error is an input of it.
-
-    Raises
-    ------
-    CmmUqError : an unknown equation, or an estimate out of its range.
-    """
+    """Measurement model of the refractivity n − 1; the equation's own error is an input of it."""
     chosen = equation_by_name(equation)
     check_range(air, chosen)
     inputs = {**air.inputs, "equation": normal(0.0, chosen.u)}
@@ -190,12 +171,7 @@ def refractive_index(air: Air, equation: str = "ciddor") -> tuple[Floats, Floats
 
 
 def check_range(air: Air, equation: AirEquation) -> None:
-    """Refuse estimates out of the range of an equation.
-
-    Raises
-    ------
-    CmmUqError : names the quantity, its value, and the range.
-    """
+    """Refuse estimates out of the range of an equation."""
     ranges = {
         "temperature_c": equation.temperature_c,
         "pressure_pa": _PRESSURE_PA,

@@ -18,13 +18,9 @@ from cmm_uq.base.points import Floats
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, Line
 
-FACTOR = 2.0
-"""Coverage factor that ISO/TS 23165 and ISO 15530-3 prescribe."""
-
+FACTOR = 2.0  # coverage factor that ISO/TS 23165 and ISO 15530-3 prescribe
 SIMULATION = say("simulation")
-
-FEWEST_READINGS = 20
-"""Of the calibrated workpiece, in ten cycles or more (ISO 15530-3:2011)."""
+FEWEST_READINGS = 20  # of the calibrated workpiece, in ten cycles or more (ISO 15530-3:2011)
 
 TEST = say(
     "Test uncertainty (ISO/TS 23165): of the test value. The machine's own errors are what is "
@@ -184,14 +180,7 @@ def use_by_simulation(
 
     The value is the systematic error that the simulation found; see :func:`expanded_without_correction`.
 
-    Parameters
-    ----------
-    simulated_errors_mm : simulated minus true value, one a simulated measurement.
-    not_simulated : lines of what the simulation leaves out; the standard asks that they be stated.
-
-    Raises
-    ------
-    CmmUqError : fewer than a hundred simulated measurements.
+    ``not_simulated``: lines of what the simulation leaves out; the standard asks that they be stated.
     """
     errors = np.asarray(simulated_errors_mm, dtype=np.float64)
     if len(errors) < 100:

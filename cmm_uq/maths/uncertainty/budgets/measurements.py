@@ -63,14 +63,15 @@ class BallbarPosition:
     u_temperature_k, cte_per_k : of the bar, where its length at 20 °C is asked for.
     """
 
-    length_mm: float
-    direction: Floats
-    centre_covariance_mm2: Floats
-    form_shift_mm: float = 0.0
-    probe_mm: float = 0.0
-    probe_common: float = 0.0
-    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)
-    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)
+    length_mm: float  # distance of the centres
+    direction: Floats  # (3,) unit vector along the bar
+    centre_covariance_mm2: Floats  # (3, 3) of one fitted centre, from the scatter of its points
+    form_shift_mm: float = 0.0  # how far, at most, a ball's form moves its centre along the bar
+    probe_mm: float = 0.0  # limits of what the probing system may shift a ball by, systematically
+    probe_common: float = 0.0  # correlation of that shift between the two balls; one when both are seen the same way
+    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)  # (3,) limits of the scale errors of x, y, z over the bar's full length
+    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)  # (3,) standard uncertainties of the squarenesses xy, yz, zx
+    # u_temperature_k, cte_per_k: of the bar, where its length at 20 °C is asked for
     u_temperature_k: float = 0.0
     cte_per_k: float = 0.0
     origins: dict[str, str] = field(default_factory=dict)
@@ -149,9 +150,7 @@ def harris_compensated() -> Budget:
 def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budget:
     """Harris 2004 section 6.4.1: one length from uncompensated points, as printed.
 
-    Parameters
-    ----------
-    scale_um : (3,) largest scale errors of x, y, z; those of 20 °C, or (21, 30, 12) at 25 °C and (26, 38, 20) at 30 °C.
+    ``scale_um``: (3,) largest scale errors of x, y, z; those of 20 °C, or (21, 30, 12) at 25 °C and (26, 38, 20) at 30 °C.
     """
     return Budget(
         say("length of the ballbar, as printed in Harris 2004 section 6.4.1"),
@@ -186,13 +185,7 @@ def triangle_angles(
 ) -> MeasurementModel:
     """Angles alpha, beta, gamma (rad) opposite to the sides a, b, c.
 
-    Parameters
-    ----------
-    correlation : of sides that share a part, such as the cylinder at a corner: pairs of ``a_mm``, ``b_mm``, ``c_mm``.
-
-    Raises
-    ------
-    CmmUqError : the sides do not close to a triangle.
+    ``correlation``: of sides that share a part, such as the cylinder at a corner: pairs of ``a_mm``, ``b_mm``, ``c_mm``.
     """
     longest, *others = sorted((np.asarray(side.mean) for side in (a_mm, b_mm, c_mm)), key=np.max, reverse=True)
     if np.any(longest >= others[0] + others[1]):
@@ -221,14 +214,8 @@ PARAMETERS = ("x", "y", "z", "radius")
 def sphere_covariance(directions: Floats, u_point_mm: float) -> Floats:
     """Covariance (4, 4) of centre and radius from points in the given directions, mm².
 
-    Parameters
-    ----------
-    directions : (n, 3) unit vectors from the centre to the points, n ≥ 4.
-    u_point_mm : standard uncertainty of one point along its direction, mm.
-
-    Raises
-    ------
-    CmmUqError : the points do not determine a sphere (fewer than four, or all on one circle).
+    ``directions``: (n, 3) unit vectors from the centre to the points, n ≥ 4. ``u_point_mm``: standard uncertainty of one
+    point along its direction, mm.
     """
     jacobian = -np.column_stack([directions, np.ones(len(directions))])
     singular = np.linalg.svd(jacobian, compute_uv=False)
@@ -250,13 +237,9 @@ def sphere_budgets(
 ) -> dict[str, Budget]:
     """Budgets of x, y, z and radius.
 
-    Parameters
-    ----------
-    estimate_mm : (4,) centre and radius.
-    covariance_mm2 : (4, 4) of the fit.
-    form_shift_mm : (4,) how far, at most, the form of the ball can move each of them.
-    dof : degrees of freedom of the covariance (points minus four where σ comes from the residuals).
-    further : lines that all four share, such as a probe or a scale.
+    ``estimate_mm``: (4,) centre and radius. ``covariance_mm2``: (4, 4) of the fit. ``form_shift_mm``: (4,) how far, at most,
+    the form of the ball can move each of them. ``dof``: degrees of freedom of the covariance (points minus four where σ
+    comes from the residuals).
     """
     budgets = {}
     for k, name in enumerate(PARAMETERS):
@@ -302,10 +285,7 @@ def length_at_20(
 ) -> MeasurementModel:
     """Length at 20 °C (ISO 1) of a workpiece measured warm by a scale that may be warm too.
 
-    Parameters
-    ----------
-    scale_c, scale_cte_per_k : of the scale; left out where the machine compensates its scales.
-    correlation : such as that of the two temperatures, which one thermometer may have measured.
+    ``correlation``: such as that of the two temperatures, which one thermometer may have measured.
     """
     inputs = {
         "indicated_mm": indicated_mm,

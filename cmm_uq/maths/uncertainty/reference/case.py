@@ -11,26 +11,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 Figures = Mapping[str, float]
-Expected = Mapping[str, tuple[float, float]]
-"""Expected value and tolerance of each figure."""
-
-SEED = 1
-"""Of every case that makes trials."""
+Expected = Mapping[str, tuple[float, float]]  # expected value and tolerance of each figure
+SEED = 1  # of every case that makes trials
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceCase:
-    """Figures with their source.
+    """Figures with their source."""
 
-    Parameters
-    ----------
-    title : what is computed.
-    source : document and clause, or how the figures were recomputed.
-    expected : value and tolerance by the name of the figure.
-    compute : gives the figures.
-    """
-
-    title: str
-    source: str
-    expected: Expected
-    compute: Callable[[], Figures]
+    title: str  # what is computed
+    source: str  # document and clause, or how the figures were recomputed
+    expected: Expected  # value and tolerance by the name of the figure
+    compute: Callable[[], Figures]  # gives the figures

@@ -23,7 +23,6 @@ from cmm_uq.maths.uncertainty.reference.case import SEED, Figures, ReferenceCase
 from cmm_uq.maths.uncertainty.reference.jcgm_100 import comparison
 
 _SIDE = np.sqrt(3)
-
 _DELTA_MASS, _DELTA_BLOCK = 0.0005, 0.5
 
 
