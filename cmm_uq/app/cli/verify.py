@@ -12,7 +12,7 @@ from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED, progress, 
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.verify import Verification
+    from cmm_uq.app.commands.verification import Verification
 
 EXAMPLES = examples(
     "verify certificate.pdf", "verify reports/iota-1102-20C", "verify certificate.pdf certificate.html --no-rerun",

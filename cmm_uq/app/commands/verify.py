@@ -1,61 +1,18 @@
-"""Is a certificate what it says? Its files are compared with each other, and with what its inputs give when computed again.
-
-Nothing of a given file is run. Inputs are read from memory as the PDF has them, so that a path in them leads nowhere; what
-takes part in the computation is installed here.
-"""
+"""Is a certificate what it says? ``cmm-uq verify`` of a machine's certificate, or of the report of a part."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from cmm_uq import __version__
-from cmm_uq.app.commands.verify_again import Compute, again, compute_again, compute_part_again
-from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.verify.digital import check_schema, open_digital
-from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
-from cmm_uq.certificate.verify.given import (
-    PART_SCHEMA,
-    RESULTS,
-    RESULTS_SCHEMA,
-    Given,
-    check_files,
-    language_of,
-    read_given,
-)
-from cmm_uq.certificate.verify.signed import check_signatures
+from cmm_uq.app.commands.verification import Recomputation, Verification, examine_certificate, verify_given
+from cmm_uq.certificate.verify.given import Given, read_given
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
-    from cmm_uq.jobs.job import Job
-    from cmm_uq.jobs.part.job import PartJob
-
-
-@dataclass(frozen=True)
-class Verification:
-    """What was verified, and what came out.
-
-    Parameters
-    ----------
-    given : the forms of the certificate.
-    inquiry : what was found.
-    job : of the inputs, where they are there and sound; of a part's report none.
-    """
-
-    given: Given
-    inquiry: Inquiry
-    job: Job | None = None
-
-    @property
-    def subject(self) -> str:
-        """The document that was verified, by title and number; the job where there is none."""
-        if self.given.html is not None:
-            return " ".join(self.given.html[1].title.split())
-        if self.given.pdf is not None and (title := self.given.pdf[1].information.get("/Title")):
-            return " ".join(title.split())
-        return str(self.given.results[1]["job"]["id"]) if self.given.results is not None else ""
+    from cmm_uq.app.commands.verify_again import Compute
+    from cmm_uq.certificate.verify.found import Inquiry
 
 
 def verify(
@@ -70,151 +27,21 @@ def verify(
     rerun : whether everything is computed again from the inputs.
     trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
     schema : folder with PTB's schemas, that the digital certificate is held to as well.
-    compute : the second computation; :func:`again` where none is given.
+    compute : the second computation of a machine's certificate; as ``report`` and ``diagnose`` do where none is given.
     stage : told of progress.
 
     Raises
     ------
     CmmUqError : a file cannot be read, is hostile, or nothing of a certificate.
     """
+    trusted = None if trust is None else tuple(trust)
+
+    def examine(inquiry: Inquiry, given: Given) -> Recomputation | None:
+        if not given.of_part:
+            return examine_certificate(inquiry, given, compute, stage)
+        from cmm_uq.app.commands.verify_part import examine_part
+
+        return examine_part(inquiry, given, rerun=rerun, trust=trusted, stage=stage)
+
     stage("Opening the files", 0.0)
-    return verify_given(read_given(tuple(paths)), rerun=rerun, trust=trust, schema=schema, compute=compute, stage=stage)
-
-
-def verify_given(
-    given: Given, *, rerun: bool = True, trust: Iterable[Path] | None = None, schema: Path | None = None,
-    compute: Compute | None = None, stage: Stage = lambda what, part: None,
-) -> Verification:  # fmt: skip
-    """Verify files that were read; see :func:`verify`.
-
-    Raises
-    ------
-    CmmUqError : a file is hostile, or nothing of a certificate.
-    """
-    inquiry = Inquiry()
-    _check_schema(inquiry, given)
-    open_digital(inquiry, given)
-    check_files(inquiry, given)
-    stage("Comparing the forms", 0.1)
-    trusted = None
-    if trust is not None:
-        from cmm_uq.certificate.sign import trust_of
-
-        trust = tuple(trust)
-        trusted = trust_of(trust)
-    job: Job | None = None
-    part: PartJob | None = None
-    if given.of_part:
-        from cmm_uq.app.commands.verify_part import compare_part
-
-        part = compare_part(inquiry, given, rerun=rerun, trust=trust)
-    else:
-        job = _compare(inquiry, given)
-    check_signatures(inquiry, given, trusted)
-    if schema is not None:
-        check_schema(inquiry, given, schema)
-    alike = False
-    if not rerun:
-        inquiry.left(AGAIN, NOT_ASKED)
-    elif part is not None:
-        alike = compute_part_again(inquiry, given, part, trust, stage)
-    elif job is not None:
-        alike = compute_again(inquiry, given, job, compute or (lambda given, job: again(given, job, stage)))
-    if given.pdf is not None and given.html is not None and not alike:
-        from cmm_uq.certificate.verify.views import compare_views
-
-        compare_views(inquiry, given.pdf[1], given.html[1], files=(given.pdf[0], given.html[0]))
-    if given.of_part and given.pdf is not None and given.html is None and not alike:
-        inquiry.left(
-            f"words of {given.pdf[0]} beside its figures and decisions", "no HTML is given to compare them with"
-        )
-    if given.html is not None and not alike and _version(given) == __version__:
-        from cmm_uq.certificate.verify.views import check_style
-
-        check_style(inquiry, given.html[1], given.html[0])
-    stage("Done", 1.0)
-    return Verification(given, inquiry, job)
-
-
-def _version(given: Given) -> str:
-    """Of the package that made a certificate; empty where nothing says it."""
-    return "" if given.results is None else str(given.results[1]["software"]["version"])
-
-
-def _check_schema(inquiry: Inquiry, given: Given) -> None:
-    """Refuse what is no results.json of a job before anything takes it for one."""
-    if given.results is None:
-        inquiry.left("figures", f"no {RESULTS} is given, and no PDF that has it inside")
-        return
-    name, data, _ = given.results
-    job = data.get("job")
-    hashes = job.get("inputs_sha256") if isinstance(job, dict) else None
-    software = data.get("software")
-    if (
-        data.get("schema") not in (RESULTS_SCHEMA, PART_SCHEMA)
-        or not isinstance(hashes, dict)
-        or not all(isinstance(one, str) for one in hashes.values())
-        or not isinstance(software, dict)
-        or not isinstance(software.get("version"), str)
-    ):
-        raise CmmUqError(
-            f"is neither {RESULTS_SCHEMA} nor {PART_SCHEMA}, with a job, the hashes of its inputs and the program", where=name,
-            fix="Give the results.json of cmm-uq report, diagnose or part",
-        )  # fmt: skip
-
-
-def _compare(inquiry: Inquiry, given: Given) -> Job | None:
-    """The forms with each other, and figures, decisions, inputs and dates; the job, where its inputs are sound."""
-    if given.results is None:
-        return None
-    from cmm_uq.certificate.verify.decisions import check_decisions
-    from cmm_uq.certificate.verify.figures import check_figures, check_verdicts
-    from cmm_uq.certificate.verify.inputs import check_dates, check_job, check_results, inputs_of
-    from cmm_uq.certificate.verify.stated import check_stated
-
-    name, data, _ = given.results
-    with inquiry.reading("figures", name):
-        check_results(inquiry, given)
-        check_figures(inquiry, data, name)
-        check_decisions(inquiry, data, name)
-        check_verdicts(inquiry, data, name)
-        if given.html is not None:
-            check_stated(inquiry, data, given.html[1], files=(given.html[0], name))
-    inputs = inputs_of(inquiry, given)
-    if inputs is None:
-        inquiry.left("dates and computing again", "the inputs are not there as results.json names them")
-        return None
-    try:
-        job = _job(inputs, data)
-    except CmmUqError as error:
-        inquiry.wrong("inputs", "inputs", "", f"are no job that this version reads: {error}")
-        return None
-    check_job(inquiry, job, data, name)
-    check_dates(inquiry, job)
-    _check_digital(inquiry, given, job)
-    return job
-
-
-def _check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
-    """The digital certificate made again of results.json and the job, by the version that made it."""
-    if given.xml is None:
-        return
-    if (made := _version(given)) != __version__:
-        inquiry.left(f"{given.xml[0]} element by element", f"made by version {made}, and this is {__version__}")
-        return
-    from cmm_uq.certificate.verify.digital import check_digital
-
-    check_digital(inquiry, given, job)
-
-
-def _job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> Job:
-    """The job of the inputs; a prediction that the job itself does not name was given with the command."""
-    from cmm_uq.app.commands.reading import in_language, job_of
-
-    job = in_language(job_of(inputs), language_of(data))
-    beside = [name for name in inputs if name not in job.inputs]
-    if len(beside) == 1 and (data.get("diagnosis") or {}).get("simulation"):
-        from cmm_uq.jobs.derived_job import against
-
-        return against(job, inputs[beside[0]], beside[0])
-    return job
+    return verify_given(read_given(tuple(paths)), examine, rerun=rerun, trust=trusted, schema=schema, stage=stage)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
     from cmm_uq.certificate.verify.again import Again
     from cmm_uq.jobs.job import Job
-    from cmm_uq.jobs.part.job import PartJob
 
 
 Compute = Callable[["Given", "Job"], "Again"]
@@ -37,7 +35,7 @@ def compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) ->
         return False
     data = given.results[1]
     made, here = str(data["software"]["version"]), __version__
-    if _plugins_missing(inquiry, data):
+    if plugins_missing(inquiry, data):
         return False
     if made != here:
         _by_another_version(inquiry, given, job, made)
@@ -49,34 +47,6 @@ def compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) ->
     except CmmUqError as error:
         inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
         return False
-
-
-def compute_part_again(
-    inquiry: Inquiry, given: Given, job: PartJob, trust: Iterable[Path] | None, stage: Stage
-) -> bool:  # fmt: skip
-    """The same of a part; see :func:`compute_again`."""
-    if given.results is None:
-        return False
-    data = given.results[1]
-    made = str(data["software"]["version"])
-    if _plugins_missing(inquiry, data):
-        return False
-    if made != __version__:
-        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")
-        return False
-    from cmm_uq.app.commands.verify_part import part_again
-    from cmm_uq.certificate.verify.again import compare_again
-
-    kept: list[str] = []
-    try:
-        written = part_again(inquiry, job, data, partial(_as_attached, given, kept), trust=trust, stage=stage)
-    except CmmUqError as error:
-        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
-        return False
-    if written is None:
-        return False
-    files, beside = written
-    return compare_again(inquiry, given, _again_of(given, files, kept, beside))
 
 
 def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
@@ -98,11 +68,11 @@ def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Aga
         alpha = _alpha(data, FALSE_ALARMS)
         form, outcome = DIAGNOSE, diagnosis_outcome(job, seed=seed, alpha=alpha, stage=stage)
     kept: list[str] = []
-    written = form.contents(outcome, stage, finished=partial(_as_attached, given, kept))
-    return _again_of(given, written, kept)
+    written = form.contents(outcome, stage, finished=partial(as_attached, given, kept))
+    return recomputed(given, written, kept)
 
 
-def _again_of(given: Given, written: Mapping[str, bytes], kept: Sequence[str], beside: Sequence[str] = ()) -> Again:
+def recomputed(given: Given, written: Mapping[str, bytes], kept: Sequence[str], beside: Sequence[str] = ()) -> Again:
     """Files that were made again, with the PDF where it is set by the program that set the given one."""
     from cmm_uq.certificate.verify.again import Again
 
@@ -117,7 +87,7 @@ def _again_of(given: Given, written: Mapping[str, bytes], kept: Sequence[str], b
     return replace(found, pdf=pdf)
 
 
-def _as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
+def as_attached(given: Given, kept: list[str], name: str, content: bytes) -> bytes:
     """A file as it is attached where it is the same but for a signature, or for the platform, which is then kept in mind."""
     from cmm_uq.certificate.results.provenance import FILE, same_but_for_the_platform
     from cmm_uq.certificate.verify.digital import same_unsigned
@@ -155,7 +125,7 @@ def _creator(pdf: bytes) -> str:
     return found[1].decode("latin-1") if found else ""
 
 
-def _plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
+def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
     """Packages that took part and are not here as they were then."""
     missing = False
     for package, wanted in (data["software"].get("plugins") or {}).items():

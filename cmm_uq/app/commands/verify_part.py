@@ -4,18 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from cmm_uq import __version__
+from cmm_uq.analysis.parts.result import evaluated
+from cmm_uq.analysis.parts.setup import plan_of
+from cmm_uq.app.commands.files import Finished, Stage
+from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, evaluate, in_language
+from cmm_uq.app.commands.parts.drift import FILE as HISTORY
+from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
+from cmm_uq.app.commands.verification import Recomputation
+from cmm_uq.app.commands.verify_again import as_attached, plugins_missing, recomputed
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.certificate.verify.again import compare_again
+from cmm_uq.certificate.verify.decisions import check_part_decisions
+from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Finding, Inquiry
 from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
-
-if TYPE_CHECKING:
-    from cmm_uq.app.commands.files import Finished, Stage
-    from cmm_uq.jobs.part.job import PartJob
+from cmm_uq.certificate.verify.inputs import check_part_job, check_results, check_standing, inputs_of
+from cmm_uq.certificate.verify.stated import check_part_stated
+from cmm_uq.certificate.verify.views import squashed, without_foot
+from cmm_uq.jobs.part.job import PartJob, part_of
+from cmm_uq.jobs.reading import sha256
 
 TRUSTED = "whose signature the machine's certificate has"
+
+
+def examine_part(
+    inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage
+) -> Recomputation | None:
+    """The report of a part; see :func:`cmm_uq.app.commands.verification.verify_given`."""
+    if (job := compare_part(inquiry, given, rerun=rerun, trust=trust)) is None:
+        return None
+    return Recomputation(lambda: _compute_again(inquiry, given, job, trust, stage))
+
+
+def _compute_again(inquiry: Inquiry, given: Given, job: PartJob, trust: Iterable[Path] | None, stage: Stage) -> bool:
+    """Everything computed from the inputs, by this version: whether the documents are the same to the byte."""
+    if given.results is None:
+        return False
+    data = given.results[1]
+    made = str(data["software"]["version"])
+    if plugins_missing(inquiry, data):
+        return False
+    if made != __version__:
+        inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")
+        return False
+    kept: list[str] = []
+    try:
+        written = part_again(inquiry, job, data, partial(as_attached, given, kept), trust=trust, stage=stage)
+    except CmmUqError as error:
+        inquiry.wrong("again", given.results[0], "", f"cannot be computed again: {error}")
+        return False
+    if written is None:
+        return False
+    files, beside = written
+    return compare_again(inquiry, given, recomputed(given, files, kept, beside))
 
 
 def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
@@ -28,10 +74,6 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
     """
     if given.results is None:
         return None
-    from cmm_uq.certificate.verify.decisions import check_part_decisions
-    from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
-    from cmm_uq.certificate.verify.inputs import check_results, inputs_of
-
     name, data, _ = given.results
     with inquiry.reading("figures", name):
         check_results(inquiry, given)
@@ -59,8 +101,6 @@ def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable
 
 def _check_stated(inquiry: Inquiry, given: Given) -> None:
     """What page and PDF state; their words are compared with each other besides, where both are there."""
-    from cmm_uq.certificate.verify.stated import check_part_stated
-
     if given.results is None:
         return
     name, data, _ = given.results
@@ -71,8 +111,6 @@ def _check_stated(inquiry: Inquiry, given: Given) -> None:
 
 
 def _without_feet(given: Given) -> str:
-    from cmm_uq.certificate.verify.views import squashed, without_foot
-
     if given.pdf is None:
         return ""
     pdf = given.pdf[1]
@@ -88,11 +126,6 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
     ------
     CmmUqError : they are no job of a part.
     """
-    from cmm_uq.app.commands.parts.documents import in_language
-    from cmm_uq.app.commands.parts.drift import FILE as HISTORY
-    from cmm_uq.app.commands.parts.machine import CALIBRATION, with_history
-    from cmm_uq.jobs.part.job import part_of
-
     language = language_of(data)
     stated = {name: content for name, content in inputs.items() if name != HISTORY}
     own = {name: content for name, content in stated.items() if not name.startswith(CALIBRATION)}
@@ -105,10 +138,6 @@ def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
 
 
 def _check_job(inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str) -> None:
-    from cmm_uq.analysis.parts.result import evaluated
-    from cmm_uq.analysis.parts.setup import plan_of
-    from cmm_uq.certificate.verify.inputs import check_part_job
-
     inquiry.looked("inputs")
     if sorted(data["job"]["inputs_sha256"]) != sorted(job.inputs):
         inquiry.wrong("inputs", file, "job.inputs_sha256", "names other files than the job",
@@ -126,10 +155,6 @@ def _check_machine(
     inquiry: Inquiry, job: PartJob, data: Mapping[str, Any], file: str, *, rerun: bool, trust: Iterable[Path] | None
 ) -> None:
     """The certificate that states the machine, verified as it would be by itself, and whether it held on the day."""
-    from cmm_uq.app.commands.parts.machine import attached_calibration, standing_of, verified
-    from cmm_uq.certificate.verify.inputs import check_standing
-    from cmm_uq.jobs.reading import sha256
-
     said = data["machine"]
     if job.facts.machine_state.job is not None:
         inquiry.looked("inputs")
@@ -201,10 +226,6 @@ def part_again(
     ------
     CmmUqError : they give nothing.
     """
-    from cmm_uq.app.commands.parts.documents import contents_of
-    from cmm_uq.app.commands.parts.drift import FILE as HISTORY
-    from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
-
     said, simulation = data["machine"], data["simulation"]
     held = bool(said["signatures_held_to_trusted"])
     if held and trust is None:

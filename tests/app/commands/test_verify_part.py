@@ -18,8 +18,9 @@ from typer.testing import CliRunner
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
 from cmm_uq.app.commands.parts.documents import contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import state_machine
-from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
-from cmm_uq.app.commands.verify import Verification, verify
+from cmm_uq.app.commands.parts.part import evaluate_part
+from cmm_uq.app.commands.verification import Verification
+from cmm_uq.app.commands.verify import verify
 from cmm_uq.app.commands.verify_part import _asked_again
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement

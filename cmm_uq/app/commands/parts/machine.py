@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 from cmm_uq.app.commands.parts.drift import with_drift
 from cmm_uq.app.commands.reading import job_of, read_job
+from cmm_uq.app.commands.verification import Verification, examine_certificate, verify_given
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say
@@ -36,9 +37,6 @@ from cmm_uq.jobs.reading import sha256 as hashes
 from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED
 from cmm_uq.machine.model import MeasurementModel
 from cmm_uq.maths.inference.draws import Draws
-
-if TYPE_CHECKING:
-    from cmm_uq.app.commands.verify import Verification
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
 NORMAL_C = 20.0  # °C to which lengths are referred (ISO 1)
@@ -187,8 +185,6 @@ def standing_of(job: PartJob, found: Verification) -> CertificateStatus:
 
 def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None = None) -> Verification:
     """The verification of the certificate that states the machine of a part's job."""
-    from cmm_uq.app.commands.verify import verify_given
-
     where = _where(job)
     given = given_of(job.machine_files)
     if given.results is None:
@@ -197,7 +193,7 @@ def verified(job: PartJob, *, rerun: bool = False, trust: Iterable[Path] | None 
     if given.of_part:
         raise CmmUqError("is of a part, and states no machine", where=where,
                          fix="Give the certificate of the machine that measured the part")  # fmt: skip
-    return verify_given(given, rerun=rerun, trust=trust)
+    return verify_given(given, examine_certificate, rerun=rerun, trust=trust)
 
 
 def _certified(job: PartJob, found: Verification, *, rerun: bool) -> _Stated:
