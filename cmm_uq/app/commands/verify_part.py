@@ -12,9 +12,10 @@ from cmm_uq import __version__
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
 from cmm_uq.app.commands.files import Finished, Stage
-from cmm_uq.app.commands.parts.documents import PartOptions, contents_of, evaluate, in_language
+from cmm_uq.app.commands.parts.documents import contents_of, in_language
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
+from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
 from cmm_uq.app.commands.verification import Recomputation
 from cmm_uq.app.commands.verify_again import as_attached, plugins_missing, recomputed
 from cmm_uq.base.errors import CmmUqError
