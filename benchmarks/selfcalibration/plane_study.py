@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.examples.shift_plate_job import PLACINGS
 from benchmarks.selfcalibration.machines import RANGE, machine
 from cmm_uq.artefacts.shift_axis.curve import Curve
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
 from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.base.points import Floats, Points

@@ -35,12 +35,7 @@ def names() -> tuple[str, ...]:
 
 @cache
 def kind_named(name: str) -> Kind | None:
-    """A kind by its name; ``None`` where there is none. A built-in kind cannot be replaced.
-
-    Raises
-    ------
-    CmmUqError : another package offers it, but cannot be loaded, or two packages do.
-    """
+    """A kind by its name; ``None`` where there is none. A built-in kind cannot be replaced."""
     if name in BUILT_IN:
         found: Kind = import_module(f"cmm_uq.artefacts.{BUILT_IN[name]}.kind").KIND
         return found
@@ -49,12 +44,7 @@ def kind_named(name: str) -> Kind | None:
 
 
 def kind_of(job: Job) -> Kind:
-    """The kind of a job.
-
-    Raises
-    ------
-    CmmUqError : there is none of this name.
-    """
+    """The kind of a job."""
     return _known(job.facts.artefact.kind)
 
 
@@ -70,12 +60,7 @@ def artefact_facts(**keys: Any) -> ArtefactFacts:
 
 
 def artefact_of(facts: ArtefactFacts, points: Points, *, where: str | None = None) -> Artefact:
-    """The artefact that a job describes, with its recording.
-
-    Raises
-    ------
-    CmmUqError : this kind is not known, has no artefact, or the recording does not fit it.
-    """
+    """The artefact that a job describes, with its recording."""
     return _known(facts.kind).observing("observed as an artefact")(facts, points, where=where)
 
 

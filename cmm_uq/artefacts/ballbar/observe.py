@@ -1,21 +1,44 @@
-"""Ballbar: two balls a fixed distance apart, in many places.
+"""What a recording of a ballbar observes and is asked for, and where it is placed.
+
+Ballbar: two balls a fixed distance apart, in many places.
 
 The observation is the distance of the two ball centres; placing and direction cancel, and a bar without a certificate
 leaves one scale common to all axes undetermined.
+
+Placings of a ballbar: the twenty positions of the standard, and anywhere in the volume.
+
+The twenty positions follow figure 26 of ASME B89.4.1-1997 as the recording of Harris (2004, figures C 1 and C 2) carries them
+out; its position 18, which repeats 14 there, is taken between 14 and 11.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.analysis.conformity.plans import B89
+from cmm_uq.analysis.planning.candidates import (
+    MIDDLE,
+    PatternFor,
+    RelocatedCandidates,
+    VolumeCandidates,
+    along_lines,
+    check_allowed,
+)
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, bar_misfit, common_length, no_references, rows_by
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Size
 from cmm_uq.machine.model.artefact_doubt import temperature_of
 from cmm_uq.machine.model.recorded import check_length, expansion, stated_sd
@@ -25,14 +48,7 @@ from cmm_uq.machine.physics.effect import Effect
 class Ballbar(Artefact):
     """A ballbar as recorded: m lengths of 2m points.
 
-    Parameters
-    ----------
-    facts : what the job says of the bar.
-    points : the recording; points 1 and 2 of every (measurement, repeat).
-
-    Raises
-    ------
-    CmmUqError : a bar lacks an end or has both in one place, or its length is off by a factor that a unit explains.
+    ``facts`` what the job says of the bar; ``points`` the recording; points 1 and 2 of every (measurement, repeat).
     """
 
     kind = "ballbar"
@@ -83,7 +99,6 @@ class Ballbar(Artefact):
         return np.asarray(np.linalg.norm(bars, axis=1) / self.expansion, dtype=np.float64)
 
     def indications(self) -> Indications | None:
-        """See :meth:`Artefact.indications`."""
         size = self.sizes[0]
         if not size.certified:
             return None
@@ -123,7 +138,6 @@ class Ballbar(Artefact):
         return self._known[1]
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`."""
         return np.asarray(self.expansion[:, None], dtype=np.float64)
 
     def _bars(self, xyz: Floats) -> Floats:
@@ -148,3 +162,83 @@ def _ends(points: Points, where: str | None) -> np.ndarray[tuple[int, int], np.d
                              fix="Record both balls, as points 1 and 2, or leave out the measurement")  # fmt: skip
         ends.append(rows[np.argsort(numbers)])
     return np.array(ends, dtype=np.int64)
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Bars of one length; ``None`` where one has not two ends."""
+    rows = rows_by(points.group)
+    if any(sorted(points.point[r]) != [1, 2] for r in rows):
+        return None
+    length = facts.length_mm or np.nan
+    return ArtefactShape(
+        rows, bar_misfit, length, facts.length_mm or common_length(points.xyz, rows), True, (), no_references(points)
+    )
+
+
+SCREENING = Screening(shape_of, balls=True)
+
+
+_DIAGONALS = (
+    (1, 1, 0), (1, -1, 0), (0, 1, -1), (0, 1, 1), (1, 0, -1), (1, 0, 1),
+    (1, 1, 1), (1, 1, -1), (1, -1, -1), (1, -1, 1),
+)  # fmt: skip
+_PARALLELS = (
+    ((0, 1, 0), (0.6, 0.5, 0.5)), ((1, 0, 0), (0.5, 0.85, 0.5)), ((1, 0, 0), (0.5, 0.25, 0.5)),
+    ((0, 1, 0), (0.3, 0.5, 0.5)), ((0, 1, 0), (0.7, 0.5, 0.5)), ((1, 0, 0), (0.65, 0.1, 0.5)),
+    ((1, 0, 0), (0.5, 0.5, 0.5)), ((0, 1, 0), (0.4, 0.5, 0.5)), ((0, 0, 1), (0.65, 0.55, 0.5)),
+    ((0, 0, 1), (0.45, 0.3, 0.5)),
+)  # fmt: skip
+
+
+def ballbar(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
+    """Both balls."""
+    half = 0.5 * planned_length(facts, plan)
+    one = Pattern(np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]), np.array([1, 2]), np.ones(2, dtype=np.int64))
+    return one.repeated(plan.repeats)
+
+
+def ballbar_positions(setting: Setting) -> tuple[SetUp, ...]:
+    """Twenty positions for a nearly cubic volume; in a longer one ten diagonals more for each further cube along it."""
+    pattern = ballbar(setting.artefact, setting.plan)
+    sections = _sections(setting.volume)
+    wanted = [(d, MIDDLE) for d in _DIAGONALS] + list(_PARALLELS)
+    placings = _lines(setting, sections[0], pattern, wanted)
+    for section in sections[1:]:
+        placings += _lines(setting, section, pattern, wanted[: len(_DIAGONALS)])
+    return tuple(placings)
+
+
+def _lines(
+    setting: Setting, volume: Volume, pattern: Pattern,
+    wanted: list[tuple[tuple[int, int, int], tuple[float, float, float]]],
+) -> list[SetUp]:  # fmt: skip
+    found = []
+    for direction, place in wanted:
+        u = np.array(direction, dtype=np.float64)
+        check_allowed(setting, u)
+        found.append(volume.set_up(pattern, attitude_along(u), place, direction_words(u)))
+    return found
+
+
+def _sections(volume: Volume) -> list[Volume]:
+    """Nearly cubic parts of the volume, overlapping by no more than they must."""
+    size = volume.size
+    counts = B89.cubes(size)
+    edge = B89.nearly_cubic * size.min()
+    found = []
+    for at in product(*(range(count) for count in counts)):
+        length = np.minimum(size, np.where(np.array(counts) > 1, edge, size))
+        start = volume.box[:, 0] + (size - length) * np.array(
+            [i / (count - 1) if count > 1 else 0.0 for i, count in zip(at, counts, strict=True)]
+        )
+        found.append(replace(volume, box=np.column_stack([start, start + length])))
+    return found
+
+
+def _shape(setting: Setting) -> PatternFor:
+    pattern = ballbar(setting.artefact, setting.plan)
+    return lambda _: pattern
+
+
+_PLACES = VolumeCandidates(along_lines, _shape, RelocatedCandidates(along_lines))
+PLANNING = Planning({"ASME B89.4.1": ballbar_positions}, _PLACES.candidates, _PLACES.elsewhere)

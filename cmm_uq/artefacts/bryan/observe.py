@@ -1,4 +1,6 @@
-"""Bryan gauge: a bar with one ball fixed to the table, the other swept through the machine's volume.
+"""What a recording of a Bryan gauge observes and is asked for, and where it is placed.
+
+Bryan gauge: a bar with one ball fixed to the table, the other swept through the machine's volume.
 
 The observation is the distance of the swept ball from the fixed one, whose place is free for the whole job, and the bar's
 length too when no certificate gives it (US 4,437,151, equations 108 and 110, solved together instead of one after the other).
@@ -6,14 +8,21 @@ length too when no certificate gives it (US 4,437,151, equations 108 and 110, so
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import cast
+
 import numpy as np
 
+from cmm_uq.analysis.planning.set_up import SetUp, direction_words, planned_length
+from cmm_uq.analysis.planning.setting import Planning, Setting, Start
+from cmm_uq.analysis.planning.volume import Volume
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, ball_misfit, no_references
 from cmm_uq.artefacts.distances.equations import DistanceSolution, solve_distances
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model.artefact import Placings
+from cmm_uq.machine.model.artefact import Artefact, Placings
 from cmm_uq.machine.model.radial import Radial
 from cmm_uq.machine.model.recorded import expansion, place
 
@@ -21,14 +30,8 @@ from cmm_uq.machine.model.recorded import expansion, place
 class Bryan(Radial):
     """A swept bar: n distances of n points, one a measurement.
 
-    Parameters
-    ----------
-    facts : what the job says of the bar; its length may be missing.
-    points : the recording; point 1 is the swept ball.
-
-    Raises
-    ------
-    CmmUqError : points other than the swept ball, too few of them, all in one place or plane.
+    ``facts`` what the job says of the bar; its length may be missing; ``points`` the recording; point 1 is the swept
+    ball.
     """
 
     kind = "bryan"
@@ -55,18 +58,8 @@ class Bryan(Radial):
         The sphere is fitted as if the machine had no errors, and bends to them: unless the swept positions surround the
         fixed ball evenly, its centre takes up part of every scale and squareness error, and e1 … e6 lack that part.
 
-        Parameters
-        ----------
-        method : of solving the equations.
-        xyz : (n, 3) readings, mm; by default those recorded.
-
-        Returns
-        -------
-        solution, and the centre (3,) of the first step, mm.
-
-        Raises
-        ------
-        CmmUqError : the swept directions do not determine all six factors.
+        ``xyz`` (n, 3) readings, mm; by default those recorded. Gives solution, and the centre (3,) of the first step,
+        mm.
         """
         certified = self.sizes[0].certified
         readings = self.points.xyz if xyz is None else xyz
@@ -74,3 +67,95 @@ class Bryan(Radial):
         differences = readings - centre
         length = self.sizes[0].nominal
         return solve_distances(differences, length * self.expansion, method), centre
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """One sphere; ``None`` with few points, or others than the swept ball."""
+    if len(points) < 8 or np.any(points.point != 1):
+        return None
+    about = points.xyz - np.median(points.xyz, axis=0)
+    extent = facts.length_mm or float(np.median(np.linalg.norm(about, axis=1)))
+    return ArtefactShape(
+        (np.arange(len(points)),), ball_misfit, facts.length_mm or np.nan, extent, False, (), no_references(points)
+    )
+
+
+SCREENING = Screening(shape_of, balls=True)
+
+
+LEAST = 4  # positions from which on a centre can be found
+_TRIED = 4000
+
+
+def swept(volume: Volume, length: float, count: int, repeats: int, centre: Floats | None = None) -> tuple[SetUp, ...]:
+    """Positions of the swept ball, spread evenly over all directions that stay inside the volume and are held.
+
+    ``length`` of the bar, mm; ``centre`` (3,) of the fixed ball in scale readings; the middle of the volume by default.
+    """
+    middle = volume.box.mean(axis=1) if centre is None else centre
+    spiral = _spiral(_TRIED)
+    held = np.array([volume.allows(direction) for direction in spiral])
+    places = middle + length * spiral
+    inside = np.all((places >= volume.box[:, 0] - 1e-6) & (places <= volume.box[:, 1] + 1e-6), axis=1)
+    high = (places[:, 2] >= volume.heights[0]) & (places[:, 2] <= volume.heights[1])
+    fitting = np.flatnonzero(held & inside & high)
+    if len(fitting) < LEAST:
+        raise CmmUqError(
+            f"a bar of {length:g} mm about ({', '.join(f'{v:.0f}' for v in middle)}) mm has hardly any position",
+            where="job.toml [plan]", fix="Use a shorter bar, a larger volume or more fixtures",
+        )  # fmt: skip
+    chosen = _spread(places[fitting], min(count, len(fitting)))
+    found = []
+    for i in fitting[chosen]:
+        xyz = volume.machine.coordinates(np.tile(places[i], (repeats, 1)))
+        one = np.ones(repeats, dtype=np.int64)
+        points = Points(xyz, one, one, np.arange(1, repeats + 1), volume.machine)
+        found.append(SetUp(direction_words(spiral[i]), points))
+    return tuple(found)
+
+
+def _spiral(count: int) -> Floats:
+    """Directions (count, 3) spread evenly over the sphere (Fibonacci lattice)."""
+    i = np.arange(count) + 0.5
+    z = 1 - 2 * i / count
+    azimuth = np.pi * (1 + np.sqrt(5)) * i
+    r = np.sqrt(1 - z**2)
+    return np.column_stack([r * np.cos(azimuth), r * np.sin(azimuth), z])
+
+
+def _spread(places: Floats, count: int) -> list[int]:
+    """Indices of places, each as far as possible from those taken before it."""
+    chosen = [int(np.argmax(places[:, 2]))]
+    distance = np.linalg.norm(places - places[chosen[0]], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(places - places[chosen[-1]], axis=1))
+    return chosen
+
+
+def swept_bar(setting: Setting) -> tuple[SetUp, ...]:
+    """As many swept positions as the plan's grid has points, all around the fixed ball."""
+    count = setting.plan.number or setting.plan.grid[0] * setting.plan.grid[1]
+    return swept(setting.volume, planned_length(setting.artefact, setting.plan), count, setting.plan.repeats)
+
+
+def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
+    """About the fixed ball of the start, or about the middle of the volume."""
+    plan, centre = setting.plan, None if start is None else _centre(start.artefact)
+    return swept(setting.volume, planned_length(setting.artefact, plan), plan.candidates, plan.repeats, centre)
+
+
+def elsewhere(artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
+    """About the recorded fixed ball; what else was recorded is at its mean there."""
+    places = swept(volume, artefact.sizes[0].nominal, count, 1, _centre(artefact))
+    means = {name: np.full(1, float(values.mean())) for name, values in artefact.points.columns.items()}
+    return tuple(replace(place, points=replace(place.points, columns=means)) for place in places)
+
+
+def _centre(artefact: Artefact) -> Floats:
+    """Of the fixed ball (3,), in scale readings, mm."""
+    bar = cast("Bryan", artefact)
+    return np.asarray(bar.centres(bar.points.machine_xyz, bar.sizes[0].nominal)[0], dtype=np.float64)
+
+
+PLANNING = Planning({"swept bar": swept_bar}, candidates, elsewhere, shared=True)

@@ -1,4 +1,10 @@
-"""Laser digitizer on a reference sphere, in several attitudes: where its mount lies (Harris 2004 sections 4.4 and 5.3).
+"""What a recording of a laser digitizer aligned on a reference sphere observes and is asked for.
+
+What the digitizer was aligned on: the reference sphere by its points, or its centre as fitted elsewhere.
+
+Both are held to one place for the whole recording: the ball tower stays where it is while the digitizer is turned.
+
+Laser digitizer on a reference sphere, in several attitudes: where its mount lies (Harris 2004 sections 4.4 and 5.3).
 
 With the mount at true coordinates D, a point of the scan plane lies at D + q, q = E·([u v 0] − [U1 V1 W1]). Recorded are
 the points of the sphere (``u_mm``, ``v_mm``, and the scale readings as x, y, z), or the readings with the origin of the scan
@@ -10,45 +16,106 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
-from cmm_uq.artefacts.digitizer.attitudes import alignments, check_angles, refuse_undetermined, scan_of
-from cmm_uq.artefacts.digitizer.facts import AlignmentFacts
-from cmm_uq.artefacts.digitizer.target import Centre, ScannedSphere, Target
+from cmm_uq.analysis.screening.shape import (
+    TOLERANCE_MM,
+    ArtefactShape,
+    Screening,
+    ball_misfit,
+    rows_by,
+    samples_of,
+    spread,
+)
+from cmm_uq.artefacts.digitizer.kind import AlignmentFacts
+from cmm_uq.artefacts.digitizer.plan import ANGLES, alignments, check_angles, refuse_undetermined, scan_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
-from cmm_uq.base.points import AXES, Floats, Points
+from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, unit
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
+from cmm_uq.machine.model.radial import Radial
+from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, mount_offset
 from cmm_uq.machine.physics.effects.scanning import attitudes
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-OFFSET = ("U1", "V1", "W1")
 
-_FAR = 0.2
-"""Part of the offset by which a drawing may be off before a unit or a column is taken for mistaken."""
+class Target(Protocol):
+    """Points (n, 3) of the sphere, or its centre seen n times, as an ``Artefact`` has them."""
+
+    sizes: tuple[Size, ...]
+    rows: Ints
+    noise_scale: Floats
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """Points as near to ``true_xyz`` as the target lets them be."""
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """What observations show of a displacement."""
+
+    def size_change(self) -> Floats:
+        """Change of the observations for one mm of each size."""
+
+    def placing(self, xyz: Floats) -> Floats | Freedoms:
+        """Change of the observations for the three freedoms of its place."""
+
+
+class ScannedSphere(Radial):
+    """Points on one sphere, whose diameter may be certified."""
+
+    kind = "digitizer"
+    title = say("Reference sphere")
+    per_size = 0.5
+    size_title = say("Diameter of the reference sphere")
+    size_what = say("diameter")
+    plural = "the diameters of the scanned spheres"
+
+    def __init__(self, facts: ArtefactFacts, points: Points, where: str | None) -> None:
+        everywhere = Placings.of(np.zeros(len(points), dtype=np.int64))
+        super().__init__(facts, points, everywhere, expansion(facts, points), where)
+
+
+class Centre:
+    """The centre of the sphere, found n times: three coordinates each."""
+
+    sizes: tuple[Size, ...] = ()
+
+    def __init__(self, count: int) -> None:
+        self.rows: Ints = np.repeat(np.arange(count), 3)[:, None]
+        self.noise_scale: Floats = np.ones(3 * count)
+
+    def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
+        """All at their mean."""
+        return np.broadcast_to(true_xyz.mean(axis=0), true_xyz.shape).copy()
+
+    def project(self, xyz: Floats, displacement: Floats) -> Floats:
+        """Every coordinate."""
+        return displacement.reshape(3 * len(xyz), displacement.shape[2])
+
+    def size_change(self) -> Floats:
+        """A centre has no size."""
+        return np.zeros((len(self.rows), 0))
+
+    def placing(self, xyz: Floats) -> Floats:
+        """Three coordinates in common."""
+        return np.tile(np.eye(3), (len(xyz), 1))
+
+
+OFFSET = ("U1", "V1", "W1")
+_FAR = 0.2  # part of the offset by which a drawing may be off before a unit or a column is taken for mistaken
 
 
 class Digitizer(Artefact):
     """A laser digitizer in several attitudes, each a ``measurement``.
 
-    Parameters
-    ----------
-    facts : what the job says of it.
-    points : the recording, with ``alpha_deg``, ``beta_deg``, ``gamma_deg``; scale readings as x, y, z.
-
-    Attributes
-    ----------
-    attitude : (n, 3, 3) of each point: columns u, v, w in machine axes.
-    alignments : of each measurement by itself.
-    start : the offset from these alone.
-    poses : which points were recorded in which attitude.
-
-    Raises
-    ------
-    CmmUqError : no attitudes, or such that do not determine the offset; points of no sphere; another digitizer.
+    ``facts`` what the job says of it; ``points`` the recording, with ``alpha_deg``, ``beta_deg``, ``gamma_deg``; scale
+    readings as x, y, z. ``attitude`` (n, 3, 3) of each point: columns u, v, w in machine axes; ``alignments`` of each
+    measurement by itself; ``start`` the offset from these alone; ``poses`` which points were recorded in which
+    attitude.
     """
 
     kind = "digitizer"
@@ -173,3 +240,52 @@ class Digitizer(Artefact):
                 f"the alignments give [U1 V1 W1] = [{found}] mm, far from offset_mm", where=where,
                 fix="Check the units, the Euler angles, and offset_mm in job.toml [artefact]",
             )  # fmt: skip
+
+
+_UNKNOWNS = 6
+_SOUND = 1e-2  # least singular value, over the largest, of three attitudes that tell an offset
+
+
+def shape_of(facts: AlignmentFacts, points: Points) -> ArtefactShape | None:
+    """Spheres, one in each attitude, or centres; ``None`` without attitudes, or with scans of a few points."""
+    if any(name not in points.columns for name in ANGLES):
+        return None
+    attitude, scan = attitudes(points), scan_of(points)
+    if scan is None:
+        everything = (np.arange(len(points)),)
+        return ArtefactShape(everything, offset_misfit, np.nan, 0.0, reference=attitude.reshape(-1, 9))
+    rows = rows_by(points.measurement)
+    if any(len(one) < 5 for one in rows):
+        return None
+    seen = np.einsum("nij,nj->ni", attitude[:, :, :2], scan)
+    radius = (facts.length_mm or np.nan) / 2
+    extent = 0.5 * float(np.median([spread((points.xyz + seen)[one]) for one in rows]))
+    return ArtefactShape(rows, scan_misfit, radius, radius if np.isfinite(radius) else extent, reference=seen)
+
+
+def scan_misfit(xyz: Floats, seen: Floats, radius: float) -> Floats:
+    """Points of one scan, relative to the mount plus what the scan plane shows (k, 3), against a sphere."""
+    return ball_misfit(xyz + seen, seen, radius)
+
+
+def offset_misfit(xyz: Floats, attitude: Floats, _: float) -> Floats:
+    """By the three centres whose offset suits half of all best, then by all that agree with these."""
+    count = len(xyz)
+    if count < 3:
+        return np.zeros(count)
+    design = np.concatenate([attitude.reshape(count, 3, 3), np.broadcast_to(np.eye(3), (count, 3, 3))], axis=2)
+    samples = np.array([np.arange(3)]) if count == 3 else samples_of(count, 3)
+    some = design[samples].reshape(len(samples), 9, _UNKNOWNS)
+    s = np.linalg.svd(some, compute_uv=False)
+    sound = s[:, -1] > _SOUND * s[:, 0]
+    if not sound.any():
+        return np.zeros(count)
+    found = np.linalg.pinv(some[sound]) @ xyz[samples[sound]].reshape(-1, 9, 1)
+    misfits = np.linalg.norm(xyz - np.einsum("nij,sj->sni", design, found[:, :, 0]), axis=2)
+    best = misfits[np.argmin(np.median(misfits, axis=1))]
+    agree = best <= max(4 * float(np.median(best)), TOLERANCE_MM)
+    fitted, *_rest = np.linalg.lstsq(design[agree].reshape(-1, _UNKNOWNS), xyz[agree].ravel(), rcond=None)
+    return np.asarray(np.linalg.norm(xyz - design @ fitted, axis=1), dtype=np.float64)
+
+
+SCREENING = Screening(shape_of)

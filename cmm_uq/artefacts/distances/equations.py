@@ -1,4 +1,11 @@
-"""The distance equations of US 4,437,151: scale errors and axis angles from positions a known distance apart.
+"""The distance equations of US 4,437,151: scale errors and axis angles from positions of a bar.
+
+Symmetric equations as US 4,437,151 solves them: Doolittle's triangular factors, and Jacobi's eigenvalues.
+
+Both work on normal equations, whose condition number is the square of that of the equations themselves. They are here to be
+compared with an orthogonal factorisation, which is what the package reports.
+
+The distance equations of US 4,437,151: scale errors and axis angles from positions a known distance apart.
 
     d² = (1+e1)dX² + 2e2 dXdY + 2e3 dXdZ + (1+e4)dY² + 2e5 dYdZ + (1+e6)dZ²                     (100), (110)
 
@@ -11,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from cmm_uq.artefacts.distances.symmetric_systems import by_doolittle, by_jacobi
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, commas, plural, say
 from cmm_uq.base.points import Floats
@@ -23,6 +30,49 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import AtLeast, as_evaluated
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
 from cmm_uq.maths.uncertainty.type_a import coverage_factor
+
+_SWEEPS = 30  # of Jacobi rotations; convergence is quadratic, and ten suffice for rounding accuracy at this size
+
+
+def by_doolittle(matrix: Floats, right: Floats) -> Floats:
+    """Solve by matrix = L·U with a unit diagonal in L, in order, without pivoting."""
+    n = len(matrix)
+    L, U = np.eye(n), np.zeros((n, n))
+    for i in range(n):
+        U[i, i:] = matrix[i, i:] - L[i, :i] @ U[:i, i:]
+        if U[i, i] == 0:
+            raise CmmUqError(f"normal equations: pivot {i + 1} is zero", fix="Record placings in more directions")
+        L[i + 1 :, i] = (matrix[i + 1 :, i] - L[i + 1 :, :i] @ U[:i, i]) / U[i, i]
+    return np.asarray(np.linalg.solve(U, np.linalg.solve(L, right)), dtype=np.float64)
+
+
+def by_jacobi(matrix: Floats, right: Floats) -> Floats:
+    """Solve by matrix = V·diag(values)·Vᵀ from Jacobi rotations."""
+    values, V = jacobi_eigenvalues(matrix)
+    if np.abs(values).min() <= np.finfo(np.float64).eps * np.abs(values).max():
+        raise CmmUqError("normal equations: an eigenvalue is zero", fix="Record placings in more directions")
+    return np.asarray(V @ ((V.T @ right) / values), dtype=np.float64)
+
+
+def jacobi_eigenvalues(matrix: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (n,) and eigenvectors (n, n) of a symmetric matrix, by cyclic Jacobi rotations (Golub & Van Loan, 8.5)."""
+    A, n = matrix.astype(np.float64, copy=True), len(matrix)
+    V = np.eye(n)
+    for _ in range(_SWEEPS):
+        if np.linalg.norm(A - np.diag(np.diag(A))) <= np.finfo(np.float64).eps * np.linalg.norm(A):
+            break
+        for p, q in combinations(range(n), 2):
+            if A[p, q] == 0:
+                continue
+            half = (A[q, q] - A[p, p]) / (2 * A[p, q])
+            t = np.copysign(1.0, half) / (abs(half) + np.hypot(half, 1.0))
+            c = 1 / np.hypot(t, 1.0)
+            turn = np.array([[c, t * c], [-t * c, c]])
+            A[:, [p, q]] = A[:, [p, q]] @ turn
+            A[[p, q], :] = turn.T @ A[[p, q], :]
+            V[:, [p, q]] = V[:, [p, q]] @ turn
+    return np.diag(A).copy(), V
+
 
 UNKNOWNS = 6
 
@@ -53,16 +103,12 @@ PLACINGS: dict[Text, tuple[int, int, int]] = {
 class DistanceSolution:
     """What the distance equations say of a machine.
 
-    Parameters
-    ----------
-    e : (6,) e1 … e6.
-    covariance : (6, 6) of them, from the residuals.
-    residuals : (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm.
-    residual_sd : mm; 0 without degrees of freedom.
-    relative_length_u : relative standard uncertainty of the distance, where it is certified; 0 where it is taken as known.
-    bias : (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not taken off, and
-        counts as a standard uncertainty.
-    open_scales : whether nothing says the distance, so that scales are not determined.
+    ``e`` (6,) e1 … e6; ``covariance`` (6, 6) of them, from the residuals; ``residuals`` (m,) calibrated distance minus
+    the one that e1 … e6 make of the readings, mm; ``residual_sd`` mm; 0 without degrees of freedom;
+    ``relative_length_u`` relative standard uncertainty of the distance, where it is certified; 0 where it is taken as
+    known; ``bias`` (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not
+    taken off, and counts as a standard uncertainty; ``open_scales`` whether nothing says the distance, so that scales
+    are not determined.
     """
 
     e: Floats
@@ -89,12 +135,7 @@ class DistanceSolution:
         return np.asarray((self.angles_rad - np.pi / 2) / ARCSECOND)
 
     def expanded(self, at_least: AtLeast = as_evaluated) -> tuple[tuple[float, float], ...] | None:
-        """U and k of each of the six factors; ``None`` where the residuals have no degrees of freedom.
-
-        Parameters
-        ----------
-        at_least : raises a U that a certificate does not state; by default none.
-        """
+        """U and k of each of the six factors; ``None`` where the residuals have no degrees of freedom."""
         factors = self.coverage_factors
         if factors is None:
             return None
@@ -171,15 +212,8 @@ def second_way_data(second_way: DistanceSolution | Text, at_least: AtLeast) -> d
 def solve_distances(differences: Floats, distance: float | Floats, method: str = "QR") -> DistanceSolution:
     """Solve equation 100 for e1 … e6 by least squares.
 
-    Parameters
-    ----------
-    differences : (m, 3) readings of one position minus those of the other, mm.
-    distance : the known distance, one or (m,), mm.
-    method : a key of :data:`SOLUTIONS`.
-
-    Raises
-    ------
-    CmmUqError : the distances do not determine all six factors; the message names the placings that would.
+    ``differences`` (m, 3) readings of one position minus those of the other, mm; ``distance`` the known distance, one
+    or (m,), mm.
     """
     differences = np.asarray(differences, dtype=np.float64)
     d = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(differences))
@@ -218,12 +252,7 @@ def missing_placings(differences: Floats) -> tuple[Text, ...]:
 
 
 def refuse_poor_placings(differences: Floats) -> None:
-    """Refuse distances that do not determine all six factors.
-
-    Raises
-    ------
-    CmmUqError : too few, all parallel, all in one plane, or otherwise too much alike.
-    """
+    """Refuse distances that do not determine all six factors."""
     apart = np.linalg.norm(differences, axis=1)
     if np.any(apart == 0):
         raise CmmUqError(

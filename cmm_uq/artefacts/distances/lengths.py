@@ -1,30 +1,40 @@
-"""Indicated lengths of a bar at 20 °C against the length that they are compared with, one by one."""
+"""Indicated lengths of a bar at 20 °C, and what a technician turns to correct them (US 4,437,151, claim 1 e).
+
+From error factors to what a technician turns: US 4,437,151, claim 1 e.
+
+X stays where it is; Y is turned square to it, then Z square to both: about X first, from where it stands once Y is turned. The
+turns are those of the unit vectors along the axes. The signs follow from *true = indicated + e*: with e_x = −S·y the Y axis
+leans towards −X by S, and turning its guide by −S about Z sets it upright; Z has −Syz about X, but for a product of angles.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import Result
+from cmm_uq.certificate.results.plain import quantity_data
+from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
+from cmm_uq.machine.physics.kinematics import Chain, axis_directions
+from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
     """Every recorded length, used or not.
 
-    Parameters
-    ----------
-    measurement, repeat : (m,).
-    length : (m,) as indicated, at 20 °C, mm.
-    reference : that it is compared with, mm.
-    residual_um : (m,) what the fitted model leaves, µm.
-    expanded_um, coverage_factor : U of each for the noise of its points, µm, and its k.
-    used, flagged : (m,) whether the error factors rest on it, and whether the screening found its measurement odd.
+    ``measurement``, ``repeat`` (m,); ``length`` (m,) as indicated, at 20 °C, mm; ``reference`` that it is compared
+    with, mm; ``residual_um`` (m,) what the fitted model leaves, µm; ``expanded_um``, ``coverage_factor`` U of each for
+    the noise of its points, µm, and its k; ``used``, ``flagged`` (m,) whether the error factors rest on it, and whether
+    the screening found its measurement odd.
     """
 
     measurement: Ints
@@ -60,13 +70,7 @@ class Lengths:
 
 
 def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
-    """Of a result.
-
-    Parameters
-    ----------
-    length : (m,) of every observation at 20 °C, mm.
-    reference : that it is compared with, mm.
-    """
+    """``length`` (m,) of every observation at 20 °C, mm; ``reference`` that it is compared with, mm."""
     artefact = result.artefact
     noise = result.noise
     expanded, factor = result.at_least(
@@ -76,3 +80,112 @@ def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
         artefact.measurement, artefact.repeat, length, reference, result.residuals / MICROMETRE, expanded,
         factor, result.model.used, result.flagged,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """One screw to turn.
+
+    ``effect`` error factor that it takes away; ``what`` what is turned or entered, and the sense of a positive figure;
+    ``axis`` whose guide or scale it is.
+    """
+
+    effect: str
+    what: Text
+    axis: str
+
+
+ADJUSTMENTS: Mapping[str, Adjustment] = MappingProxyType(
+    {
+        adjustment.effect: adjustment
+        for adjustment in (
+            Adjustment(SCALE["x"].name, say("Scale of X: lengthen what it reads by"), "x"),
+            Adjustment(SCALE["y"].name, say("Scale of Y: lengthen what it reads by"), "y"),
+            Adjustment(SCALE["z"].name, say("Scale of Z: lengthen what it reads by"), "z"),
+            Adjustment(SQUARENESS["xy"].name, say("Guide of Y: turn about +Z by"), "y"),
+            Adjustment(SQUARENESS["yz"].name, say("Guide of Z: turn about +X by"), "z"),
+            Adjustment(SQUARENESS["zx"].name, say("Guide of Z: turn about +Y by"), "z"),
+        )
+    }
+)
+"""What takes away each of the six factors; right-handed turns."""
+
+ANGLES: Mapping[str, str] = MappingProxyType(
+    {effect.name: "–".join(plane.upper()) for plane, effect in SQUARENESS.items()}
+)
+"""Angle between two axes that is 90° plus the squareness error."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What to turn or enter on a machine.
+
+    ``adjustment`` which screw; ``parameter`` of its effect that it takes away, a key with its unit; ``figure`` to set,
+    ppm or ″; ``over_travel`` what it moves at the far end of its axis, µm; ``None`` where the travel is not stated.
+    """
+
+    adjustment: Adjustment
+    parameter: str
+    figure: Quantity
+    over_travel: Quantity | None
+
+    @property
+    def beyond_doubt(self) -> bool:
+        """Whether the 95 % interval does not contain zero."""
+        low, high = self.figure.interval95
+        return not low <= 0 <= high
+
+    def as_data(self) -> dict[str, Any]:
+        """For results.json."""
+        return {
+            "effect": self.adjustment.effect, "what": self.adjustment.what, self.parameter: quantity_data(self.figure),
+            "over_travel_um": None if self.over_travel is None else quantity_data(self.over_travel),
+            "beyond_doubt": self.beyond_doubt,
+        }  # fmt: skip
+
+
+def turns(squareness: Floats, z_rides_on_y: bool) -> Floats:
+    """Right-handed turns that make the axes square: of Y about +Z, then of Z about +X and about +Y.
+
+    ``squareness`` (..., 3) Sxy, Syz, Szx, rad. Gives (..., 3) rad.
+    """
+    axes = axis_directions(squareness)
+    y, z = axes[..., 1, :], axes[..., 2, :]
+    upright = np.arctan2(y[..., 0], y[..., 1])
+    across, along = z[..., 0], z[..., 1]
+    if z_rides_on_y:
+        c, s = np.cos(upright), np.sin(upright)
+        across, along = c * across - s * along, s * across + c * along
+    about_x = np.arctan2(along, z[..., 2])
+    about_y = -np.arctan2(across, np.hypot(along, z[..., 2]))
+    return np.stack([upright, about_x, about_y], axis=-1)
+
+
+def settings(result: Result) -> tuple[Setting, ...]:
+    """What takes away each of the six factors that the recording determines."""
+    machine, turned = result.artefact.points.machine, _turns(result)
+    found = []
+    for effect, adjustment in ADJUSTMENTS.items():
+        if effect not in result.parameters or effect in result.free:
+            continue
+        name, quantity = next(iter(result.parameters[effect].items()))
+        figure = turned.get(effect, quantity)
+        low, high = machine.travel_mm["xyz".index(adjustment.axis)]
+        per_unit = (PPM if quantity.unit == "ppm" else ARCSECOND) * float(high - low) / MICROMETRE
+        found.append(
+            Setting(adjustment, name, figure, figure.times(per_unit, unit("µm")) if np.isfinite(per_unit) else None)
+        )
+    return tuple(found)
+
+
+def _turns(result: Result) -> dict[str, Quantity]:
+    """The three turns of the draws' axes, by the squareness that they take away; one that the job does not name is 0."""
+    draws = {name: values for (name, _), (values, _) in result.model.reported(result.values).items()}
+    none = np.zeros(len(result.values))
+    squareness = np.column_stack([draws.get(effect.name, none) for effect in SQUARENESS.values()])
+    rides = Chain.of(result.artefact.points.machine.chain).rides("z", on="y")
+    each = turns(ARCSECOND * squareness, rides).T / ARCSECOND
+    return {
+        effect.name: Quantity.of_draws(values, unit("″"))
+        for effect, values in zip(SQUARENESS.values(), each, strict=True)
+    }

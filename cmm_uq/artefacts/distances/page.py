@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cmm_uq.artefacts.distances.adjustment import ANGLES, Setting
 from cmm_uq.artefacts.distances.equations import FACTORS, DistanceSolution
+from cmm_uq.artefacts.distances.lengths import ANGLES, Setting
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
@@ -15,14 +15,7 @@ from cmm_uq.maths.uncertainty.quantity import rounded
 def section(
     result: Result, settings: tuple[Setting, ...], second_way: DistanceSolution | Text, *remarks: Text
 ) -> Section:
-    """What to turn or enter, by the fitted model; beside it the six factors by the distance equations.
-
-    Parameters
-    ----------
-    settings : by the fitted model.
-    second_way : solution of equation 100, or why there is none.
-    remarks : on the second way.
-    """
+    """What to turn or enter, by the fitted model; beside it the six factors by the distance equations."""
     blocks = [*_adjustments(settings), *_second_way(result, second_way, remarks)]
     return Section(say("The adjustment that the machine needs"), tuple(blocks), opinion=True)
 

@@ -18,24 +18,16 @@ from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, Unit, unit
 from cmm_uq.machine.physics.error_map import COLUMNS, ErrorMap
 
-LEAST_POSITIONS = 4
-"""Positions that the maps of a column must share."""
-
-_TURNED = 0.3
-"""Part of the misfit that is left when a column with the wrong sign is turned."""
+LEAST_POSITIONS = 4  # positions that the maps of a column must share
+_TURNED = 0.3  # part of the misfit that is left when a column with the wrong sign is turned
 
 
 @dataclass(frozen=True, eq=False)
 class MapColumn:
     """One error of one carriage in k maps, at the p positions that they share.
 
-    Parameters
-    ----------
-    axis : the carriage.
-    component : 0 … 5: displacements along x, y, z, rotations about x, y, z.
-    positions : (p,) mm.
-    values : (k, p) mm; of rotations the displacement at a lever of one metre.
-    temperatures : (k,) °C.
+    ``axis`` the carriage; ``component`` 0 … 5: displacements along x, y, z, rotations about x, y, z; ``positions`` (p,)
+    mm; ``values`` (k, p) mm; of rotations the displacement at a lever of one metre; ``temperatures`` (k,) °C.
     """
 
     axis: str

@@ -10,29 +10,21 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 
-_LAST_DIGIT = 1e-9
-"""mm."""
+_LAST_DIGIT = 1e-9  # mm
 
 _MOST = 0.8
 """Part of the readings that are the same to the last digit, from which on a column is another one with a few changed."""
 
-_FEWEST, _VALUES = 6, 4
-"""Same readings, and different values among them, without which that is coincidence."""
-
-_DIGITS = range(5)
-"""After the point, in the column's unit."""
-
-_EXACT = 1e-6
-"""Of the last digit."""
+_FEWEST, _VALUES = 6, 4  # same readings, and different values among them, without which that is coincidence
+_DIGITS = range(5)  # after the point, in the column's unit
+_EXACT = 1e-6  # of the last digit
 
 
 def copies(values: Floats, unit: float) -> list[tuple[int, ...]]:
     """Groups of maps (indices into ``values``, ascending) that give one column with the same figures.
 
-    Parameters
-    ----------
-    values : (k, p) of one error in k maps, mm; a map that is zero throughout is in no group.
-    unit : size of the column's unit in ``values``.
+    ``values`` (k, p) of one error in k maps, mm; a map that is zero throughout is in no group; ``unit`` size of the
+    column's unit in ``values``.
     """
     groups: list[list[int]] = []
     for k in range(len(values)):

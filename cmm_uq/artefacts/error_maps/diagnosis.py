@@ -11,8 +11,7 @@ from cmm_uq.analysis.diagnosis.diagnosis import OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.artefacts.error_maps.columns import MapColumn, turned
-from cmm_uq.artefacts.error_maps.expansion import expansion
-from cmm_uq.artefacts.error_maps.fit import function, held_out, noise_of, residual
+from cmm_uq.artefacts.error_maps.fit import expansion, function, held_out, noise_of, residual
 from cmm_uq.artefacts.error_maps.search import ColumnComparison, Rival, column_comparison
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
@@ -21,32 +20,22 @@ from cmm_uq.machine.physics.catalogue import effects as effects_named
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
-_WELL_KNOWN = 0.95
-"""Probability from which no other explanation is named beside one."""
-
-_BAND = 2.0
-"""Standard uncertainties of a band that is not to hold zero."""
-
-_NAMED = 0.05
-"""Probability from which another explanation is named."""
+_WELL_KNOWN = 0.95  # probability from which no other explanation is named beside one
+_BAND = 2.0  # standard uncertainties of a band that is not to hold zero
+_NAMED = 0.05  # probability from which another explanation is named
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
     """How the maps of one error differ beyond any known effect.
 
-    Parameters
-    ----------
-    column : the error.
-    rival : the explanation in words, with the map that differs if one does.
-    probability : of it.
-    instead : others that could stand in its place.
-    maps : numbers of the maps that it, or one of those, has differ from the others, from 0 as their temperatures.
-    region : of the position, mm, where it exceeds half its largest value and its band does not hold zero.
-    p_value : of "these maps differ by noise alone", corrected for all errors that were compared.
-    amplitude : largest value, in the column's unit.
-    curve : position in mm, difference and its standard uncertainty in the column's unit, each (p,).
-    turned : whether the map would agree if its sign were turned.
+    ``column`` the error; ``rival`` the explanation in words, with the map that differs if one does; ``probability`` of
+    it; ``instead`` others that could stand in its place; ``maps`` numbers of the maps that it, or one of those, has
+    differ from the others, from 0 as their temperatures; ``region`` of the position, mm, where it exceeds half its
+    largest value and its band does not hold zero; ``p_value`` of "these maps differ by noise alone", corrected for all
+    errors that were compared; ``amplitude`` largest value, in the column's unit; ``curve`` position in mm, difference
+    and its standard uncertainty in the column's unit, each (p,); ``turned`` whether the map would agree if its sign
+    were turned.
     """
 
     column: MapColumn
@@ -70,15 +59,12 @@ class Difference:
 class MapsDiagnosis:
     """See the module's docstring.
 
-    Parameters
-    ----------
-    verdict : ``consistent``, ``explained``, ``partial`` or ``unexplained``.
-    p_value, alpha : of "the maps differ by noise alone", and the rate of false alarms asked for.
-    comparisons : every error that was compared.
-    effects : what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ.
-    differences : beyond them, the most significant first.
-    displacement, rotation : noise of a reading, µm and ″; ``None`` where no such error was compared.
-    improvement : parts of the travel predicted from the rest; a rotation counts as µm at one metre.
+    ``verdict`` ``consistent``, ``explained``, ``partial`` or ``unexplained``; ``p_value``, ``alpha`` of "the maps
+    differ by noise alone", and the rate of false alarms asked for; ``comparisons`` every error that was compared;
+    ``effects`` what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ;
+    ``differences`` beyond them, the most significant first; ``displacement``, ``rotation`` noise of a reading, µm and
+    ″; ``None`` where no such error was compared; ``improvement`` parts of the travel predicted from the rest; a
+    rotation counts as µm at one metre.
     """
 
     verdict: str
@@ -104,16 +90,7 @@ def diagnose_maps(
     seed: int,
     progress: Progress | None = None,
 ) -> MapsDiagnosis:
-    """Diagnose what error maps of one machine have in common and where they differ.
-
-    Parameters
-    ----------
-    columns : errors of carriages in every map.
-    named : effects that the job names.
-    alpha : false-alarm rate over all columns.
-    seed : of everything random.
-    progress : told the part done.
-    """
+    """Diagnose what error maps of one machine have in common and where they differ."""
     comparisons, effects, differences = [], [], []
     for i, column in enumerate(columns):
         compared = column_comparison(column, named, seed)

@@ -16,11 +16,7 @@ WHITE = "white"
 def kinds_along(chain: Ints, white: float, correlations: Sequence[float]) -> list[NoiseKind]:
     """Kinds of noise of readings (m,) in the order of their positions.
 
-    Parameters
-    ----------
-    chain : (m,) readings with one number follow each other.
-    white : probability, beforehand, of white noise, of which heavy tails take their part; the correlations share the rest.
-    correlations : of neighbours.
+    ``chain`` (m,) readings with one number follow each other.
     """
     identity = sparse.csr_array(sparse.eye_array(len(chain)))
     share = (1 - white) / len(correlations)

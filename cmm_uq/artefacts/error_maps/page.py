@@ -1,21 +1,151 @@
-"""The diagnosis of error maps as a document."""
+"""The diagnosis of error maps: from data to page and results."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 from cmm_uq import __version__
-from cmm_uq.artefacts.error_maps.analysis import MapsDiagnosed
-from cmm_uq.artefacts.error_maps.diagnosis import Difference
+from cmm_uq.analysis.screening.finding import Finding
+from cmm_uq.artefacts.error_maps.columns import MapColumn, columns_of
+from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosis, diagnose_maps
+from cmm_uq.artefacts.error_maps.fit import squareness_data, squareness_findings, squareness_sections
 from cmm_uq.artefacts.error_maps.overview import overview_of
 from cmm_uq.artefacts.error_maps.search import ColumnComparison
-from cmm_uq.artefacts.error_maps.squareness import squareness_sections
 from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, lines, names, number, say
 from cmm_uq.certificate.diagnosis.overview import held_out, sure
 from cmm_uq.certificate.document import Block, Column, Document, Facts, Paragraph, Section, Table, working_page
 from cmm_uq.certificate.effect_words import effect_of, size_of, titles
 from cmm_uq.certificate.plots.residuals import curve_with_band
+from cmm_uq.certificate.results.contents import effect_data, false_alarms, finding_data, head, improvement_data
+from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.certificate.sections.findings import improvement_table
 from cmm_uq.certificate.wording import probability
+from cmm_uq.jobs.job import Job
+from cmm_uq.machine.model.machine_maps import WHERE, maps_of
+from cmm_uq.machine.physics.catalogue import effects
+from cmm_uq.machine.physics.effects.thermal import ThermalScale
+from cmm_uq.machine.physics.error_map import ErrorMap
+from cmm_uq.maths.inference.ensembles import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class MapsDiagnosed:
+    """A job of error maps with its diagnosis.
+
+    ``job`` what was read; ``maps`` its error maps, in the order in which it names them; ``findings`` what is odd among
+    the maps' figures; ``diagnosis`` what changes with temperature, and which maps contradict the others.
+    """
+
+    job: Job
+    maps: tuple[ErrorMap, ...]
+    findings: tuple[Finding, ...]
+    diagnosis: MapsDiagnosis
+
+
+def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> MapsDiagnosed:
+    """Diagnose a set of error maps."""
+    maps, columns, findings = compared_maps(job)
+    findings += squareness_findings(maps)
+    found = diagnose_maps(columns, job.facts.model.effects, alpha=alpha, seed=seed, progress=progress)
+    return MapsDiagnosed(job, tuple(maps), tuple(findings), found)
+
+
+def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list[Finding]]:
+    """Error maps of a job, what they have in common, and what is odd among that."""
+    maps = maps_of(job)
+    if len(maps) < 2:
+        raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
+                         fix="Name two or more maps of the machine; with three it shows which of them differs")  # fmt: skip
+    for effect in effects(job.facts.model.effects, where="job.toml [model] effects"):
+        if effect.columns and not isinstance(effect, ThermalScale):
+            raise CmmUqError(f"{effect.name} needs {', '.join(effect.columns)}, which error maps do not have",
+                             where="job.toml [model] effects", fix="Leave it out")  # fmt: skip
+    if job.facts.conformity:
+        raise CmmUqError("error maps are diagnosed, no standard here decides on them",
+                         where="job.toml [[conformity]]", fix="Leave it out")  # fmt: skip
+    columns, findings = columns_of(maps)
+    if not columns:
+        why = "; ".join(finding.why for finding in findings)
+        raise CmmUqError(f"the error maps have nothing in common to compare: {why}", where=WHERE,
+                         fix="Map the same errors at the same positions each time")  # fmt: skip
+    return tuple(maps), columns, findings
+
+
+def refuse_unfit(job: Job) -> None:
+    """Refuse error maps that cannot be compared; see :func:`compared_maps`."""
+    compared_maps(job)
+
+
+def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
+    """results.json of a diagnosis of error maps."""
+    d, noise = found.diagnosis, found.diagnosis.displacement
+    squareness = squareness_data(found.maps)
+    nothing = {"value": None, "u": None, "interval95": None}
+    return {
+        **head(found.job, effects=False),
+        "sampling": {
+            "sampler": None,
+            "seed": seed,
+            "ess_min": None,
+            "rhat_max": None,
+            "converged": True,
+        },
+        "diagnosis": {
+            "verdict": d.verdict,
+            "p_value": d.p_value,
+            **false_alarms(d.alpha),
+            "where": [_where(item) for item in d.differences],
+            "effects": [effect_data(item, d.improvement) for item in d.effects],
+            "indistinguishable": [],
+            "suggested_measurements": [
+                {"separates": list(names), "what": what, "repetitions": 1, "odds": None}
+                for names, what in next_words(d)
+            ],
+            "noise": {
+                "stated_coordinate_um": None,
+                "coordinate_um": nothing if noise is None else quantity_data(noise),
+                "rotation_arcsec": nothing if d.rotation is None else quantity_data(d.rotation),
+                "placing_um": nothing,
+                "correlated_in_time": False,
+                "heavy_tails": False,
+                "contradicts_stated": False,
+            },
+            "screening": [finding_data(finding, "") for finding in found.findings],
+            "improvement": improvement_data(d.improvement),
+            "compared": [_compared(compared, d.p_of(compared)) for compared in d.comparisons],
+            **({"squareness_arcsec": squareness} if squareness else {}),
+        },
+    }
+
+
+def _where(item: Difference) -> dict[str, Any]:
+    return {
+        "covariate": f"{item.column.axis}_mm",
+        "region": list(item.region),
+        "p_value": min(1.0, item.p_value),
+        "amplitude_um": item.amplitude_um,
+        "what": item.rival.name,
+        "probability": item.probability,
+        "instead": list(item.instead),
+        "sign_turned": item.turned,
+    }
+
+
+def _compared(compared: ColumnComparison, p_value: float) -> dict[str, Any]:
+    return {
+        "what": compared.column.title,
+        "positions": len(compared.column.positions),
+        "temperatures_c": compared.column.temperatures.tolist(),
+        "p_value": p_value,
+        "explanations": [
+            {"together": [compared.rivals[i].name for i in key], "probability": p}
+            for key, p in sorted(compared.combinations.probability.items(), key=lambda item: -item[1])[:6]
+        ],
+    }
+
 
 _PICTURES = 3
 
@@ -33,7 +163,7 @@ def maps_document(found: MapsDiagnosed, seed: int) -> Document:
         Section(say("Before and after"), () if d.verdict == "consistent" else (_before_after(found),)),
         *squareness_sections(found.maps),
         Section(say("Noise"), tuple(Paragraph(text) for text in noise_words(d))),
-        Section(say("Errors compared"), (_compared(found),)),
+        Section(say("Errors compared"), (_compared_of_page(found),)),
     )
     return working_page(
         facts,
@@ -114,7 +244,7 @@ def _before_after(found: MapsDiagnosed) -> Table:
     )
 
 
-def _compared(found: MapsDiagnosed) -> Table:
+def _compared_of_page(found: MapsDiagnosed) -> Table:
     d = found.diagnosis
     rows = tuple(
         (

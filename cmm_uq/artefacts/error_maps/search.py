@@ -29,8 +29,7 @@ from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.machine.physics.effects.thermal import EXPANSION, SCALE_EXPANSION
 
 _SIGMAS = 300
-_ASSERTED = 0.8
-"""Probability from which an effect is asserted: what one map that is off can imitate is not."""
+_ASSERTED = 0.8  # probability from which an effect is asserted: what one map that is off can imitate is not
 
 _WHITE, _CORRELATIONS = 0.5, (0.4, 0.6, 0.8, 0.9)
 """Noise of a map: its readings are taken one after the other in one run, while interferometer and air drift."""
@@ -59,12 +58,8 @@ class ColumnComparison:
     The observations are the k − 1 orthonormal contrasts between the maps at each position: the function that they share is
     gone, and white noise is white still.
 
-    Parameters
-    ----------
-    column : what is compared.
-    rivals : that compete for how the maps differ.
-    given : what the job knows of how they differ; of any size.
-    seed : of the null distribution and the draws.
+    ``column`` what is compared; ``rivals`` that compete for how the maps differ; ``given`` what the job knows of how
+    they differ; of any size; ``seed`` of the null distribution and the draws.
     """
 
     column: MapColumn
@@ -166,13 +161,7 @@ class ColumnComparison:
 
 
 def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> ColumnComparison:
-    """The rivals for how the maps of a column differ.
-
-    Parameters
-    ----------
-    named : effects that the job names.
-    seed : of everything random.
-    """
+    """The rivals for how the maps of a column differ."""
     rivals: list[Rival] = []
     given: list[Rival] = []
     place, temperatures = column.positions, column.temperatures

@@ -19,44 +19,31 @@ SIDE, NEAR = 7, 3
 """Readings on each side that a reading is judged by: nearly half of the former may be spikes themselves, and the latter follow
 a course that wanders."""
 
-WIDEST = 2
-"""Readings in a row that are a spike; more are a part of the travel where the map differs."""
-
-_FEWEST = 6
-"""Readings of a column."""
+WIDEST = 2  # readings in a row that are a spike; more are a part of the travel where the map differs
+_FEWEST = 6  # readings of a column
 
 _AT_AN_END = 0.5
 """Weight of what the first and the last reading are off: there is no other side on which the course would come back."""
 
-_FAR = 7.0
-"""Of its robust standard deviations, by which a reading off its neighbours is a spike."""
+_FAR = 7.0  # of its robust standard deviations, by which a reading off its neighbours is a spike
 
 _OWN = 0.5
 """Part of a spike that shows in the course of one of two maps, and not in that of the other, for it to be that one's."""
 
-_SEEN = 3.0
-"""Of the standard deviations between maps, by which a jump of a map's own course is off the others too."""
-
-_BESIDE = 0.4
-"""Part of a spike by which a reading beside it belongs to it."""
-
+_SEEN = 3.0  # of the standard deviations between maps, by which a jump of a map's own course is off the others too
+_BESIDE = 0.4  # part of a spike by which a reading beside it belongs to it
 _ROUNDS = 5
 
 DAMAGED = 0.25
 """Part of the readings of a map that may be spikes; with more, what is left of the column is not believed."""
 
-_FINEST = 0.3
-"""Part of the last digit that no reading is better than."""
+_FINEST = 0.3  # part of the last digit that no reading is better than
 
 
 def spikes(positions: Floats, values: Floats, unit: float) -> NDArray[np.bool_]:
     """Which readings (k, p) of one error in k maps are spikes.
 
-    Parameters
-    ----------
-    positions : (p,) mm, ascending.
-    values : (k, p) mm.
-    unit : size of the column's unit in ``values``.
+    ``positions`` (p,) mm, ascending; ``values`` (k, p) mm; ``unit`` size of the column's unit in ``values``.
     """
     found, left = np.zeros(values.shape, dtype=bool), values.copy()
     if values.shape[1] < _FEWEST:

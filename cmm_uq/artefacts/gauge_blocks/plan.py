@@ -5,7 +5,7 @@ from __future__ import annotations
 from cmm_uq.analysis.planning.candidates import PatternFor, RelocatedCandidates, VolumeCandidates, along_lines
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting
-from cmm_uq.artefacts.gauge_lines.patterns import block, blocks_of, five_of, seven_lines
+from cmm_uq.artefacts.gauge_lines.observe import block, blocks_of, five_of, seven_lines
 from cmm_uq.base.points import Floats
 
 
@@ -29,5 +29,4 @@ def _shape(setting: Setting) -> PatternFor:
 
 
 _PLACES = VolumeCandidates(along_lines, _shape, RelocatedCandidates(along_lines))
-
 PLANNING = Planning({"ISO 10360-2": iso_lines}, _PLACES.candidates, _PLACES.elsewhere)

@@ -1,4 +1,10 @@
-"""Step gauge and gauge blocks: faces at certified distances along one line, in several places.
+"""Lengths along lines, as step gauges and gauge blocks have them: what is measured, observed and asked of a recording.
+
+What is measured of a step gauge or of gauge blocks in one placing, and the lines that the standard asks for.
+
+Lines follow ISO 10360-2:2009, 6.3: the four space diagonals and the three axes, five lengths each.
+
+Step gauge and gauge blocks: faces at certified distances along one line, in several places.
 
 Every face is an observation: how far along the line it was found, against its certified distance. The line runs from the
 first to the farthest face as recorded, so its two directions across cost nothing, and its position is free in each
@@ -11,17 +17,22 @@ that is the part that no number of faces averages out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cmm_uq.analysis.planning.candidates import MIDDLE, check_allowed
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, attitude_along, direction_words, planned_length
+from cmm_uq.analysis.planning.setting import Setting
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, line_misfit, rows_by
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import unit
-from cmm_uq.jobs.tables.artefact import ReferencedFacts
+from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Indications, Placings, Size
 from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
 from cmm_uq.machine.model.certified_places import CertifiedPlaces
@@ -32,23 +43,92 @@ from cmm_uq.machine.physics.effects.own_errors import ALONG_A_LINE
 from cmm_uq.maths.inference.doubt import Cause
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-_LAPPED_UM = 5.0
-"""Standard deviation of the faces of a gauge without a certificate from their nominal places, µm."""
+PITCH = 20.0  # mm, usual distance of the faces of a step gauge
+FIVE = 5  # lengths on a line (ISO 10360-2:2009, 6.3)
 
-_SAME_FACE = 1e-6
-"""mm; certified distances closer than this belong to one face."""
+
+def faces_of(facts: ArtefactFacts, plan: PlanFacts) -> Floats:
+    """Distances of faces from the first, in ascending order, mm."""
+    if plan.lengths_mm:
+        return np.unique(np.array(plan.lengths_mm, dtype=np.float64))
+    length = planned_length(facts, plan)
+    pitch = plan.pitch_mm or PITCH
+    faces: Floats = pitch * np.arange(1, int(length / pitch + 1e-9) + 1, dtype=np.float64)
+    return faces if len(faces) else np.array([length])
+
+
+def blocks_of(facts: ArtefactFacts, plan: PlanFacts) -> Floats:
+    """Lengths of blocks, in ascending order, mm."""
+    if plan.lengths_mm:
+        return np.unique(np.array(plan.lengths_mm, dtype=np.float64))
+    return np.asarray(planned_length(facts, plan) * np.arange(1, FIVE + 1) / FIVE, dtype=np.float64)
+
+
+def five_of(lengths: Floats, longest: float) -> Floats:
+    """Five lengths, well spread from the shortest to the longest, that are not longer than ``longest``; fewer if there are."""
+    fitting = lengths[lengths <= longest + 1e-6]
+    if len(fitting) <= FIVE:
+        return fitting
+    wanted = np.linspace(fitting[0], fitting[-1], FIVE)
+    return np.asarray(fitting[np.unique(np.abs(fitting[:, None] - wanted).argmin(axis=0))], dtype=np.float64)
+
+
+def gauge(lengths: Floats, plan: PlanFacts) -> Pattern:
+    """Faces at 0 and at some lengths (k,), met on the way out and, if the plan says so, on the way back."""
+    out = np.concatenate([[0.0], lengths])
+    faces = np.concatenate([out, out[::-1]]) if plan.both_ways else out
+    n = len(faces)
+    body, travel = np.zeros((n, 3)), np.zeros((n, 3))
+    body[:, 0] = faces - 0.5 * out[-1]
+    travel[:, 0] = np.where(np.arange(n) < len(out), 1.0, -1.0)
+    one = Pattern(body, np.arange(1, n + 1), np.ones(n, dtype=np.int64), {"reference_mm": faces}, {"approach": travel})
+    return one.repeated(plan.repeats)
+
+
+def block(length: float, plan: PlanFacts) -> Pattern:
+    """Two outer faces, each met from outside."""
+    along = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    one = Pattern(
+        -0.5 * length * along, np.array([1, 2]), np.ones(2, dtype=np.int64), {"reference_mm": np.array([0.0, length])},
+        {"approach": along, "normal": -along},
+    )  # fmt: skip
+    return one.repeated(plan.repeats)
+
+
+def seven_lines(setting: Setting, lengths: Floats, shapes: Callable[[Floats], list[Pattern]]) -> tuple[SetUp, ...]:
+    """Four space diagonals and three axes through the middle of the volume, five lengths on each.
+
+    ``lengths`` (k,) that there are, mm.
+    """
+    volume = setting.volume
+    size = volume.size
+    diagonals = [size * signs for signs in ((1, 1, 1), (1, -1, 1), (-1, 1, 1), (-1, -1, 1))]
+    found = []
+    for direction in (*diagonals, *np.eye(3)):
+        check_allowed(setting, direction)
+        fitting = five_of(lengths, volume.chord(direction))
+        if not len(fitting):
+            raise volume.too_small(
+                np.outer([-0.5, 0.5], lengths[0] * attitude_along(direction)[:, 0]), direction_words(direction)
+            )
+        found += [
+            volume.set_up(shape, attitude_along(direction), MIDDLE, direction_words(direction))
+            for shape in shapes(fitting)
+        ]
+    return tuple(found)
+
+
+_LAPPED_UM = 5.0  # standard deviation of the faces of a gauge without a certificate from their nominal places, µm
+_SAME_FACE = 1e-6  # mm; certified distances closer than this belong to one face
 
 
 @dataclass(frozen=True, eq=False)
 class Reversals:
     """Faces reached from both sides.
 
-    Parameters
-    ----------
-    measurement : (p,) of each such face.
-    reference : (p,) its certified distance, mm.
-    gap : (p,) found when travelling away from the first face minus when travelling towards it, mm.
-    weights : (n,) of every observation in the gap of its face; 0 of a face that was not reached from both sides.
+    ``measurement`` (p,) of each such face; ``reference`` (p,) its certified distance, mm; ``gap`` (p,) found when
+    travelling away from the first face minus when travelling towards it, mm; ``weights`` (n,) of every observation in
+    the gap of its face; 0 of a face that was not reached from both sides.
     """
 
     measurement: Ints
@@ -60,14 +140,8 @@ class Reversals:
 class StepGauge(Artefact):
     """Faces at certified distances along lines: n observations of n points.
 
-    Parameters
-    ----------
-    facts : what the job says of the gauge; ``length_mm`` is its longest distance, by default of those recorded.
-    points : the recording, with ``reference_mm``.
-
-    Raises
-    ------
-    CmmUqError : no certified distances, a line with a single face, or distances that a mistaken unit explains.
+    ``facts`` what the job says of the gauge; ``length_mm`` is its longest distance, by default of those recorded;
+    ``points`` the recording, with ``reference_mm``.
     """
 
     kind = "step_gauge"
@@ -265,3 +339,18 @@ def _ends(reference: Floats, lines: Placings) -> Floats:
     first = np.minimum.reduceat(reference[order], starts)
     farthest = np.maximum.reduceat(reference[order], starts)
     return mean_of(farthest) - mean_of(first)
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Lines of faces; ``None`` without references, or with a line of a single face."""
+    if "reference_mm" not in points.columns:
+        return None
+    reference = points.columns["reference_mm"][:, None]
+    rows = rows_by(points.measurement)
+    if any(np.ptp(reference[r]) == 0 for r in rows):
+        return None
+    extent = float(np.median([np.ptp(reference[r]) for r in rows]))
+    return ArtefactShape(rows, line_misfit, np.nan, extent, False, ("reference_mm",), reference)
+
+
+SCREENING = Screening(shape_of)

@@ -1,4 +1,6 @@
-"""Plane: points probed on a flat surface, whose place and tilt are free in each measurement.
+"""What a recording of a probed plane observes and is asked for, and where it is placed.
+
+Plane: points probed on a flat surface, whose place and tilt are free in each measurement.
 
 The observation is the distance of each point of contact from the plane. A point 0, where there is one, is the direction
 point just before contact: it tells on which side the probe was (US 4,866,643 claim 1) and is no observation.
@@ -7,15 +9,22 @@ point just before contact: it tells on which side the probe was (US 4,866,643 cl
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.artefacts.plane.facts import PlaneFacts
+from cmm_uq.analysis.planning.candidates import PatternFor, RelocatedCandidates, VolumeCandidates, across_planes
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, flat_misfit, no_references, spread
+from cmm_uq.artefacts.plane.kind import PlaneFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.recorded import place
 from cmm_uq.machine.physics.compensation import DirectionPointError, OffsetPlane, offset_plane
@@ -33,12 +42,9 @@ _ON_A_LINE = 1e-3
 class ProbedPlane:
     """One plane of a recording.
 
-    Parameters
-    ----------
-    measurement : its number.
-    count : points of contact.
-    flatness : range of the distances from the least-squares plane, mm; ``None`` of three points, which have none.
-    surface : the plane moved by the probe's offset; ``None`` without offset.
+    ``measurement`` its number; ``count`` points of contact; ``flatness`` range of the distances from the least-squares
+    plane, mm; ``None`` of three points, which have none; ``surface`` the plane moved by the probe's offset; ``None``
+    without offset.
     """
 
     measurement: int
@@ -50,15 +56,8 @@ class ProbedPlane:
 class PlaneSurface(Artefact):
     """A probed plane: an observation for every point of contact.
 
-    Parameters
-    ----------
-    facts : what the job says; ``probe_offset_mm`` moves the plane from the probe's centre to the surface, where every
-        measurement has a direction point and all of them are believed.
-    points : the recording.
-
-    Raises
-    ------
-    CmmUqError : too few points of contact, points on one line, or a direction point that is missing or not accepted.
+    ``facts`` what the job says; ``probe_offset_mm`` moves the plane from the probe's centre to the surface, where every
+    measurement has a direction point and all of them are believed; ``points`` the recording.
     """
 
     kind = "plane"
@@ -114,10 +113,8 @@ class PlaneSurface(Artefact):
     def probed(self, u_point: float) -> tuple[ProbedPlane, ...]:
         """Flatness of each plane, and the surface where the probe's offset is known.
 
-        Parameters
-        ----------
-        u_point : standard uncertainty of a point of contact along the normal, mm; it counts where there are just three,
-            whose scatter nothing shows.
+        ``u_point`` standard uncertainty of a point of contact along the normal, mm; it counts where there are just
+        three, whose scatter nothing shows.
         """
         found = []
         off = self.off_plane()
@@ -196,3 +193,46 @@ class PlaneSurface(Artefact):
                 f"measurement {number}: {problem}", where=place(points, points.measurement == number, where),
                 fix=f"Record at least {LEAST_POINTS} points spread over the plane",
             )  # fmt: skip
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Planes of four points of contact or more, since three always lie in one; ``None`` where there are none."""
+    touched = points.point != DIRECTION_POINT
+    rows = tuple(np.flatnonzero(touched & (points.measurement == m)) for m in np.unique(points.measurement[touched]))
+    rows = tuple(r for r in rows if len(r) > LEAST_POINTS)
+    if not rows:
+        return None
+    extent = float(np.median([spread(points.xyz[r]) for r in rows]))
+    return ArtefactShape(rows, flat_misfit, np.nan, extent, False, (), no_references(points))
+
+
+SCREENING = Screening(shape_of)
+
+
+def surface(facts: ArtefactFacts, plan: PlanFacts, size: Floats) -> Pattern:
+    """A grid of points of contact over ``size`` (2,) mm; with a probe offset also the point just before the first contact."""
+    columns, rows = plan.grid
+    offset = cast("PlaneFacts", facts).probe_offset_mm
+    i, j = np.meshgrid(np.linspace(-0.5, 0.5, columns), np.linspace(-0.5, 0.5, rows))
+    touched = np.column_stack([i.ravel() * size[0], j.ravel() * size[1], np.zeros(i.size)])
+    number = np.arange(1, len(touched) + 1)
+    if offset is not None:
+        before = touched[:1] + np.array([0.0, 0.0, 4 * offset])
+        touched = np.vstack([before, touched])
+        number = np.concatenate([[0], number])
+    return Pattern(touched, number, np.ones(len(touched), dtype=np.int64)).repeated(plan.repeats)
+
+
+def surface_places(setting: Setting) -> tuple[SetUp, ...]:
+    """A grid over the lower face of the volume."""
+    pattern = surface(setting.artefact, setting.plan, setting.volume.size[:2])
+    return (setting.volume.set_up(pattern, np.eye(3), (0.5, 0.5, 0.0), say("flat")),)
+
+
+def _shape(setting: Setting) -> PatternFor:
+    pattern = surface(setting.artefact, setting.plan, np.full(2, 0.5 * setting.volume.size.min()))
+    return lambda _: pattern
+
+
+_PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_planes))
+PLANNING = Planning({"surface plate": surface_places}, _PLACES.candidates, _PLACES.elsewhere)

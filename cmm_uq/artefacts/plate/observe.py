@@ -1,4 +1,6 @@
-"""Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
+"""What a recording of a ball plate or hole plate observes and is asked for, and where it is placed.
+
+Plate: balls or holes at reference positions, placed rigidly and anyhow in each measurement.
 
 All three coordinates of every ball are observations; the six freedoms of each placing are projected out exactly. What the
 certificate leaves open is in the length of the plate as far as all positions have it in common, and an error of each ball
@@ -12,12 +14,25 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from cmm_uq.artefacts.plate.facts import PlateFacts
+from cmm_uq.analysis.planning.candidates import (
+    ACROSS,
+    PatternFor,
+    RelocatedCandidates,
+    VolumeCandidates,
+    across_planes,
+    check_allowed,
+)
+from cmm_uq.analysis.planning.set_up import PRINCIPAL_PLANES, Pattern, SetUp
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, body_misfit, rows_by, spread
+from cmm_uq.artefacts.plate.kind import PlateFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
-from cmm_uq.base.points import Floats, Ints, Points
+from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import unit
 from cmm_uq.jobs.recording.references import NOISE_RATIO
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Indications, Placings, Size
 from cmm_uq.machine.model.artefact_doubt import by_certificate, faults, since_earlier
 from cmm_uq.machine.model.certified_places import CertifiedPlaces
@@ -27,28 +42,17 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_body import Body
 from cmm_uq.maths.inference.doubt import Cause
 
-DRILLED_UM = 30.0
-"""Standard deviation of holes from their nominal places, and of balls glued to a plate, µm."""
-
-CHANGED_UM = 2.0
-"""By how much a plate may have changed its shape between two dates, µm."""
-
+DRILLED_UM = 30.0  # standard deviation of holes from their nominal places, and of balls glued to a plate, µm
+CHANGED_UM = 2.0  # by how much a plate may have changed its shape between two dates, µm
 REFERENCES = ("reference_x_mm", "reference_y_mm", "reference_z_mm")
 
 
 class Plate(Rigid):
     """A plate as recorded: 3n observations (x, y, z of each ball in turn) of n points.
 
-    Parameters
-    ----------
-    facts : what the job says of the plate; ``length_mm`` is that of the farthest ball from the first by its number where it
-        is not stated.
-    points : the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
-        An earlier recording in place of references (:mod:`cmm_uq.jobs.recording.references`) adds its own noise.
-
-    Raises
-    ------
-    CmmUqError : no reference positions, a placing with one ball, or positions that are not those of this plate.
+    ``facts`` what the job says of the plate; ``length_mm`` is that of the farthest ball from the first by its number
+    where it is not stated; ``points`` the recording, with ``reference_x_mm``, ``reference_y_mm``, ``reference_z_mm``.
+    An earlier recording in place of references (:mod:`cmm_uq.jobs.recording.references`) adds its own noise.
     """
 
     kind = "plate"
@@ -154,3 +158,51 @@ class Plate(Rigid):
         length = self.sizes[0].nominal
         check_length(float(found.sum() / nominal.sum()) * length, length, "the recorded plates", where)
         self.refuse_another_shape("Check the numbering of the balls and their reference positions", where)
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Placings of the plate; ``None`` without references."""
+    if any(name not in points.columns for name in REFERENCES):
+        return None
+    reference = np.column_stack([points.columns[name] for name in REFERENCES])
+    return ArtefactShape(
+        rows_by(points.measurement), body_misfit, np.nan, spread(reference), False, REFERENCES, reference
+    )
+
+
+SCREENING = Screening(shape_of, balls=True)
+
+
+def plate(facts: ArtefactFacts, plan: PlanFacts, size: float) -> Pattern:
+    """A grid of balls; without a pitch as large as fits ``size`` mm."""
+    columns, rows = plan.grid
+    longest = max(columns, rows) - 1
+    pitch = plan.pitch_mm or (facts.length_mm or plan.length_mm or size) / np.hypot(columns - 1, rows - 1)
+    pitch = min(pitch, size / longest) if plan.pitch_mm is None else pitch
+    i, j = np.meshgrid(np.arange(columns), np.arange(rows))
+    reference = np.asarray(pitch * np.column_stack([i.ravel(), j.ravel(), np.zeros(i.size)]), dtype=np.float64)
+    named = {f"reference_{a}_mm": reference[:, k] for k, a in enumerate(AXES)}
+    one = Pattern(reference - reference.mean(axis=0), np.arange(1, i.size + 1), np.ones(i.size, dtype=np.int64), named)
+    return one.repeated(plan.repeats)
+
+
+def plate_placings(setting: Setting) -> tuple[SetUp, ...]:
+    """Flat at two heights, upright along X front and back, upright along Y left and right."""
+    volume = setting.volume
+    pattern = plate(setting.artefact, setting.plan, float(volume.size.min()))
+    found = []
+    for (title, attitude), places in zip(PRINCIPAL_PLANES, (
+        ((0.5, 0.5, 0.0), (0.5, 0.5, 1.0)), ((0.5, 0.0, 0.5), (0.5, 1.0, 0.5)), ((0.0, 0.5, 0.5), (1.0, 0.5, 0.5)),
+    ), strict=True):  # fmt: skip
+        check_allowed(setting, attitude[:, 2], ACROSS)
+        found += [volume.set_up(pattern, attitude, place, title) for place in places]
+    return tuple(found)
+
+
+def _shape(setting: Setting) -> PatternFor:
+    pattern = plate(setting.artefact, setting.plan, float(setting.volume.size.min()))
+    return lambda _: pattern
+
+
+_PLACES = VolumeCandidates(across_planes, _shape, RelocatedCandidates(across_planes))
+PLANNING = Planning({"plate placings": plate_placings}, _PLACES.candidates, _PLACES.elsewhere)

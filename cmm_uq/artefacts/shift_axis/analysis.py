@@ -8,14 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.artefacts.shift_axis.curve import Curve, CurveEstimate, estimate_curve
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import IntegratedCurve, KnownSpan, integrated
-from cmm_uq.artefacts.shift_axis.series import ShiftedSeries, shifted_series
-from cmm_uq.artefacts.shift_axis.shift_integration import Method
-from cmm_uq.artefacts.shift_axis.undetermined import Undetermined, undetermined
+from cmm_uq.artefacts.shift_axis.integration import IntegratedCurve, KnownSpan, Method, integrated
+from cmm_uq.artefacts.shift_axis.series import ShiftedSeries, Undetermined, shifted_series, undetermined
 from cmm_uq.artefacts.shifting.correction_table import correction_table
-from cmm_uq.artefacts.shifting.facts import KnownLength, ShiftFacts, shift_facts
-from cmm_uq.artefacts.shifting.found import Reported, ShiftFound, listed_draws
-from cmm_uq.artefacts.shifting.peak_to_valley import peak_to_valley
+from cmm_uq.artefacts.shifting.found import Reported, ShiftFound, listed_draws, peak_to_valley
+from cmm_uq.artefacts.shifting.kind import KnownLength, ShiftFacts, shift_facts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, PPM, unit
@@ -27,18 +24,15 @@ from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
 KNOWN = "job.toml [artefact] known"
 _FINE = 101
-_MISREAD = 0.02
-"""Part of a known length by which the readings may differ from it."""
+_MISREAD = 0.02  # part of a known length by which the readings may differ from it
 
 
 @dataclass(frozen=True, eq=False)
 class ShiftResult(ShiftFound):
     """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.artefacts.shifting.found.ShiftFound`.
 
-    Parameters
-    ----------
-    undetermined : what no reading shows.
-    integrated : the paper's integrations of two complete series, by method; empty otherwise.
+    ``undetermined`` what no reading shows; ``integrated`` the paper's integrations of two complete series, by method;
+    empty otherwise.
     """
 
     estimate: CurveEstimate
@@ -114,18 +108,7 @@ class ShiftResult(ShiftFound):
 
 
 def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult:
-    """Analyse a shift job.
-
-    Parameters
-    ----------
-    job : as read.
-    seed : of everything random; the same seed gives the same result.
-    progress : told the part of the sampling done, from 0 to 1.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed as it stands.
-    """
+    """Analyse a shift job."""
     stated = job.facts.recording.u_coordinate_um
     series, known = checked_series(job)
     estimate = estimate_curve(
@@ -137,12 +120,7 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 
 def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
-    """Series of a shift job along an axis, and the length that is known of the artefact.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed as it stands.
-    """
+    """Series of a shift job along an axis, and the length that is known of the artefact."""
     check_facts(job)
     facts = shift_facts(job)
     series = recorded_series(facts, job.points, job.recording_path)
@@ -150,12 +128,7 @@ def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
 
 
 def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:
-    """Readings of a shift job along an axis.
-
-    Raises
-    ------
-    CmmUqError : the job names no axis or no shifts, or the readings are no series of these shifts.
-    """
+    """Readings of a shift job along an axis."""
     if facts.axis is None:
         raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
                          fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
@@ -168,12 +141,7 @@ def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSer
 
 
 def check_facts(job: Job) -> None:
-    """Refuse what a shift job, along an axis or in a plane, cannot have.
-
-    Raises
-    ------
-    CmmUqError : with the key.
-    """
+    """Refuse what a shift job, along an axis or in a plane, cannot have."""
     facts, aside = job.facts, job.facts.recording.measurements_aside
     if facts.model.effects:
         raise CmmUqError("a shift job estimates errors as free functions, not by effects",
@@ -191,12 +159,7 @@ def check_facts(job: Job) -> None:
 
 
 def known_points(given: KnownLength, numbers: Ints) -> tuple[int, int]:
-    """Indices into ``numbers`` of the two points of a known length.
-
-    Raises
-    ------
-    CmmUqError : a point that was not read, or the same twice.
-    """
+    """Indices into ``numbers`` of the two points of a known length."""
     index = {int(number): i for i, number in enumerate(numbers)}
     for number in (given.from_point, given.to_point):
         if number not in index:
@@ -209,12 +172,7 @@ def known_points(given: KnownLength, numbers: Ints) -> tuple[int, int]:
 
 
 def check_known(given: KnownLength, measured: float) -> None:
-    """Refuse a known length that the readings contradict grossly.
-
-    Raises
-    ------
-    CmmUqError : with what was read, mm.
-    """
+    """Refuse a known length that the readings contradict grossly."""
     if abs(measured - given.length_mm) > _MISREAD * given.length_mm:
         raise CmmUqError(f"points {given.from_point} and {given.to_point} read {measured:.6g} mm apart, not "
                          f"{given.length_mm:g} mm", where=KNOWN, fix="Mend the length or the points")  # fmt: skip

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_axis.series import RepeatedDrift, ShiftedSeries
 from cmm_uq.artefacts.shifting.smooth_function import FINEST, SmoothFunction
 from cmm_uq.artefacts.shifting.smooth_model import Coefficients, SmoothModel, sampled
@@ -23,18 +23,14 @@ from cmm_uq.maths.inference.ensembles import Chains, Progress
 from cmm_uq.maths.uncertainty.quantity import expanded_of
 
 _TYPICAL = 5 * MICROMETRE
-_DRIFT = 10 * MICROMETRE
-"""Standard deviation of the drift, mm per hour."""
+_DRIFT = 10 * MICROMETRE  # standard deviation of the drift, mm per hour
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
     """Draws of e at positions, true = indicated + e.
 
-    Parameters
-    ----------
-    position : (m,) mm.
-    draws : (N, m) mm.
+    ``position`` (m,) mm; ``draws`` (N, m) mm.
     """
 
     position: Floats
@@ -80,13 +76,9 @@ class Curve:
 class CurveEstimate:
     """All that the readings say of an axis.
 
-    Parameters
-    ----------
-    series, known : what it was made from.
-    coefficients : joint draws of everything linear.
-    chains : of the hyper-parameters, and how they converged.
-    seed : of everything random.
-    scale_known : whether the mean sensitivity is determined: by a known length, or by shifts known exactly.
+    ``series``, ``known`` what it was made from; ``coefficients`` joint draws of everything linear; ``chains`` of the
+    hyper-parameters, and how they converged; ``seed`` of everything random; ``scale_known`` whether the mean
+    sensitivity is determined: by a known length, or by shifts known exactly.
     """
 
     series: ShiftedSeries
@@ -173,17 +165,7 @@ def estimate_curve(
 ) -> CurveEstimate:
     """Fit all readings at once.
 
-    Parameters
-    ----------
-    series : any number of placings, points missing, repeats averaged.
-    known : a known length, by indices into ``series.numbers``.
-    sigma : standard uncertainty of one reading, mm; from repeats and residuals when left out.
-    seed : of everything random.
-    progress : told the part of the sampling done.
-
-    Raises
-    ------
-    CmmUqError : too few readings.
+    ``sigma`` standard uncertainty of one reading, mm; from repeats and residuals when left out.
     """
     model = _model(series, known, sigma)
     if len(series.reading) - model.flat.shape[1] < 1:

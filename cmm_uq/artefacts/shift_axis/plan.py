@@ -8,22 +8,17 @@ import numpy as np
 
 from cmm_uq.analysis.planning.set_up import Pattern, SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
-from cmm_uq.artefacts.gauge_lines.patterns import faces_of
+from cmm_uq.artefacts.gauge_lines.observe import faces_of
 from cmm_uq.artefacts.shift_axis.analysis import recorded_series
-from cmm_uq.artefacts.shift_axis.undetermined import undetermined
-from cmm_uq.artefacts.shifting.facts import ShiftFacts
+from cmm_uq.artefacts.shift_axis.series import undetermined
+from cmm_uq.artefacts.shifting.kind import ShiftFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Points
 
 
 def shift_series(setting: Setting) -> tuple[SetUp, ...]:
-    """The artefact's points along its axis, once for each shift.
-
-    Raises
-    ------
-    CmmUqError : the job names no axis or no shifts, or the farthest shift leaves the volume.
-    """
+    """The artefact's points along its axis, once for each shift."""
     facts, plan, volume = _facts(setting), setting.plan, setting.volume
     if facts.axis is None or not facts.shifts_mm:
         raise CmmUqError("axis and shifts_mm are needed", where="job.toml [artefact]",
@@ -52,24 +47,14 @@ def shift_series(setting: Setting) -> tuple[SetUp, ...]:
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    """None: its series are all that is measured.
-
-    Raises
-    ------
-    CmmUqError : says so.
-    """
+    """None: its series are all that is measured."""
     _facts(setting)
     raise CmmUqError("a shift job has its series, and no other placings to choose from",
                      where="job.toml [plan] criterion", fix="Leave it out; shifts_mm says what is measured")  # fmt: skip
 
 
 def free(setting: Setting, points: Points, where: str) -> tuple[Text, ...]:
-    """What no reading of these series shows.
-
-    Raises
-    ------
-    CmmUqError : the readings are no series of the job's shifts.
-    """
+    """What no reading of these series shows."""
     facts = _facts(setting)
     series = recorded_series(facts, points, where)
     left = undetermined(series, scale_known=facts.known is not None)

@@ -1,4 +1,10 @@
-"""Readings of one artefact in several placings along an axis, checked, repeats averaged."""
+"""Readings of one artefact in several placings along an axis, and what shifts cannot tell.
+
+What shifts cannot tell: errors of the machine that the artefact's own dimensions imitate.
+
+A function with a period that divides every shift is the same in all placings, so it looks like an artefact of other
+dimensions. Between places that no chain of shifts joins, the error may differ by any amount; only smoothness decides there.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +20,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import HOUR
 
-_ALIKE = 1e-3
-"""Shifts nearer to each other than this are the same, mm."""
-_LATER = 0.01
-"""Root of the sum of squares of the times between repeats, h, from which on they show a drift."""
+_ALIKE = 1e-3  # shifts nearer to each other than this are the same, mm
+_LATER = 0.01  # root of the sum of squares of the times between repeats, h, from which on they show a drift
 _MISPLACED = 0.1
 """Part of the artefact's length by which a placing may differ from its nominal shift, at most and at least 1 mm."""
 
@@ -26,10 +30,7 @@ _MISPLACED = 0.1
 class RepeatedDrift:
     """Drift as repeats of the same reading at different times show it.
 
-    Parameters
-    ----------
-    rate : mm per hour.
-    noise_scale : its standard uncertainty over that of one ordinary reading, per hour.
+    ``rate`` mm per hour; ``noise_scale`` its standard uncertainty over that of one ordinary reading, per hour.
     """
 
     rate: float
@@ -40,18 +41,13 @@ class RepeatedDrift:
 class ShiftedSeries:
     """Means over repeats, one row a reading.
 
-    Parameters
-    ----------
-    axis : that was read.
-    reading : (n,) scale readings, mm.
-    series, point : (n,) index of the placing, and of the artefact's point.
-    noise_scale : (n,) standard uncertainty of each mean over that of one ordinary reading.
-    time : (n,) s; ``None`` where it was not recorded.
-    shifts, u_shift : (s,) nominal shift of each placing and the standard uncertainty of each against the first, mm.
-    cosine : (s,) of the angle between artefact and axis in each placing, from the other two coordinates.
-    numbers : (p,) of the artefact's points, as recorded.
-    scatter : of repeats about their means and their drift; ``None`` without repeats.
-    drift : from repeats at different times; ``None`` where there are none.
+    ``axis`` that was read; ``reading`` (n,) scale readings, mm; ``series``, ``point`` (n,) index of the placing, and of
+    the artefact's point; ``noise_scale`` (n,) standard uncertainty of each mean over that of one ordinary reading;
+    ``time`` (n,) s; ``None`` where it was not recorded; ``shifts``, ``u_shift`` (s,) nominal shift of each placing and
+    the standard uncertainty of each against the first, mm; ``cosine`` (s,) of the angle between artefact and axis in
+    each placing, from the other two coordinates; ``numbers`` (p,) of the artefact's points, as recorded; ``scatter`` of
+    repeats about their means and their drift; ``None`` without repeats; ``drift`` from repeats at different times;
+    ``None`` where there are none.
     """
 
     axis: str
@@ -95,12 +91,7 @@ class ShiftedSeries:
 
 
 def shifted_series(points: Points, axis: str, shifts: Floats, u_shift: float, where: str = "") -> ShiftedSeries:
-    """Series from a recording: ``measurement`` numbers the placings, ``point`` the artefact's points.
-
-    Raises
-    ------
-    CmmUqError : what cannot be evaluated, and which placing would mend it.
-    """
+    """Series from a recording: ``measurement`` numbers the placings, ``point`` the artefact's points."""
     placings = np.unique(points.measurement)
     _check_shifts(shifts, placings)
     means = means_over_repeats(points, where)
@@ -228,4 +219,64 @@ def _cosines(means: Floats, series: Ints, along: int) -> Floats:
         x = means[rows, along] - means[rows, along].mean()
         slopes = x @ means[rows][:, across] / (x @ x)
         found[s] = 1 / np.sqrt(1 + slopes @ slopes)
+    return found
+
+
+_ALIKE_of_undetermined = 0.05
+"""Shifts whose rest is below this part of the smallest are multiples of each other, as far as smooth functions can see."""
+
+
+@dataclass(frozen=True, eq=False)
+class Undetermined:
+    """What the readings by themselves leave free.
+
+    ``period`` mm; functions of this period, and of a half, a third, … of it, show in no reading; ``patterns`` (m, k)
+    basis of the errors at the positions read that change no reading, beyond a constant and, unless the scale is known,
+    a slope; orthonormal.
+    """
+
+    period: float
+    patterns: Floats
+
+
+def undetermined(series: ShiftedSeries, *, scale_known: bool) -> Undetermined:
+    """Null space of the readings without any assumption of smoothness.
+
+    Errors at the m positions read, the artefact's points and (unless known) the shifts are free; what is left free of the
+    errors, when all readings are met, is the null space.
+    """
+    positions = series.positions
+    place = np.abs(series.reading[:, None] - positions).argmin(axis=1)
+    rows = np.arange(len(place))
+    errors = np.zeros((len(place), len(positions)))
+    errors[rows, place] = 1.0
+    others = np.zeros((len(place), len(series.numbers) + len(series.shifts) - 1))
+    others[rows, series.point] = 1.0
+    if series.u_shift > 0:
+        moved = series.series > 0
+        others[rows[moved], len(series.numbers) + series.series[moved] - 1] = 1.0
+    left, sizes, _ = np.linalg.svd(others)
+    rest = left[:, int((sizes > 1e-9).sum()) :]
+    _, sizes, right = np.linalg.svd(rest.T @ errors)
+    free = right[int((sizes > 1e-9).sum()) :].T
+    trivial = [np.ones(len(positions))]
+    if series.u_shift > 0 or not scale_known:
+        trivial.append(positions - positions.mean())
+    known, _ = np.linalg.qr(np.column_stack(trivial))
+    free = free - known @ (known.T @ free)
+    basis, sizes, _ = np.linalg.svd(free, full_matrices=False)
+    # pitches and shifts a little off their nominals leave of the slope itself no more than their own relative error
+    return Undetermined(common_period(series.shifts), basis[:, sizes > _ALIKE_of_undetermined])
+
+
+def common_period(shifts: Floats) -> float:
+    """Largest length, mm, of which every shift is a multiple (Euclid's algorithm on lengths that are not exact)."""
+    found = 0.0
+    smallest = float(np.diff(np.sort(shifts)).min())
+    for shift in np.abs(shifts - shifts[0])[1:]:
+        one, other = found, float(shift)
+        while other > _ALIKE_of_undetermined * smallest:
+            rest = one % other
+            one, other = other, min(rest, other - rest)
+        found = one
     return found

@@ -9,13 +9,12 @@ import numpy as np
 
 from cmm_uq.artefacts.shift_axis.analysis import check_facts, check_known, known_points
 from cmm_uq.artefacts.shift_axis.curve import Curve
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate, placed_plate
 from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane
 from cmm_uq.artefacts.shifting.correction_table import plane_correction_table
-from cmm_uq.artefacts.shifting.facts import KnownLength, shift_facts
-from cmm_uq.artefacts.shifting.found import Reported, ShiftFound, listed_draws
-from cmm_uq.artefacts.shifting.peak_to_valley import peak_to_valley
+from cmm_uq.artefacts.shifting.found import Reported, ShiftFound, listed_draws, peak_to_valley
+from cmm_uq.artefacts.shifting.kind import KnownLength, shift_facts
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, Unit, unit
 from cmm_uq.jobs.job import Job
@@ -137,12 +136,7 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 
 def checked_plate(job: Job) -> tuple[PlacedPlate, KnownSpan | None]:
-    """The plate of a shift job in a plane, and the length that is known of it.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed as it stands.
-    """
+    """The plate of a shift job in a plane, and the length that is known of it."""
     check_facts(job)
     facts = shift_facts(job)
     plate = placed_plate(job.points, str(facts.plane), job.recording_path)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate, rotations
 from cmm_uq.artefacts.shifting.smooth_function import SmoothFunction
 from cmm_uq.artefacts.shifting.smooth_model import SmoothModel
@@ -26,28 +26,22 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, STRAIGHTNESS
 from cmm_uq.machine.physics.kinematics import carried_offset
 
-SCALE_SD, SQUARENESS_SD = 300 * PPM, 500 * ARCSECOND
-"""What physics allows, as in the effects of the same names."""
+SCALE_SD, SQUARENESS_SD = 300 * PPM, 500 * ARCSECOND  # what physics allows, as in the effects of the same names
 _TYPICAL, _TYPICAL_ROTATION = 5 * MICROMETRE, 5 * ARCSECOND
-_SHORTEST = 1 / 8
-"""Shortest correlation length as a part of the range."""
+_SHORTEST = 1 / 8  # shortest correlation length as a part of the range
 _ROUNDS = 4
-_MICRO_PRIOR = 1e-3
-"""Noise over prior in the start's least squares, mm."""
+_MICRO_PRIOR = 1e-3  # noise over prior in the start's least squares, mm
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneModel:
     """The linear model about a start, and how its coefficients make balls.
 
-    Parameters
-    ----------
-    smooth : observations: all of the first axis, then all of the second, minus the start.
-    balls : (p, 2) start, mm.
-    to_balls : (2p, q) change of the balls' coordinates by the last q flat coefficients.
-    turning : index of the carriages that have a rotation, in the order of the functions after the fourth.
-    lever : (2, 2) of each such carriage: whether its lever has the readings of the first and of the second axis.
-    known_column : (2p,) change of the balls by the last of the columns; ``None`` where no length is known within a u.
+    ``smooth`` observations: all of the first axis, then all of the second, minus the start; ``balls`` (p, 2) start, mm;
+    ``to_balls`` (2p, q) change of the balls' coordinates by the last q flat coefficients; ``turning`` index of the
+    carriages that have a rotation, in the order of the functions after the fourth; ``lever`` (2, 2) of each such
+    carriage: whether its lever has the readings of the first and of the second axis; ``known_column`` (2p,) change of
+    the balls by the last of the columns; ``None`` where no length is known within a u.
     """
 
     smooth: SmoothModel
@@ -61,12 +55,7 @@ class PlaneModel:
 def plane_model(plate: PlacedPlate, known: KnownSpan | None, chain: str, sigma: float | None) -> PlaneModel:
     """The model linearised where least squares with scales and squareness puts plate and placings.
 
-    Parameters
-    ----------
-    plate : readings.
-    known : a known distance of two balls, by indices into ``plate.numbers``.
-    chain : of the machine.
-    sigma : standard uncertainty of one reading, mm; ``None`` when it is to be estimated.
+    ``sigma`` standard uncertainty of one reading, mm; ``None`` when it is to be estimated.
     """
     balls, turned, moved = plate.balls, plate.turned, plate.moved
     turning, lever = _turning(plate, chain)

@@ -15,12 +15,9 @@ from cmm_uq.artefacts.shifting.smooth_model import Scatter
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 
-_ALIKE_MM, _ALIKE_RAD = 1.0, np.radians(1.0)
-"""Placings nearer to each other than this are the same."""
-_MISPLACED = 1.0
-"""A ball farther than this from where the other placings have it is numbered wrongly or mistaken, mm."""
-_LINE = 0.02
-"""Balls whose width is below this part of their length lie on a line."""
+_ALIKE_MM, _ALIKE_RAD = 1.0, np.radians(1.0)  # placings nearer to each other than this are the same
+_MISPLACED = 1.0  # A ball farther than this from where the other placings have it is numbered wrongly or mistaken, mm
+_LINE = 0.02  # balls whose width is below this part of their length lie on a line
 _TILT = 0.05
 _ROUNDS = 50
 
@@ -29,17 +26,11 @@ _ROUNDS = 50
 class PlacedPlate:
     """Means over repeats, one row a ball in a placing.
 
-    Parameters
-    ----------
-    plane : xy, yz or zx.
-    reading : (n, 3) scale readings, mm.
-    placing, ball : (n,) index of the placing and of the ball.
-    noise_scale : (n,) standard uncertainty of each mean over that of one ordinary reading.
-    placings, numbers : (s,) and (p,) numbers as recorded.
-    balls : (p, 2) roughly, mm, as they lie in the first placing.
-    turned : (s,) how far each placing is turned against the first, roughly, rad.
-    moved : (s, 2) where the first placing's origin lies in each, roughly, mm.
-    scatter : of repeats, both coordinates; ``None`` without repeats.
+    ``plane`` xy, yz or zx; ``reading`` (n, 3) scale readings, mm; ``placing``, ``ball`` (n,) index of the placing and
+    of the ball; ``noise_scale`` (n,) standard uncertainty of each mean over that of one ordinary reading; ``placings``,
+    ``numbers`` (s,) and (p,) numbers as recorded; ``balls`` (p, 2) roughly, mm, as they lie in the first placing;
+    ``turned`` (s,) how far each placing is turned against the first, roughly, rad; ``moved`` (s, 2) where the first
+    placing's origin lies in each, roughly, mm; ``scatter`` of repeats, both coordinates; ``None`` without repeats.
     """
 
     plane: str
@@ -96,12 +87,7 @@ def rotations(angle: Floats) -> Floats:
 
 
 def placed_plate(points: Points, plane: str, where: str = "") -> PlacedPlate:
-    """Placings from a recording: ``measurement`` numbers them, ``point`` the plate's balls.
-
-    Raises
-    ------
-    CmmUqError : what cannot be evaluated, and which placing would mend it.
-    """
+    """Placings from a recording: ``measurement`` numbers them, ``point`` the plate's balls."""
     means = means_over_repeats(points, where)
     placings, placing = np.unique(means.measurement, return_inverse=True)
     numbers, ball = np.unique(means.point, return_inverse=True)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from cmm_uq.artefacts.shift_axis.curve import Curve
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.model import PlaneModel, plane_model
 from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate
 from cmm_uq.artefacts.shift_plate.undetermined import FreeInPlane, free_in_plane
@@ -23,22 +23,16 @@ from cmm_uq.machine.physics.effects.rigid_body import SCALE
 from cmm_uq.maths.inference.ensembles import Chains, Progress
 
 _FINE = 41
-_LEAST_LEFT = 6
-"""Coordinates beyond balls and placings that must be left to tell of the machine."""
+_LEAST_LEFT = 6  # coordinates beyond balls and placings that must be left to tell of the machine
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneEstimate:
     """All that the placings say.
 
-    Parameters
-    ----------
-    plate, known : what it was made from.
-    model : linear model about its start.
-    coefficients : joint draws of everything linear.
-    chains : of the hyper-parameters, and how they converged.
-    free : what the placings leave open.
-    seed : of everything random.
+    ``plate``, ``known`` what it was made from; ``model`` linear model about its start; ``coefficients`` joint draws of
+    everything linear; ``chains`` of the hyper-parameters, and how they converged; ``free`` what the placings leave
+    open; ``seed`` of everything random.
     """
 
     plate: PlacedPlate
@@ -159,18 +153,7 @@ def estimate_plane(
 ) -> PlaneEstimate:
     """Fit all placings at once.
 
-    Parameters
-    ----------
-    plate : any number of placings, balls missing, repeats averaged.
-    known : a known distance of two balls, by indices into ``plate.numbers``.
-    chain : of the machine; it says whose rotation shows.
-    sigma : standard uncertainty of one coordinate of one reading, mm; from repeats and residuals when left out.
-    seed : of everything random.
-    progress : told the part of the sampling done.
-
-    Raises
-    ------
-    CmmUqError : too few readings.
+    ``sigma`` standard uncertainty of one coordinate of one reading, mm; from repeats and residuals when left out.
     """
     model = plane_model(plate, known, chain, sigma)
     if (left := len(model.smooth.observed) - model.smooth.flat.shape[1]) < _LEAST_LEFT:

@@ -12,17 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.artefacts.shift_axis.undetermined import common_period
+from cmm_uq.artefacts.shift_axis.series import common_period
 from cmm_uq.artefacts.shift_plate.model import PlaneModel
 from cmm_uq.artefacts.shift_plate.placed_plate import PlacedPlate
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
 
-_ALIKE = 0.02
-"""What changes the readings by less than this part of its own size is not determined by them."""
-_SQUARE_DEG = 5.0
-"""Placings turned by less than this against each other are shifts of each other."""
+_ALIKE = 0.02  # what changes the readings by less than this part of its own size is not determined by them
+_SQUARE_DEG = 5.0  # placings turned by less than this against each other are shifts of each other
 
 _TITLES: dict[str, Text] = {
     **{effect.name: say("scale of {axis}", axis=Verbatim(a.upper())) for a, effect in SCALE.items()},
@@ -48,11 +46,9 @@ _TITLES: dict[str, Text] = {
 class FreeInPlane:
     """What the readings by themselves leave free.
 
-    Parameters
-    ----------
-    combinations : names of what can change together, or alone, without changing any reading.
-    periods : of each axis, mm: functions of this period, and of a half, a third, … of it, show in no reading; ``None`` where
-        the turned placings see them.
+    ``combinations`` names of what can change together, or alone, without changing any reading; ``periods`` of each
+    axis, mm: functions of this period, and of a half, a third, … of it, show in no reading; ``None`` where the turned
+    placings see them.
     """
 
     combinations: tuple[tuple[str, ...], ...]

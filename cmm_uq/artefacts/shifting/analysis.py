@@ -5,13 +5,13 @@ from __future__ import annotations
 from cmm_uq import __version__
 from cmm_uq.artefacts.shift_axis import page as axis_page
 from cmm_uq.artefacts.shift_axis.analysis import ShiftResult, analyse_shift
-from cmm_uq.artefacts.shift_axis.results import shift_results
+from cmm_uq.artefacts.shift_axis.page import shift_results
 from cmm_uq.artefacts.shift_plate import page as plane_page
 from cmm_uq.artefacts.shift_plate.analysis import PlaneShiftResult, analyse_plane
-from cmm_uq.artefacts.shift_plate.results import plane_shift_results
+from cmm_uq.artefacts.shift_plate.page import plane_shift_results
 from cmm_uq.artefacts.shifting.correction_table import table_text
-from cmm_uq.artefacts.shifting.facts import shift_facts
-from cmm_uq.artefacts.shifting.page import table_file
+from cmm_uq.artefacts.shifting.found import table_file
+from cmm_uq.artefacts.shifting.kind import shift_facts
 from cmm_uq.base.messages import Text, Verbatim, names, say
 from cmm_uq.certificate.certificate import certificate_of
 from cmm_uq.certificate.clauses import clauses_data, formal_warnings
@@ -24,12 +24,7 @@ from cmm_uq.maths.inference.ensembles import Progress
 
 
 def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:
-    """Analyse a shift job.
-
-    Raises
-    ------
-    CmmUqError : the job cannot be analysed as it stands.
-    """
+    """Analyse a shift job."""
     if shift_facts(job).plane is not None:
         return analyse_plane(job, seed=seed, progress=progress)
     return analyse_shift(job, seed=seed, progress=progress)

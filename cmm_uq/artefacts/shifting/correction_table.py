@@ -15,20 +15,13 @@ from cmm_uq.machine.physics.effects.rigid_body import SQUARENESS
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, write_error_map
 from cmm_uq.machine.physics.kinematics import carried_offset
 
-_DECIMALS = 3
-"""Of the table's µm and ″."""
+_DECIMALS = 3  # of the table's µm and ″
 
 
 def correction_table(axis: str, curve: Curve, machine: Machine) -> ErrorMap:
     """Error map with the curve as displacement of one carriage along itself; everything else zero.
 
     It reaches over the machine's travel where that is known; beyond what was read it holds the last value, uncalibrated.
-
-    Parameters
-    ----------
-    axis : x, y or z.
-    curve : true = indicated + e at scale readings.
-    machine : whose travel the table must cover.
     """
     column = AXES.index(axis)
     errors = np.zeros((len(curve.position), 6))

@@ -1,30 +1,85 @@
-"""What every analysis of shifted artefacts found, along an axis or in a plane."""
+"""What every analysis of shifted artefacts gives, along an axis or in a plane, and what certificates show of it.
+
+Peak to valley of a curve that is known from draws, with an interval that can hold a straight curve too.
+
+The largest difference of a drawn curve is never zero and grows with every uncertainty (JCGM 101:2008, 9.4 shows the
+like), so an interval of such draws lies above the truth, and never holds a straight curve. Here the differences c_i − c_j
+between all pairs of positions get one factor k, from the draws, that holds them all at once. Where every c_i − c_j lies within
+d_ij ± k·u_ij, the largest lies between the largest d_ij − k·u_ij, no less than 0, and the largest d_ij + k·u_ij. This is done
+twice: with 99.5 % it says which pairs can be the largest at all, and with 95.5 % of these alone (Bonferroni: together 95 %).
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from cmm_uq.artefacts.shifting.kind import shift_facts
+from cmm_uq.base.messages import Text, Verbatim, day, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
+from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
+from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.result import StatedUncertainty
+from cmm_uq.certificate.sections.results import SIGN, Left, stated_table
+from cmm_uq.certificate.sections.traceability import artefact_rows, certificate_rows, traceability_section
+from cmm_uq.certificate.wording import Summary, figure_row
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.draws import Draws, by_ensemble
 from cmm_uq.maths.inference.ensembles import Chains
 from cmm_uq.maths.uncertainty.correlation import Covariance
-from cmm_uq.maths.uncertainty.quantity import Quantity
+from cmm_uq.maths.uncertainty.quantity import Quantity, nominal, significant
 
-Reported = Mapping[str, tuple[Floats, str]]
-"""Draws (N,) of something that is reported, and its unit, by its name."""
+_DRAWS = 4000  # for the factor: its quantile is then known to a percent
+_CAN_BE, _HOLDS = 0.995, 0.955
+_POSITIONS = 200  # more are thinned out: a smooth curve has no more to say
 
 
-_STILL = 1e-9
-"""Part of the largest spread in a list up to which an item does not move but for rounding."""
+def peak_to_valley(curve: Floats) -> Quantity:
+    """Largest difference of a curve between two positions, µm.
+
+    ``curve`` (N, m) draws, mm. Gives that of the mean curve, the standard deviation of that of the draws, and the
+    interval of all pairs.
+    """
+    low, high = _ends(curve)
+    sizes, value = np.ptp(curve, axis=1) / MICROMETRE, float(np.ptp(curve.mean(axis=0))) / MICROMETRE
+    return Quantity(value, float(sizes.std(ddof=1)), (low / MICROMETRE, high / MICROMETRE), unit("µm"))
+
+
+def _ends(curve: Floats) -> tuple[float, float]:
+    """Ends of the interval, mm."""
+    mean, covariance = curve.mean(axis=0), np.atleast_2d(np.cov(curve, rowvar=False))
+    spread = np.linspace(0, len(mean) - 1, min(_POSITIONS, len(mean))).astype(int)
+    chosen = np.union1d(spread, [mean.argmin(), mean.argmax()])
+    mean, variance = mean[chosen], np.diag(covariance)[chosen]
+    square = variance[:, None] + variance - 2 * covariance[np.ix_(chosen, chosen)]
+    u = np.sqrt(np.where(square > 1e-12 * variance.max(initial=0.0), square, 0.0))
+    draws = curve[np.linspace(0, len(curve) - 1, min(_DRAWS, len(curve))).astype(int)][:, chosen] - mean
+    difference = mean[:, None] - mean
+    within = _factor(draws, u, u > 0, _CAN_BE) * u
+    among = difference + within >= np.max(difference - within)
+    within = _factor(draws, u, among & (u > 0), _HOLDS) * u
+    return float(np.max((difference - within)[among]).clip(0.0)), float(np.max((difference + within)[among]))
+
+
+def _factor(draws: Floats, u: Floats, among: NDArray[np.bool_], level: float) -> float:
+    """The k for which draws (N, m) about their mean keep the differences of some pairs (m, m) within k·u that often."""
+    away = np.zeros(len(draws))
+    for i in np.flatnonzero(among.any(axis=1)):
+        away = np.maximum(away, np.max(np.abs(draws[:, [i]] - draws[:, among[i]]) / u[i, among[i]], axis=1))
+    return float(np.quantile(away, level))
+
+
+Reported = Mapping[str, tuple[Floats, str]]  # draws (N,) of something that is reported, and its unit, by its name
+
+
+_STILL = 1e-9  # part of the largest spread in a list up to which an item does not move but for rounding
 
 
 class Estimated(Protocol):
@@ -64,10 +119,7 @@ class Along(Protocol):
 class ShiftFound(ABC):
     """What was found.
 
-    Parameters
-    ----------
-    job : what was analysed.
-    estimate : of the machine and the artefact, with its posterior.
+    ``job`` what was analysed; ``estimate`` of the machine and the artefact, with its posterior.
     """
 
     job: Job
@@ -116,13 +168,7 @@ class ShiftFound(ABC):
         return StatedUncertainty.of(self.job)
 
     def stated_along(self, curve: Along, size: float = MICROMETRE, symbol: str = "µm") -> Floats:
-        """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel.
-
-        Parameters
-        ----------
-        curve : where it is zero by definition it stays so.
-        size, symbol : unit in which the capability is given.
-        """
+        """(m,) U of a curve by position, in its own unit, not below the laboratory's capability of that travel."""
         capability = self.stating.capability
         if capability is None:
             return curve.expanded
@@ -144,13 +190,68 @@ def _rms_um(values: Floats) -> float:
 
 
 def listed_draws(place: str, draws: Floats, unit: str) -> Reported:
-    """Draws (N, m) of the items of a list of results.json, but those that do not move: they are zero by definition.
-
-    Parameters
-    ----------
-    place : of the list.
-    draws, unit : in that unit.
-    """
+    """Draws (N, m) of the items of a list of results.json, but those that do not move: they are zero by definition."""
     spread = np.ptp(draws, axis=0)
     moving = np.flatnonzero(spread > _STILL * spread.max(initial=0.0))
     return {f"{place}[{i}]": (draws[:, i], unit) for i in moving.tolist()}
+
+
+Named = Sequence[Left]  # quantities that are stated, each with its place in results.json and its name
+
+
+def table_file(job: Job) -> str:
+    """Name of the correction table, an error map, beside the certificate."""
+    return file_name("correction_table.csv", job.origin)
+
+
+def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
+    """Figures of performance."""
+    notes = (
+        SIGN,
+        meaning,
+        say("U is the expanded uncertainty for a coverage probability of 95 %, from the posterior distribution."),
+    )
+    return Section(
+        say("Figures of performance"),
+        (stated_table(caption, [(name, quantity) for _, _, name, quantity in named], notes),),
+    )
+
+
+def summary_of(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> Summary:
+    """What was measured, its figures and warnings, for the end of a command."""
+    figures = tuple(figure_row(name, quantity) for _, _, name, quantity in named)
+    return Summary(what, day(job.facts.job.date), figures=figures, warnings=tuple(warnings))
+
+
+def artefact_section(
+    job: Job, otherwise: Text, points: Text, shifts: tuple[tuple[Text, Text], ...], *further: Block
+) -> Section:
+    """The artefact, what of it is known, and to what that makes the results traceable."""
+    facts = shift_facts(job)
+    rows = artefact_rows(job, otherwise)
+    if (known := facts.known) is not None:
+        told = say(
+            "{points} {first} to {last}: {length} mm, U = {U} µm (k = 2)",
+            points=points, first=known.from_point, last=known.to_point, length=nominal(known.length_mm),
+            U=significant(2 * known.u_um),
+        )  # fmt: skip
+        rows.append((say("Known length"), told))
+    return traceability_section(job, (*rows, *certificate_rows(facts.certificate), *shifts), *further)
+
+
+def method_section(text: Text, readings: int, chains: Chains, seed: int, *further: Block) -> Section:
+    """How the readings were fitted, and how the sampling went."""
+    reached = say(
+        "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time {time:.1f} of {steps} steps",
+        reached=say("reached") if chains.converged else say("NOT reached"),
+        ess=chains.ess_min,
+        rhat=chains.rhat_max,
+        time=chains.autocorrelation_time,
+        steps=chains.steps,
+    )
+    rows = (
+        (say("Readings (means)"), number(readings)),
+        (say("Sampler"), say("{sampler}, seed {seed}", sampler=Verbatim(chains.sampler), seed=seed)),
+        (say("Convergence"), reached),
+    )
+    return Section(say("Method"), (Paragraph(text), Facts(rows), *further))

@@ -9,23 +9,18 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 
-NOISE_RATIO = "noise_ratio"
-"""Optional column: standard uncertainty of this reading over that of an ordinary one."""
+NOISE_RATIO = "noise_ratio"  # optional column: standard uncertainty of this reading over that of an ordinary one
 
 
 @dataclass(frozen=True, eq=False)
 class Means:
     """One row a (measurement, point), in this order.
 
-    Parameters
-    ----------
-    measurement, point : (m,) as recorded.
-    readings : (m, 3) scale readings of x, y, z, mm, weighted by the noise of each repeat.
-    noise_scale : (m,) standard uncertainty of each mean over that of one ordinary reading.
-    time : (m,) s; ``None`` where it was not recorded.
-    line : (m,) of the first repeat in its file; 0 where there is none.
-    of : (n,) row that each recorded point went into.
-    ratio : (n,) noise of each recorded point over an ordinary one's.
+    ``measurement``, ``point`` (m,) as recorded; ``readings`` (m, 3) scale readings of x, y, z, mm, weighted by the
+    noise of each repeat; ``noise_scale`` (m,) standard uncertainty of each mean over that of one ordinary reading;
+    ``time`` (m,) s; ``None`` where it was not recorded; ``line`` (m,) of the first repeat in its file; 0 where there is
+    none; ``of`` (n,) row that each recorded point went into; ``ratio`` (n,) noise of each recorded point over an
+    ordinary one's.
     """
 
     measurement: Ints
@@ -39,12 +34,7 @@ class Means:
 
 
 def means_over_repeats(points: Points, where: str = "") -> Means:
-    """Means of a recording.
-
-    Raises
-    ------
-    CmmUqError : a noise ratio that is not positive.
-    """
+    """Means of a recording."""
     ratio = points.columns.get(NOISE_RATIO, np.ones(len(points)))
     if (ratio <= 0).any():
         raise CmmUqError(

@@ -16,23 +16,19 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.artefacts.shifting.smooth_function import LONGEST, SmoothFunction
-from cmm_uq.artefacts.shifting.smooth_marginal import BATCH, Marginal, marginal
+from cmm_uq.artefacts.shifting.smooth_function import BATCH, LONGEST, Marginal, SmoothFunction, marginal
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.draws import evenly
 from cmm_uq.maths.inference.ensembles import Chains, Progress, run_ensembles
 from cmm_uq.maths.inference.posterior import SIGMA_BOUNDS
 from cmm_uq.maths.inference.proposals import refined
 
-DRAWS = 2000
-"""Of everything linear, taken evenly from the chains."""
+DRAWS = 2000  # of everything linear, taken evenly from the chains
 EFFECTIVE_SAMPLES = 2000
-_AMPLITUDE_BOUNDS = (1e-4, 1e2)
-"""Of each amplitude over its typical size."""
+_AMPLITUDE_BOUNDS = (1e-4, 1e2)  # of each amplitude over its typical size
 _LENGTH, _LENGTH_SPREAD = 0.2, 0.6
 """Median correlation length as a part of the range, and the standard deviation of its logarithm: five hills or so."""
-_GROWTH_SPREAD = 1.5
-"""Standard deviation of the logarithm of the ends' size over the middle's."""
+_GROWTH_SPREAD = 1.5  # standard deviation of the logarithm of the ends' size over the middle's
 _GROWTH_BOUNDS = 0.5, 8.0
 """Ends that are quieter than the middle by more than this look all the same: a plateau on which chains would get stuck."""
 
@@ -54,15 +50,10 @@ class Scatter:
 class SmoothModel:
     """See the module's docstring.
 
-    Parameters
-    ----------
-    observed : (n,) mm.
-    noise_scale : (n,) positive.
-    flat : (n, q) columns of which nothing is known beforehand; of full rank.
-    columns, column_sd : (n, c) and (c,) columns with Gaussian coefficients about zero.
-    functions : at least one.
-    scatter : of repeats, where σ is to be estimated from them too.
-    sigma : standard uncertainty of one reading, mm; ``None`` when it is to be estimated.
+    ``observed`` (n,) mm; ``noise_scale`` (n,) positive; ``flat`` (n, q) columns of which nothing is known beforehand;
+    of full rank; ``columns``, ``column_sd`` (n, c) and (c,) columns with Gaussian coefficients about zero;
+    ``functions`` at least one; ``scatter`` of repeats, where σ is to be estimated from them too; ``sigma`` standard
+    uncertainty of one reading, mm; ``None`` when it is to be estimated.
     """
 
     observed: Floats
@@ -227,12 +218,8 @@ class SmoothModel:
 class Coefficients:
     """Joint draws of everything linear.
 
-    Attributes
-    ----------
-    coefficients : (N, J) of all functions' sines.
-    growth : (N,) the ends' size over the middle's.
-    columns : (N, c); flat : (N, q).
-    sigma : (N,) mm.
+    ``coefficients`` (N, J) of all functions' sines; ``growth`` (N,) the ends' size over the middle's; ``columns`` (N,
+    c); flat : (N, q); ``sigma`` (N,) mm.
     """
 
     model: SmoothModel

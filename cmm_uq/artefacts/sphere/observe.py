@@ -1,4 +1,6 @@
-"""Sphere: points probed on a ball, whose centre is free in each measurement (ISO 10360-5).
+"""What a recording of a test sphere observes and is asked for, and where it is placed.
+
+Sphere: points probed on a ball, whose centre is free in each measurement (ISO 10360-5).
 
 A sphere without a certified diameter cannot tell an error of the effective stylus radius from its own size.
 """
@@ -10,11 +12,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cmm_uq.artefacts.sphere.facts import SphereFacts
+from cmm_uq.analysis.planning.candidates import MIDDLE, PatternFor, RelocatedCandidates, VolumeCandidates, upright
+from cmm_uq.analysis.planning.set_up import Pattern, SetUp, planned_length
+from cmm_uq.analysis.planning.setting import Planning, Setting
+from cmm_uq.analysis.screening.shape import (
+    ArtefactShape,
+    Screening,
+    ball_misfit,
+    no_references,
+    recentred,
+    rows_by,
+    samples_of,
+    spread,
+)
+from cmm_uq.artefacts.sphere.kind import SphereFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE
+from cmm_uq.jobs.tables.artefact import ArtefactFacts
+from cmm_uq.jobs.tables.plan import PlanFacts
 from cmm_uq.machine.model.artefact import Forms, Placings
 from cmm_uq.machine.model.artefact_doubt import form_faults
 from cmm_uq.machine.model.radial import Radial
@@ -30,13 +47,9 @@ LARGEST_ANGLE = np.radians(20.0)
 class ProbedSpheres:
     """Least-squares spheres of a recording, one for each (measurement, repeat).
 
-    Parameters
-    ----------
-    measurement, repeat : (q,).
-    count : (q,) points of each.
-    form : (q,) range of the radial distances, mm (ISO 10360-5:2010, P_Form).
-    size : (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size); not finite without a certificate.
-    centres : (q, 3) of the least-squares spheres, mm.
+    ``measurement``, ``repeat`` (q,); ``count`` (q,) points of each; ``form`` (q,) range of the radial distances, mm
+    (ISO 10360-5:2010, P_Form); ``size`` (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size);
+    not finite without a certificate; ``centres`` (q, 3) of the least-squares spheres, mm.
     """
 
     measurement: Ints
@@ -50,18 +63,8 @@ class ProbedSpheres:
 class Sphere(Radial):
     """A probed sphere: ``length_mm`` is its diameter.
 
-    Parameters
-    ----------
-    facts : what the job says of the sphere.
-    points : the recording, with ``nx, ny, nz`` where they are known.
-
-    Attributes
-    ----------
-    form : form deviation of the ball by its certificate, mm; 0 when it is not given.
-
-    Raises
-    ------
-    CmmUqError : too few points, points in one plane, normals that do not point away from the centre.
+    ``facts`` what the job says of the sphere; ``points`` the recording, with ``nx, ny, nz`` where they are known.
+    ``form`` form deviation of the ball by its certificate, mm; 0 when it is not given.
     """
 
     kind = "sphere"
@@ -124,3 +127,72 @@ class Sphere(Radial):
         self._normals = normals / length[:, None]
         columns = {f"n{a}": self._normals[:, i] for i, a in enumerate(AXES)}
         self.points = replace(self.points, columns={**self.points.columns, **columns})
+
+
+_NORMAL = 0.4  # part of the radius by which a recorded normal may miss the point: normals may be nominal, 20° off
+_NORMALS = tuple(f"n{a}" for a in AXES)
+
+
+def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
+    """Spheres, with normals where they are recorded; ``None`` where one has too few points."""
+    rows, radius = rows_by(points.measurement), (facts.length_mm or np.nan) / 2
+    if any(len(r) < 5 for r in rows):
+        return None
+    extent = radius if np.isfinite(radius) else 0.5 * float(np.median([spread(points.xyz[r]) for r in rows]))
+    if not all(name in points.columns for name in _NORMALS):
+        return ArtefactShape(rows, ball_misfit, radius, extent, False, (), no_references(points))
+    normals = np.column_stack([points.columns[name] for name in _NORMALS])
+    return ArtefactShape(rows, _ball_with_normals, radius, extent, False, _NORMALS, normals)
+
+
+def _ball_with_normals(xyz: Floats, normals: Floats, radius: float) -> Floats:
+    """Each normal says where the centre lies; their median does not follow a few."""
+    if np.isnan(radius):
+        i, j = samples_of(len(xyz), 2).T
+        steps = normals[j] - normals[i]
+        squares = np.sum(steps**2, axis=1)
+        if not np.any(wide := squares > 0.5 * squares.max()):
+            return np.zeros(len(xyz))
+        radius = float(np.median(np.sum((xyz[j] - xyz[i]) * steps, axis=1)[wide] / squares[wide]))
+    away = xyz - np.median(xyz - radius * normals, axis=0)
+    away, radius = recentred(away, radius, free=False)  # nominal normals put it astray
+    misses = np.linalg.norm(away - radius * normals, axis=1) - _NORMAL * abs(radius)
+    return np.asarray(np.maximum(np.abs(np.linalg.norm(away, axis=1) - radius), misses), dtype=np.float64)
+
+
+SCREENING = Screening(shape_of)
+
+
+RINGS = ((0.0, 1, 0.0), (22.5, 4, 0.0), (45.0, 8, 22.5), (67.5, 4, 0.0), (90.0, 8, 22.5))
+"""Points over a hemisphere: degrees from the pole, how many, degrees turned. The usual twenty-five of ISO 10360-5."""
+
+
+def sphere(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
+    """Twenty-five points over the upper hemisphere, each probed along its normal."""
+    normals = []
+    for down, count, turn in RINGS:
+        polar = np.radians(down)
+        azimuth = np.radians(turn) + 2 * np.pi * np.arange(count) / count
+        ring = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.full(count, np.cos(polar))]
+        normals.append(np.column_stack(ring))
+    n = np.vstack(normals)
+    one = Pattern(
+        0.5 * planned_length(facts, plan) * n, np.arange(1, len(n) + 1), np.ones(len(n), dtype=np.int64), {},
+        {"normal": n, "approach": -np.where(np.abs(n) > 1e-9, n, 0.0)},
+    )  # fmt: skip
+    return one.repeated(plan.repeats)
+
+
+def sphere_places(setting: Setting) -> tuple[SetUp, ...]:
+    """Once in the middle of the volume."""
+    pattern = sphere(setting.artefact, setting.plan)
+    return (setting.volume.set_up(pattern, np.eye(3), MIDDLE, say("in the middle")),)
+
+
+def _shape(setting: Setting) -> PatternFor:
+    pattern = sphere(setting.artefact, setting.plan)
+    return lambda _: pattern
+
+
+_PLACES = VolumeCandidates(upright, _shape, RelocatedCandidates(lambda volume: []))
+PLANNING = Planning({"ISO 10360-5": sphere_places}, _PLACES.candidates, _PLACES.elsewhere)

@@ -1,12 +1,14 @@
-"""What a certificate shows of a probed sphere: form and size of each, and the radial deviations."""
+"""What the certificate of a test sphere states and shows beside the estimates."""
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, cast
 
-from cmm_uq.artefacts.sphere.analysis import about_centre, deviations_um, results
+import numpy as np
+
 from cmm_uq.artefacts.sphere.observe import Sphere
 from cmm_uq.base.messages import Number, Text, number, say
+from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Column, Plot, Section, Table
 from cmm_uq.certificate.outcome import Page
@@ -14,6 +16,35 @@ from cmm_uq.certificate.plots.residuals import length_plot, volume_plot
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, numbered
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
+
+
+def deviations_um(sphere: Sphere) -> Floats:
+    """(n,) distance of each point from its best centre minus the certified or mean radius, µm."""
+    radius = sphere.sizes[0].nominal * sphere.per_size * sphere.expansion
+    return np.asarray((sphere.distances(sphere.points.xyz, None) - radius) / MICROMETRE, dtype=np.float64)
+
+
+def about_centre(sphere: Sphere) -> Floats:
+    """(n, 3) places of the points about their centres, on the sphere of the nominal size, mm."""
+    return np.asarray(
+        sphere.size_change() * sphere.sizes[0].nominal * sphere.directions(sphere.points.xyz), dtype=np.float64
+    )
+
+
+def results(result: Result) -> dict[str, Any]:
+    """Form and size errors for results.json."""
+    sphere = cast("Sphere", result.artefact)
+    probed, certified = sphere.probed(), sphere.sizes[0].certified
+    return {
+        "spheres": [
+            {"measurement": int(measurement), "repeat": int(repeat), "points": int(count), "form_error_um": form,
+             "size_error_um": size if certified else None}
+            for measurement, repeat, count, form, size in zip(
+                probed.measurement, probed.repeat, probed.count, (probed.form / MICROMETRE).tolist(),
+                (probed.size / MICROMETRE).tolist(), strict=True,
+            )
+        ]
+    }  # fmt: skip
 
 
 def sections(result: Result) -> list[Section]:

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle.observe import Triangle
-from cmm_uq.artefacts.triangle.placings import PLANES
+from cmm_uq.artefacts.triangle.observe import PLANES, Triangle
 from cmm_uq.artefacts.triangle.standard import SIDES_OF_DIMENSIONS, corners
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
@@ -27,9 +26,7 @@ from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, tip_offsets
 
 _ALIGNED = np.cos(np.radians(3.0))
-_ANOTHER_PLACE = 20.0
-"""mm between readings, or between tips, from which on two placings differ."""
-
+_ANOTHER_PLACE = 20.0  # mm between readings, or between tips, from which on two placings differ
 _X, _, _Z, _TIP_X, _TIP_Y, _ = range(6)
 
 PARAMETERS = tuple(effect.name for family in (SCALE, SQUARENESS, ROTATION) for effect in family.values())
@@ -40,14 +37,9 @@ PARAMETERS = tuple(effect.name for family in (SCALE, SQUARENESS, ROTATION) for e
 class Defects:
     """What one aligned placing lacks of the certified triangle.
 
-    Parameters
-    ----------
-    measurement : its number.
-    plane : key of ``PLANES``.
-    H, K, A : mm, see the module's docstring.
-    base, height : of the certified triangle, mm.
-    start, apex : (3,) scale readings of corner 1 and of corner 3, mm.
-    tip : (3,) stylus tip offset, mm.
+    ``measurement`` its number; ``plane`` key of ``PLANES``; ``H``, ``K``, ``A`` mm, see the module's docstring;
+    ``base``, ``height`` of the certified triangle, mm; ``start``, ``apex`` (3,) scale readings of corner 1 and of
+    corner 3, mm; ``tip`` (3,) stylus tip offset, mm.
     """
 
     measurement: int
@@ -66,11 +58,8 @@ class Defects:
 class TriangleSolution:
     """Parameters by the source's equations, mended.
 
-    Parameters
-    ----------
-    values : (15,) in the order of :data:`PARAMETERS`.
-    per_coordinate : (15, 3n) change of each for 1 mm of each recorded coordinate.
-    per_dimension : (15, 6) change of each for 1 mm of each dimension of the standard.
+    ``values`` (15,) in the order of :data:`PARAMETERS`; ``per_coordinate`` (15, 3n) change of each for 1 mm of each
+    recorded coordinate; ``per_dimension`` (15, 6) change of each for 1 mm of each dimension of the standard.
     """
 
     values: Floats
@@ -84,12 +73,7 @@ class TriangleSolution:
 
 
 def solve_equations(triangle: Triangle) -> TriangleSolution:
-    """Solve one equation after the other.
-
-    Raises
-    ------
-    CmmUqError : the machine's chain is another one, a placing is not aligned, or one that an equation needs is missing.
-    """
+    """Solve one equation after the other."""
     machine = triangle.points.machine
     if machine.chain != "YXZ":
         raise CmmUqError(
@@ -114,15 +98,7 @@ def solve_equations(triangle: Triangle) -> TriangleSolution:
 def defects(triangle: Triangle, xyz: Floats, dimensions: Floats) -> list[Defects]:
     """Defects of every placing, the mean of its repeats.
 
-    Parameters
-    ----------
-    triangle : with its recording.
-    xyz : (n, 3) recorded coordinates, mm.
-    dimensions : (6,) of the standard, mm.
-
-    Raises
-    ------
-    CmmUqError : a triangle whose side 1–2 does not lie along an axis, or whose height does not.
+    ``xyz`` (n, 3) recorded coordinates, mm; ``dimensions`` (6,) of the standard, mm.
     """
     points, nominal = triangle.points, corners(SIDES_OF_DIMENSIONS @ dimensions)
     readings = (xyz + points.machine.origin_mm) / triangle.expansion[:, None]

@@ -1,4 +1,11 @@
-"""Triangle standard as recorded: the axes of three cylinders in several placings.
+"""What a recording of a triangle of gauge blocks and cylinders observes and is asked for, and where it is placed.
+
+The placings of the triangle standard: where it stands, which way, and with which tip.
+
+The source counts seven placings and describes eight. The horizontal one shifted along X gives the yaw of Y, which the
+vertical ones on the left and on the right give as well and over a longer lever; it is the eighth.
+
+Triangle standard as recorded: the axes of three cylinders in several placings.
 
 In the source's equations a rotation of any carriage acts on the stylus tip offset too, and two tips of different length part
 yaw from scale. So ``tip_x_mm, tip_y_mm, tip_z_mm`` count for every carriage here, and not for the ram alone.
@@ -6,12 +13,26 @@ yaw from scale. So ``tip_x_mm, tip_y_mm, tip_z_mm`` count for every carriage her
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from types import MappingProxyType
+from typing import cast
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle.facts import TriangleFacts
+from cmm_uq.analysis.planning.candidates import (
+    ACROSS,
+    THIRDS,
+    RelocatedCandidates,
+    across_planes,
+    check_allowed,
+    thinned,
+)
+from cmm_uq.analysis.planning.set_up import SetUp, split
+from cmm_uq.analysis.planning.setting import Planning, Setting, Start
+from cmm_uq.analysis.screening.shape import ArtefactShape, Screening, body_misfit, rows_by
+from cmm_uq.artefacts.triangle.kind import TriangleFacts
 from cmm_uq.artefacts.triangle.standard import (
     DIMENSIONS,
     SIDES_OF_DIMENSIONS,
@@ -20,8 +41,8 @@ from cmm_uq.artefacts.triangle.standard import (
     corners,
 )
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import say
-from cmm_uq.base.points import Floats, Points
+from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.points import AXES, Floats, Machine, Points
 from cmm_uq.base.units import unit
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.model.artefact_doubt import by_certificate, faults
@@ -31,30 +52,90 @@ from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_body import Body
 from cmm_uq.machine.physics.effects.own_errors import AFFINE
 
+PLANES: Mapping[str, tuple[int, int]] = MappingProxyType({"XY": (0, 1), "YZ": (1, 2), "ZX": (0, 2)})
+"""Axis of the longest side, axis of the height over it."""
+
+
+@dataclass(frozen=True)
+class Placing:
+    """One placing.
+
+    ``title`` in words; ``plane`` key of :data:`PLANES`; ``place`` where along the room that the machine has for it, 0 …
+    1 for X, Y, Z; ``long_tip`` whether the longer of two tips is mounted.
+    """
+
+    title: Text
+    plane: str
+    place: tuple[float, float, float]
+    long_tip: bool = False
+
+
+SEVEN_PLACINGS = (
+    Placing(say("horizontal, low"), "XY", (0.0, 0.5, 0.0)),
+    Placing(say("horizontal, high"), "XY", (0.0, 0.5, 1.0)),
+    Placing(say("vertical in YZ, left"), "YZ", (0.0, 0.5, 0.0)),
+    Placing(say("vertical in YZ, right"), "YZ", (1.0, 0.5, 0.0)),
+    Placing(say("vertical in YZ, right, longer tip"), "YZ", (1.0, 0.5, 0.0), long_tip=True),
+    Placing(say("vertical in ZX"), "ZX", (0.5, 0.5, 0.0)),
+    Placing(say("vertical in ZX, longer tip"), "ZX", (0.5, 0.5, 0.0), long_tip=True),
+)
+
+SHIFTED = Placing(say("horizontal, low, shifted along X"), "XY", (1.0, 0.5, 0.0))  # the eighth
+
+
+def placed_triangle(
+    machine: Machine, sides: Floats, placings: Sequence[Placing] = SEVEN_PLACINGS, *,
+    tips_mm: tuple[float, float] = (80.0, 240.0), repeats: int = 1,
+) -> Points:  # fmt: skip
+    """Nominal readings of a triangle in these placings, one measurement each.
+
+    ``sides`` (3,) 1–2, 2–3, 3–1 of the triangle, mm; 1–2 is laid along an axis; ``tips_mm`` lengths of the short and of
+    the long tip: down in horizontal placings, along X in YZ, along Y in ZX. The readings are those of the machine's
+    scales, so a longer tip wants the triangle moved, not the machine.
+    """
+    travel = np.array([machine.travel(axis) for axis in AXES])
+    room = travel + 0.05 * np.ptp(travel, axis=1)[:, None] * [1, -1]
+    body = corners(sides)
+    xyz, tips = [], []
+    for placing in placings:
+        along, up = PLANES[placing.plane]
+        size = np.zeros(3)
+        size[[along, up]] = np.ptp(body[:, :2], axis=0)
+        spare = room[:, 1] - room[:, 0] - size
+        if np.any(spare < 0):
+            axis = int(np.argmin(spare))
+            raise CmmUqError(
+                f"the triangle is {size[axis]:.4g} mm long along {AXES[axis].upper()}, of which the machine has "
+                f"{np.ptp(room[axis]):.4g} mm to spare", where=placing.title, fix="Use a smaller triangle",
+            )  # fmt: skip
+        corner = np.tile(room[:, 0] + spare * placing.place, (3, 1))
+        corner[:, [along, up]] += body[:, :2] - body[:, :2].min(axis=0)
+        tip = np.zeros(3)
+        tip[3 - along - up] = tips_mm[placing.long_tip] * (-1 if placing.plane == "XY" else 1)
+        xyz.append(np.tile(corner, (repeats, 1)))
+        tips.append(np.tile(tip, (3 * repeats, 1)))
+    n = 3 * repeats * len(placings)
+    readings, offsets = np.vstack(xyz), np.vstack(tips)
+    return Points(
+        machine.coordinates(readings), np.repeat(np.arange(1, len(placings) + 1), 3 * repeats),
+        np.tile([1, 2, 3], n // 3), np.tile(np.repeat(np.arange(1, repeats + 1), 3), len(placings)), machine,
+        {f"tip_{axis}_mm": offsets[:, i] for i, axis in enumerate(AXES)},
+    )  # fmt: skip
+
+
 _TITLES = (
     say("Block 1–2"), say("Block 2–3"), say("Block 3–1"), say("Cylinder 1"), say("Cylinder 2"), say("Cylinder 3"),
 )  # fmt: skip
 
 
-_WRONG_UM = 5.0
-"""By how much a side may be off whose block or cylinder is another than the job says, µm."""
+_WRONG_UM = 5.0  # by how much a side may be off whose block or cylinder is another than the job says, µm
 
 
 class Triangle(Rigid):
     """A triangle as recorded: points 1, 2, 3 of every (measurement, repeat) are the axes of its cylinders.
 
-    Parameters
-    ----------
-    facts : what the job says of blocks and cylinders.
-    points : the recording.
-
-    Attributes
-    ----------
-    standard : dimensions of the triangle.
-
-    Raises
-    ------
-    CmmUqError : the triangle does not close, a corner is missing, or the recording is of another triangle.
+    ``facts`` what the job says of blocks and cylinders; ``points`` the recording. ``standard`` dimensions of the
+    triangle.
     """
 
     kind = "triangle"
@@ -91,7 +172,6 @@ class Triangle(Rigid):
         return faults(self._facts, self.points, body, by_certificate(u_um, _WRONG_UM), geometry=AFFINE)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`."""
         change = corner_changes(self.standard.sides)[self._corner] * self.expansion[:, None, None]
         return np.asarray((change - self.placings.means(change)).reshape(-1, len(DIMENSIONS)), dtype=np.float64)
 
@@ -111,3 +191,64 @@ def _refuse_missing_corners(points: Points, where: str | None) -> None:
             where=place(points, short, where),
             fix="Record all three cylinders, or leave out the measurement",
         )
+
+
+def shape_of(facts: TriangleFacts, points: Points) -> ArtefactShape | None:
+    """Placings of the triangle; ``None`` where a point is no corner."""
+    if not np.isin(points.point, (1, 2, 3)).all():
+        return None
+    sides = TriangleStandard.of(facts).sides
+    body = corners(sides)[points.point - 1]
+    return ArtefactShape(rows_by(points.measurement), body_misfit, np.nan, float(sides.max()), True, (), body)
+
+
+SCREENING = Screening(shape_of, balls=True)
+
+
+def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
+    """The seven placings of the triangle standard."""
+    sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
+    machine = replace(setting.machine, travel_mm=setting.volume.box)
+    for placing in SEVEN_PLACINGS:
+        check_allowed(setting, np.eye(3)[3 - sum(PLANES[placing.plane])], ACROSS)
+    points = placed_triangle(machine, sides, repeats=setting.plan.repeats)
+    return tuple(
+        SetUp(placing.title, replace(some.points, machine=setting.machine))
+        for placing, some in zip(SEVEN_PLACINGS, split(points), strict=True)
+    )
+
+
+def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
+    """Every plane, place and tip, at most as many as the plan says."""
+    return thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
+
+
+def _title(plane: str, *, longer: bool) -> Text:
+    named = Verbatim(plane)
+    return say("in the plane {plane}, longer tip", plane=named) if longer else say("in the plane {plane}", plane=named)
+
+
+def _everywhere(setting: Setting) -> Iterator[SetUp]:
+    """Every plane, place and tip."""
+    volume = setting.volume
+    sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
+    machine = replace(setting.machine, travel_mm=volume.box)
+    normals = {plane: np.eye(3)[3 - a - b] for plane, (a, b) in PLANES.items()}
+    for plane, normal in normals.items():
+        if not volume.allows(normal):
+            continue
+        tipped = [
+            Placing(_title(plane, longer=long), plane, (x, y, z), long)
+            for x, y, z in product(THIRDS, repeat=3)
+            for long in (False, True)
+        ]
+        try:
+            points = placed_triangle(machine, sides, tipped, repeats=setting.plan.repeats)
+        except CmmUqError:  # it does not fit this plane
+            continue
+        for placing, some in zip(tipped, split(points), strict=True):
+            if volume.heights[0] <= some.middle[2] <= volume.heights[1]:
+                yield SetUp(placing.title, replace(some.points, machine=setting.machine))
+
+
+PLANNING = Planning({"triangle placings": triangle_placings}, candidates, RelocatedCandidates(across_planes))

@@ -1,18 +1,217 @@
-"""What a certificate shows of a triangle standard: its angles, the sides in every placing, and two ways to the parameters."""
+"""What the certificate of a triangle of gauge blocks and cylinders states and shows beside the estimates."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from math import degrees
+from typing import Any, cast
 
-from cmm_uq.artefacts.triangle.analysis import SIDES, ByEquations, Sides, Standard, TriangleFigures, results
+import numpy as np
+
+from cmm_uq.artefacts.triangle.equations import PARAMETERS, solve_equations
+from cmm_uq.artefacts.triangle.observe import Triangle
+from cmm_uq.artefacts.triangle.standard import DRAWS
+from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say, semicolons, signed
-from cmm_uq.base.units import ARCSECOND, unit
+from cmm_uq.base.points import Floats, Ints
+from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Plot, Section, Table
 from cmm_uq.certificate.outcome import Page
 from cmm_uq.certificate.plots.residuals import length_plot
-from cmm_uq.certificate.result import Result
-from cmm_uq.certificate.wording import deviating, expanded
+from cmm_uq.certificate.result import AtLeast, Result
+from cmm_uq.certificate.wording import deviating, expanded, refusal
+from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.quantity import rounded
+from cmm_uq.maths.uncertainty.type_a import factor_of_noise
+
+SIDES = ("1–2", "2–3", "3–1")
+ALIKE = 0.9  # correlation from which on two estimates are hardly told apart
+
+
+@dataclass(frozen=True)
+class Standard:
+    """Figures of the standard at 20 °C, each with U for 95 % by Monte Carlo: sides and height, mm; angles, rad."""
+
+    sides: tuple[tuple[float, float], ...]
+    angles: tuple[tuple[float, float], ...]
+    height: tuple[float, float]
+    draws: int
+
+    def as_data(self) -> dict[str, Any]:
+        """For results.json."""
+        return {
+            "sides_mm": {name: {"value": value, "U": U} for name, (value, U) in zip(SIDES, self.sides, strict=True)},
+            "angles": {
+                str(corner): {"value_deg": float(np.degrees(value)), "U_arcsec": U / ARCSECOND}
+                for corner, (value, U) in enumerate(self.angles, 1)
+            },
+            "height_mm": {"value": self.height[0], "U": self.height[1]},
+            "draws": self.draws,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Sides 1–2, 2–3, 3–1 of every placing against the certified ones, µm.
+
+    ``measurement`` (r,) of each (measurement, repeat); ``before_um``, ``after_um`` (r, 3) as recorded, and after the
+    fitted model; ``expanded_um``, ``coverage_factor`` U of a side for the noise of its ends, and its k.
+    """
+
+    measurement: Ints
+    before_um: Floats
+    after_um: Floats
+    expanded_um: float
+    coverage_factor: float
+
+
+@dataclass(frozen=True)
+class ByEquations:
+    """A parameter by the source's equations, in the unit of its effect: u, k for 95 %, and how U is stated."""
+
+    effect: str
+    value: float
+    u: float
+    factor: float
+    at_least: AtLeast
+
+    @property
+    def expanded(self) -> float:
+        """U."""
+        return self._stated[0]
+
+    @property
+    def coverage_factor(self) -> float:
+        """K of it."""
+        return self._stated[1]
+
+    @property
+    def _stated(self) -> tuple[float, float]:
+        return self.at_least(f"equations.{self.effect}", self.factor * self.u, self.factor, self.unit)
+
+    @property
+    def title(self) -> Text:
+        return every()[self.effect].title
+
+    @property
+    def parameter(self) -> str:
+        """Name of it, a key with its unit."""
+        return every()[self.effect].reported[0].name
+
+    @property
+    def unit(self) -> Unit:
+        return every()[self.effect].reported[0].unit
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleFigures:
+    """All of these of a result."""
+
+    result: Result
+
+    @property
+    def _triangle(self) -> Triangle:
+        return cast("Triangle", self.result.artefact)
+
+    @cached_property
+    def standard(self) -> Standard:
+        standard = self._triangle.standard
+        figures, draws = standard.figures(), standard.draws(self.result.posterior.seed)
+        sides, angles = (
+            tuple((float(values[i]), _expanded(drawn[:, i])) for i in range(3))
+            for values, drawn in ((figures.sides, draws.sides), (figures.angles, draws.angles))
+        )
+        return Standard(sides, angles, (float(figures.height), _expanded(draws.height)), DRAWS)
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Of every placing."""
+        triangle, points = self._triangle, self._triangle.points
+        found = _lengths(triangle, points.xyz)
+        predicted = self.result.model.predicted(self.result.posterior.draws.mean(axis=0))
+        before = (found - triangle.standard.sides) / MICROMETRE
+        after = (found - _lengths(triangle, predicted)) / MICROMETRE
+        measurement = points.measurement[np.lexsort((points.point, points.group))].reshape(-1, 3)[:, 0]
+        noise, longest = self.result.noise, float(np.max(triangle.standard.sides))
+        return Sides(measurement, before, after, *self.result.at_least(
+            "sides.U_um", float(np.sqrt(2)) * noise.expanded, noise.coverage_factor, unit("µm"), longest
+        ))  # fmt: skip
+
+    @cached_property
+    def equations(self) -> tuple[ByEquations, ...] | Text:
+        """Parameters by the source's equations, or why there are none."""
+        triangle = self._triangle
+        try:
+            solution = solve_equations(triangle)
+        except CmmUqError as error:
+            return refusal(error)
+        noise, dimensions = self.result.noise.coordinate, triangle.standard.u
+        by_noise, known = solution.u(noise.value * MICROMETRE, 0 * dimensions), solution.u(0.0, dimensions)
+        known = np.hypot(known, solution.per_dimension @ triangle.standard.dimensions * self.result.relative_doubt)
+        return tuple(
+            ByEquations(
+                name,
+                float(value),
+                float(np.hypot(one, other)),
+                factor_of_noise(noise, one, other),
+                self.result.at_least,
+            )
+            for name, value, one, other in zip(PARAMETERS, solution.values, by_noise, known, strict=True)
+        )
+
+    @cached_property
+    def alike(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of effects that these placings hardly tell apart, with the correlation of their estimates."""
+        result = self.result
+        names = [u.key[0] for u in result.posterior.unknowns if u.key[0] in result.parameters]
+        correlation = np.atleast_2d(np.corrcoef(result.values[:, : len(names)], rowvar=False))
+        return tuple(
+            (names[j], names[i], float(correlation[i, j]))
+            for i in range(len(names))
+            for j in range(i)
+            if abs(correlation[i, j]) > ALIKE
+        )
+
+
+def results(result: Result) -> Mapping[str, Any]:
+    """The same for results.json."""
+    found = TriangleFigures(result)
+    equations, sides = found.equations, found.sides
+    return {
+        "standard": found.standard.as_data(),
+        "sides": [
+            {"measurement": int(number), "before_um": before, "after_um": after}
+            for number, before, after in zip(
+                sides.measurement, sides.before_um.tolist(), sides.after_um.tolist(), strict=True
+            )
+        ],
+        "equations": {"refused": equations} if isinstance(equations, str) else {
+            one.effect: {
+                one.parameter: {"value": one.value, "u": one.u, "U": one.expanded, "k": one.coverage_factor}
+            }
+            for one in equations
+        },
+        **({} if isinstance(equations, str) else {"conditional": {"equations": "white noise, and a few observations each"}}),
+        "hardly_told_apart": [
+            {"effects": [one, other], "correlation": correlation} for one, other, correlation in found.alike
+        ],
+    }  # fmt: skip
+
+
+def _expanded(draws: Floats) -> float:
+    """U of draws (N,): half the width of their 95 % interval."""
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return 0.5 * float(high - low)
+
+
+def _lengths(triangle: Triangle, xyz: Floats) -> Floats:
+    """Sides 1–2, 2–3, 3–1 of every (measurement, repeat) in order, (r, 3) mm at 20 °C."""
+    points = triangle.points
+    order = np.lexsort((points.point, points.group))
+    corner = (xyz / triangle.expansion[:, None])[order].reshape(-1, 3, 3)
+    return np.asarray(np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2), dtype=np.float64)
 
 
 def sections(result: Result) -> list[Section]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cmm_uq.artefacts.triangle.facts import TriangleFacts
+from cmm_uq.artefacts.triangle.kind import TriangleFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
@@ -34,12 +34,7 @@ class TriangleFigures:
 
 @dataclass(frozen=True, eq=False)
 class TriangleStandard:
-    """The dimensions of a triangle, mm, each (6,) in the order of :data:`DIMENSIONS`.
-
-    Raises
-    ------
-    CmmUqError : the sides do not close to a triangle.
-    """
+    """The dimensions of a triangle, mm, each (6,) in the order of :data:`DIMENSIONS`."""
 
     dimensions: Floats
     u: Floats

@@ -30,11 +30,7 @@ SPOILT = say("a certificate that comes with the signature was changed")
 class Evidence:
     """What a file brings along for its signatures.
 
-    Parameters
-    ----------
-    certificates : above the signers'.
-    revocations : lists.
-    answers : of OCSP responders.
+    ``certificates`` above the signers'; ``revocations`` lists; ``answers`` of OCSP responders.
     """
 
     certificates: tuple[x509.Certificate, ...] = ()
@@ -46,12 +42,8 @@ class Evidence:
 class Standing:
     """What holds of a signer.
 
-    Parameters
-    ----------
-    trusted : whether somebody trusted vouches for them.
-    revocation : of their certificate.
-    test_key : whether the key is one for trying.
-    problems : why it does not count.
+    ``trusted`` whether somebody trusted vouches for them; ``revocation`` of their certificate; ``test_key`` whether the
+    key is one for trying; ``problems`` why it does not count.
     """
 
     trusted: bool
@@ -63,16 +55,7 @@ class Standing:
 def standing(
     certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime | None, *, proven: bool
 ) -> Standing:
-    """What holds of a signer.
-
-    Parameters
-    ----------
-    certificate : of the signer.
-    evidence : from the file.
-    trust : whom one trusts.
-    at : time of signing.
-    proven : whether a time stamp proves it: without one, a certificate that was revoked since does not count.
-    """
+    """What holds of a signer."""
     try:
         signer = certificates.load_der_x509_certificate(certificate.dump())
         reasons, test = unfit(signer), is_test(signer)
@@ -158,15 +141,7 @@ def _validate(
 
 
 def context(evidence: Evidence, trust: Trust, at: dt.datetime, mode: str = "soft-fail") -> ValidationContext:
-    """What certificates are judged by at a time; nothing is fetched.
-
-    Parameters
-    ----------
-    evidence : from the file.
-    trust : whom one trusts.
-    at : the time.
-    mode : ``require`` where every certificate must be known not to be revoked, else ``soft-fail``.
-    """
+    """What certificates are judged by at a time; nothing is fetched."""
     return ValidationContext(
         trust_roots=[x509.Certificate.load(anchor) for anchor in trust.anchors],
         other_certs=list(evidence.certificates), crls=[one.dump() for one in _lists(evidence, trust)],

@@ -17,12 +17,7 @@ _SILENT = logging.NullHandler()
 
 @contextlib.contextmanager
 def installed() -> Iterator[None]:
-    """Imports inside that may miss a package of the extra.
-
-    Raises
-    ------
-    NotInstalledError : one is not installed.
-    """
+    """Imports inside that may miss a package of the extra."""
     for name in ("pyhanko", "pyhanko_certvalidator", "signxml"):
         logging.getLogger(name).addHandler(_SILENT)  # what matters is said once, by what is found
     try:
@@ -33,12 +28,7 @@ def installed() -> Iterator[None]:
 
 
 def ran(coroutine: Coroutine[Any, Any, _T]) -> _T:
-    """What a coroutine of the library returns, also where a loop runs already, as in a notebook.
-
-    Parameters
-    ----------
-    coroutine : not yet begun.
-    """
+    """What a coroutine of the library returns, also where a loop runs already, as in a notebook."""
     try:
         asyncio.get_running_loop()
     except RuntimeError:

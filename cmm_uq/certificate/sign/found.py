@@ -24,10 +24,7 @@ _FILES = (".pem", ".crt", ".cer", ".der", ".crl")
 class Trust:
     """Whom one trusts: nobody by default, and never those of the system.
 
-    Parameters
-    ----------
-    anchors : certificates, DER.
-    revocations : revocation lists, DER, besides those in the file.
+    ``anchors`` certificates, DER; ``revocations`` revocation lists, DER, besides those in the file.
     """
 
     anchors: tuple[bytes, ...] = ()
@@ -41,22 +38,15 @@ NOBODY = Trust()
 class Signature:
     """One signature, and what holds of it.
 
-    Parameters
-    ----------
-    subject : whom the certificate names, whole.
-    name : the same, its common name.
-    issuer : who issued the certificate.
-    level : of the signature: ``PAdES B-B``, ``XAdES B-B``, …
-    time : of signing.
-    time_proven : whether a time stamp that is trusted says so; else it is what the signer says.
-    intact : whether what was signed is what is there, and the key of the certificate signed it.
-    covers_whole_file : whether nothing stands in the file that it does not cover, but for time stamps, what proves
-        certificates, and further signatures.
-    trusted : whether a chain leads to somebody trusted, in date when it was signed.
-    revocation : of the certificate.
-    test_key : whether the key is one for trying; what is to be said then is :data:`~cmm_uq.certificate.sign.signer.TEST_NOTE`.
-    problems : why it does not count.
-    content : what was verified: of a PDF the signed revision, of XML the canonical form of the root without the signature.
+    ``subject`` whom the certificate names, whole; ``name`` the same, its common name; ``issuer`` who issued the
+    certificate; ``level`` of the signature: ``PAdES B-B``, ``XAdES B-B``, …; ``time`` of signing; ``time_proven``
+    whether a time stamp that is trusted says so; else it is what the signer says; ``intact`` whether what was signed is
+    what is there, and the key of the certificate signed it; ``covers_whole_file`` whether nothing stands in the file
+    that it does not cover, but for time stamps, what proves certificates, and further signatures; ``trusted`` whether a
+    chain leads to somebody trusted, in date when it was signed; ``revocation`` of the certificate; ``test_key`` whether
+    the key is one for trying; what is to be said then is :data:`~cmm_uq.certificate.sign.signer.TEST_NOTE`;
+    ``problems`` why it does not count; ``content`` what was verified: of a PDF the signed revision, of XML the
+    canonical form of the root without the signature.
     """
 
     subject: str
@@ -80,16 +70,7 @@ class Signature:
 
 
 def trust_of(paths: Sequence[Path]) -> Trust:
-    """Certificates and revocation lists in files, or in all such files of a folder.
-
-    Parameters
-    ----------
-    paths : of PEM or DER files, or of folders that hold them.
-
-    Raises
-    ------
-    CmmUqError : one cannot be read, or holds neither.
-    """
+    """Certificates and revocation lists in files, or in all such files of a folder."""
     anchors: list[bytes] = []
     revocations: list[bytes] = []
     for path in paths:

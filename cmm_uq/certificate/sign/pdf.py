@@ -23,20 +23,16 @@ if TYPE_CHECKING:
     from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
     from pyhanko.sign.signers import PdfSigner
 
-FIELD = "Signature"
-"""Names of the fields: Signature1, Signature2, …"""
+FIELD = "Signature"  # names of the fields: Signature1, Signature2, …
 
 
 @dataclass(frozen=True)
 class Seal:
     """What is seen of a signature on the first page.
 
-    Parameters
-    ----------
-    picture : a PDF of one page, shown in the seal's place.
-    places : left, bottom, right and top of the place of the first signature and of those after it, in points from the
-        page's lower left corner; a signature for which no place is left is not seen.
-    says : the picture in words, for those who cannot see it.
+    ``picture`` a PDF of one page, shown in the seal's place; ``places`` left, bottom, right and top of the place of the
+    first signature and of those after it, in points from the page's lower left corner; a signature for which no place
+    is left is not seen; ``says`` the picture in words, for those who cannot see it.
     """
 
     picture: bytes
@@ -54,15 +50,8 @@ LEVELS: tuple[Level, ...] = get_args(Level)
 class Stamping:
     """What a level above B-B needs.
 
-    Parameters
-    ----------
-    server : address of a time stamp server.
-    level : B-T, B-LT or B-LTA.
-    trust : whom the chains of signer and server must lead to, for B-LT and B-LTA.
-
-    Raises
-    ------
-    CmmUqError : the address is none of HTTP.
+    ``server`` address of a time stamp server; ``level`` B-T, B-LT or B-LTA; ``trust`` whom the chains of signer and
+    server must lead to, for B-LT and B-LTA.
     """
 
     server: str
@@ -80,18 +69,7 @@ def sign_pdf(
 ) -> bytes:  # fmt: skip
     """A PDF with a signature.
 
-    Parameters
-    ----------
-    pdf : the document; signatures that it has stay valid.
-    signer : who signs.
-    seal : what is seen of it; ``None`` for nothing.
-    at : time of signing, with its zone.
-    stamping : level above B-B; ``None`` for B-B.
-    reason : why it is signed.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read as a PDF, the key must not sign at this time, or a server does not answer as it should.
+    ``seal`` what is seen of it; ``None`` for nothing; ``stamping`` level above B-B; ``None`` for B-B.
     """
     signer.check(at)
     with installed():
@@ -171,12 +149,7 @@ EPOCH = "SOURCE_DATE_EPOCH"
 
 
 def signing_time() -> dt.datetime:
-    """Whole seconds, in UTC.
-
-    Raises
-    ------
-    CmmUqError : the variable is no number of seconds since 1970.
-    """
+    """Whole seconds, in UTC."""
     given = os.environ.get(EPOCH, "")
     if not given:
         return dt.datetime.now(dt.UTC).replace(microsecond=0)

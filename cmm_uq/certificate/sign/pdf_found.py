@@ -22,31 +22,17 @@ if TYPE_CHECKING:
 
 DIGESTS = frozenset({"sha256", "sha384", "sha512"})
 MECHANISMS = frozenset({"rsassa_pkcs1v15", "rsassa_pss", "ecdsa"})
-
 PADES = "/ETSI.CAdES.detached"
 WEAK = say("the signature is made with an algorithm that is weak or unknown")
 BROKEN = say("the signature does not fit the file: one of them was changed")
 UNREADABLE = say("the signature cannot be read")
 STAMP_BROKEN = say("the time stamp does not fit the signature")
 NO_PADES = say("the signature is no PAdES signature")
-
-_TOLD = 6
-"""Kinds of objects that a message names."""
+_TOLD = 6  # kinds of objects that a message names
 
 
 def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> tuple[Signature, ...]:
-    """Every signature in a PDF, in the order in which they were made; time stamps of the document count with these.
-
-    Parameters
-    ----------
-    data : the file.
-    trust : whom one trusts, among them those of time stamps.
-    where : its name, for messages.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read as a PDF.
-    """
+    """Every signature in a PDF, in the order in which they were made; time stamps of the document count with these."""
     with installed():
         from pyhanko.pdf_utils.reader import PdfFileReader
     if len(data) > SIGNED_BYTES.most:
@@ -256,15 +242,7 @@ def _evidence(reader: PdfFileReader) -> Evidence:
 
 
 def _level(file: _File, embedded: EmbeddedPdfSignature, stamped: dt.datetime | None, *, known: bool) -> str:
-    """B, T, LT or LTA (ETSI EN 319 142-1), as far as it holds.
-
-    Parameters
-    ----------
-    file : that it is in.
-    embedded : the signature.
-    stamped : time of its time stamp.
-    known : whether its certificate is proven not to be revoked.
-    """
+    """B, T, LT or LTA (ETSI EN 319 142-1), as far as it holds."""
     if stamped is None:
         return "B"
     if not known or not (file.evidence.revocations or file.evidence.answers):

@@ -46,8 +46,7 @@ from cmm_uq.certificate.sign.extra import installed
 from cmm_uq.certificate.sign.found import Trust
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
-_ROOM = 16
-"""Bytes by which two signatures of an ECDSA key may differ in length, as DER."""
+_ROOM = 16  # bytes by which two signatures of an ECDSA key may differ in length, as DER
 
 
 class Adapted(signers.Signer):  # type: ignore[misc]
@@ -82,14 +81,7 @@ def show(writer: IncrementalPdfFileWriter, field: DictionaryObject, picture: byt
 
 
 def tag(writer: IncrementalPdfFileWriter, reference: IndirectObject, says: str) -> None:
-    """Put a field into the structure of a tagged PDF as a form control (ISO 14289-1, 7.18.1 and 7.18.4).
-
-    Parameters
-    ----------
-    writer : of the revision that has the field.
-    reference : to the field, to be found by screen readers.
-    says : what they say of it.
-    """
+    """Put a field into the structure of a tagged PDF as a form control (ISO 14289-1, 7.18.1 and 7.18.4)."""
     field = reference.get_object()
     field["/Contents"] = pdf_string(says)
     root = writer.root["/StructTreeRoot"] if "/StructTreeRoot" in writer.root else DictionaryObject()
@@ -133,12 +125,7 @@ def _to(held: PdfObject) -> IndirectObject:
 
 
 def appending(pdf: bytes) -> IncrementalPdfFileWriter:
-    """A writer that appends a revision, and draws nothing at random.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read as a PDF.
-    """
+    """A writer that appends a revision, and draws nothing at random."""
     with installed():
         from pyhanko.pdf_utils import generic
         from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
@@ -215,12 +202,7 @@ def _list(element: Any) -> Any:
 
 
 def _added(before: Any, after: Any) -> list[Any]:
-    """What stands behind the end of a list that is otherwise the same.
-
-    Raises
-    ------
-    ValueError : it is not the same.
-    """
+    """What stands behind the end of a list that is otherwise the same."""
     if [_text(one) for one in before] != [_text(after.raw_get(i)) for i in range(len(before))]:
         raise ValueError
     return [after.raw_get(i) for i in range(len(before), len(after))]
@@ -251,7 +233,6 @@ def _text(held: Any) -> bytes:
 
 TIMEOUT_S = 10.0
 MOST_BYTES = 1_000_000
-
 _FIX = "Try again, name another server, or sign at level B-B without one"
 
 
@@ -263,12 +244,7 @@ class Server(TimeStamper):  # type: ignore[misc]
         self.url = url
 
     async def async_request_tsa_response(self, req: tsp.TimeStampReq) -> tsp.TimeStampResp:
-        """What the server answers.
-
-        Raises
-        ------
-        CmmUqError : it does not answer, or with something else than a time stamp.
-        """
+        """What the server answers."""
         headers = {"Content-Type": "application/timestamp-query", "Accept": "application/timestamp-reply"}
         request = urllib.request.Request(self.url, req.dump(), headers)  # noqa: S310 - the scheme was looked at
         try:
@@ -284,12 +260,7 @@ class Server(TimeStamper):  # type: ignore[misc]
         return tsp.TimeStampResp.load(data)
 
     async def async_timestamp(self, message_digest: bytes, md_algorithm: str) -> Any:
-        """A time stamp of a digest.
-
-        Raises
-        ------
-        CmmUqError : the server refuses, or stamps something else.
-        """
+        """A time stamp of a digest."""
         try:
             token = await super().async_timestamp(message_digest, md_algorithm)
             stamped = (
@@ -304,19 +275,13 @@ class Server(TimeStamper):  # type: ignore[misc]
         return token
 
 
-STAMP = "TimeStamp"
-"""Name of the field of a document's time stamp, before its number."""
+STAMP = "TimeStamp"  # name of the field of a document's time stamp, before its number
 
 
 class Proof:
     """What proves the certificates of a signature at a time, fetched from those who issued them.
 
-    Parameters
-    ----------
-    signer : who signs.
-    server : of time stamps.
-    trust : whom a chain of either must lead to.
-    at : the time.
+    ``signer`` who signs; ``server`` of time stamps; ``trust`` whom a chain of either must lead to; ``at`` the time.
     """
 
     def __init__(self, signer: Signer, server: Server, trust: Trust, at: dt.datetime) -> None:
@@ -329,12 +294,7 @@ class Proof:
         self.paths: list[Any] = []
 
     async def gather(self) -> None:
-        """Fetch it, before anything is signed.
-
-        Raises
-        ------
-        CmmUqError : a chain does not lead to anybody trusted, or nobody says whether a certificate was revoked.
-        """
+        """Fetch it, before anything is signed."""
         signer = CertificateValidator(translated(self._signer.certificate), validation_context=self.context)
         try:
             self.paths.append(await signer.async_validate_path())

@@ -17,32 +17,23 @@ from cmm_uq.certificate.sign.extra import installed
 if TYPE_CHECKING:
     from cryptography.x509 import Certificate, Name
 
-TEST_WORDS = "TEST KEY"
-"""What the subject of a test key begins with."""
+TEST_WORDS = "TEST KEY"  # what the subject of a test key begins with
 
 TEST_OID = "2.25.252645135011245891322374512867431283711"
 """Of the extension that marks a test key, below the arc of numbers that anybody may draw (ITU-T X.667)."""
 
 TEST_NOTE = say("signed with a test key: it proves nothing, and anybody can make one")
-
-LEAST_RSA, LEAST_EC = 2048, 256
-"""Bits of a key that still counts (ETSI TS 119 312, NIST SP 800-131A)."""
-
-ONE_DIGEST = "sha256"
-"""Digest of whatever is signed here."""
+LEAST_RSA, LEAST_EC = 2048, 256  # bits of a key that still counts (ETSI TS 119 312, NIST SP 800-131A)
+ONE_DIGEST = "sha256"  # digest of whatever is signed here
 
 
 @dataclass(frozen=True)
 class Signer:
     """A key and its certificate.
 
-    Parameters
-    ----------
-    certificate : of the key.
-    chain : certificates above it, nearest first; without the root where nobody gave it.
-    algorithm : of the key.
-    signed : signature of data with SHA-256: RSASSA-PKCS1-v1_5, or ECDSA as DER.
-    where : the key is kept, for messages.
+    ``certificate`` of the key; ``chain`` certificates above it, nearest first; without the root where nobody gave it;
+    ``algorithm`` of the key; ``signed`` signature of data with SHA-256: RSASSA-PKCS1-v1_5, or ECDSA as DER; ``where``
+    the key is kept, for messages.
     """
 
     certificate: Certificate
@@ -63,21 +54,11 @@ class Signer:
 
     @property
     def bits(self) -> int:
-        """Of the key."""
         size: int = getattr(self.certificate.public_key(), "key_size", 0)
         return size
 
     def check(self, at: dt.datetime) -> None:
-        """Refuse to sign with what no one could accept.
-
-        Parameters
-        ----------
-        at : time of the signature, with its zone.
-
-        Raises
-        ------
-        CmmUqError : the certificate is not valid at this time, its key too short, or not for signing.
-        """
+        """Refuse to sign with what no one could accept."""
         certificate = self.certificate
         if at < certificate.not_valid_before_utc:
             raise CmmUqError(f"its certificate is valid only from {_day(certificate.not_valid_before_utc)}",
@@ -90,17 +71,7 @@ class Signer:
 
 
 def signing(key: object, where: str) -> tuple[Literal["rsa", "ecdsa"], Callable[[bytes], bytes]]:
-    """How a private key in memory signs.
-
-    Parameters
-    ----------
-    key : RSA or ECDSA; its signatures are the same for the same data.
-    where : it is kept, for messages.
-
-    Raises
-    ------
-    CmmUqError : it is of another sort.
-    """
+    """How a private key in memory signs."""
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 
@@ -154,26 +125,12 @@ def _day(time: dt.datetime) -> str:
     return time.date().isoformat()
 
 
-TEST_DAYS = 365
-"""How long a test key is valid."""
-
-LONGEST_NAME = 64 - len(f"{TEST_WORDS} – ")
-"""Characters of a name (X.520, ub-common-name)."""
+TEST_DAYS = 365  # how long a test key is valid
+LONGEST_NAME = 64 - len(f"{TEST_WORDS} – ")  # characters of a name (X.520, ub-common-name)
 
 
 def signer_of_file(path: Path, passphrase: str) -> Signer:
-    """The key of a PKCS#12 file.
-
-    Parameters
-    ----------
-    path : of the file.
-    passphrase : that opens it.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read, the passphrase is another, it has no private key or no certificate, or the key is of a
-        sort that does not sign here.
-    """
+    """The key of a PKCS#12 file."""
     with installed():
         from cryptography.hazmat.primitives.serialization import pkcs12
     where = str(path)
@@ -196,11 +153,7 @@ def signer_of_file(path: Path, passphrase: str) -> Signer:
 class TrialKey:
     """A key for trying.
 
-    Parameters
-    ----------
-    key : with its certificate, as a PKCS#12 file.
-    certificate : alone, PEM.
-    until : last day that it is valid.
+    ``key`` with its certificate, as a PKCS#12 file; ``certificate`` alone, PEM; ``until`` last day that it is valid.
     """
 
     key: bytes
@@ -209,18 +162,7 @@ class TrialKey:
 
 
 def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
-    """A new key for trying, with a certificate that it signs itself and that says so.
-
-    Parameters
-    ----------
-    name : of whom it is for.
-    passphrase : that is to open it.
-    at : when its certificate begins to be valid.
-
-    Raises
-    ------
-    CmmUqError : the name is empty or too long, or the passphrase is empty.
-    """
+    """A new key for trying, with a certificate that it signs itself and that says so."""
     if not 0 < len(name.strip()) <= LONGEST_NAME:
         raise CmmUqError(
             f"a name has 1 to {LONGEST_NAME} characters", where="--name", fix="Name the laboratory or person"

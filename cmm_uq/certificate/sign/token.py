@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 SCHEME = "pkcs11:"
 KNOWN = ("token", "object", "module-path")
-
 _EXAMPLE = f"{SCHEME}token=LABORATORY;object=KEY?module-path=/usr/lib/libsofthsm2.so"
 
 
@@ -26,11 +25,7 @@ _EXAMPLE = f"{SCHEME}token=LABORATORY;object=KEY?module-path=/usr/lib/libsofthsm
 class Place:
     """Where a key is.
 
-    Parameters
-    ----------
-    module : library of the token's maker.
-    token : label of the token.
-    key : label of the key and its certificate.
+    ``module`` library of the token's maker; ``token`` label of the token; ``key`` label of the key and its certificate.
     """
 
     module: str
@@ -39,16 +34,7 @@ class Place:
 
 
 def place_of(uri: str) -> Place:
-    """Where a URI leads.
-
-    Parameters
-    ----------
-    uri : ``pkcs11:token=LABEL;object=LABEL?module-path=FILE``; the PIN never stands in it.
-
-    Raises
-    ------
-    CmmUqError : a part of it is missing or unknown, or it holds a PIN.
-    """
+    """Where a URI leads."""
     path, _, query = uri.removeprefix(SCHEME).partition("?")
     pairs = [*parse_qsl(path.replace(";", "&")), *parse_qsl(query)]
     parts = {name: unquote(value) for name, value in pairs}
@@ -65,17 +51,7 @@ def place_of(uri: str) -> Place:
 
 
 def signer_of_token(uri: str, pin: str) -> Signer:
-    """The key on a token.
-
-    Parameters
-    ----------
-    uri : see :func:`place_of`.
-    pin : that opens the token.
-
-    Raises
-    ------
-    CmmUqError : there is no such module, token, key or certificate, or the PIN is another.
-    """
+    """The key on a token."""
     with installed():
         from cryptography.x509 import load_der_x509_certificate
         from pkcs11 import Attribute, KeyType, ObjectClass
@@ -115,12 +91,7 @@ class _Token:
 
     @contextlib.contextmanager
     def opened(self) -> Iterator[Any]:
-        """A session; whatever goes wrong in it in one line.
-
-        Raises
-        ------
-        CmmUqError : there is no such module, token or key, or the PIN is another.
-        """
+        """A session; whatever goes wrong in it in one line."""
         import pkcs11
         from pkcs11 import exceptions
 

@@ -29,17 +29,7 @@ SIGNATURE = f"{DS}Signature"
 
 
 def root_of(data: bytes, where: str) -> _Element:
-    """The root of an XML file.
-
-    Parameters
-    ----------
-    data : the file.
-    where : its name, for messages.
-
-    Raises
-    ------
-    CmmUqError : it is no XML, declares a document type, or is too large.
-    """
+    """The root of an XML file."""
     with installed():
         from lxml import etree
     if len(data) > SIGNED_BYTES.most:
@@ -64,25 +54,11 @@ def _typed(where: str) -> CmmUqError:
 
 COMMENT = say("the file has a comment, which no signature covers")
 INSTRUCTION = say("the file has a processing instruction, which no signature covers")
-
-_LETTERS = 16
-"""Of a name that is taken from the file's hash, so that no other element has it."""
+_LETTERS = 16  # of a name that is taken from the file's hash, so that no other element has it
 
 
 def sign_xml(xml: bytes, signer: Signer, *, at: dt.datetime, where: str = "the XML file") -> bytes:
-    """An XML file with a signature.
-
-    Parameters
-    ----------
-    xml : the file; a signature would cover no other beside it, so that it must have none.
-    signer : who signs.
-    at : time of signing, with its zone.
-    where : its name, for messages.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read, is signed already, has what no signature covers, or the key must not sign at this time.
-    """
+    """An XML file with a signature."""
     signer.check(at)
     root = root_of(xml, where)
     if next(root.iter(SIGNATURE), None) is not None:
@@ -157,7 +133,6 @@ METHODS = frozenset(f"http://www.w3.org/2001/04/xmldsig-more#{key}-sha{bits}" fo
 LEVEL = "XAdES B-B"
 QUALIFYING = f"{DS}Object/{XADES}QualifyingProperties"
 PROPERTIES = f"{QUALIFYING}/{XADES}SignedProperties"
-
 OF_ANOTHER = say("the signed properties are not those of this signature")
 NO_XADES = say("the signature has no signed properties, as XAdES asks for")
 ELSEWHERE = say("the signature does not stand as the last element of the root")
@@ -169,18 +144,7 @@ SEVERAL = say("the file has several signatures, and one covers the other")
 
 
 def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file") -> tuple[Signature, ...]:
-    """Every signature in an XML file.
-
-    Parameters
-    ----------
-    data : the file.
-    trust : whom one trusts.
-    where : its name, for messages.
-
-    Raises
-    ------
-    CmmUqError : it cannot be read as XML.
-    """
+    """Every signature in an XML file."""
     root = root_of(data, where)
     elements = list(root.iter(SIGNATURE))
     return tuple(_found(data, element, several=len(elements) > 1, trust=trust) for element in elements)

@@ -26,24 +26,18 @@ _OTHER_KERNELS = 0.5
 _OF_ONE = ("sampling", "diagnosis", "budget", "correlation", "unseen", "decision")
 """Parts whose figures are compared with one and not with themselves: shares, probabilities, statistics of a sampler."""
 
-FEWEST_OF_A_PART = 4000
-"""Draws behind a share of a part's variance, or behind what another way of measuring would give."""
-
-_ERRORS = 6.0
-"""Standard errors of a Monte Carlo that two of it may differ by, beyond which one figure in 10⁸ lies."""
+FEWEST_OF_A_PART = 4000  # draws behind a share of a part's variance, or behind what another way of measuring would give
+_ERRORS = 6.0  # standard errors of a Monte Carlo that two of it may differ by, beyond which one figure in 10⁸ lies
 
 
 @dataclass(frozen=True)
 class Again:
     """What was computed again.
 
-    Parameters
-    ----------
-    files : whatever the command writes, by name, with ``results.json``; without the PDF.
-    pdf : the PDF, with the files attached that the given one has; ``None`` where it cannot be set by the same program.
-    why_no_pdf : that is so.
-    kept : files that say on what platform they were made, and are otherwise what the inputs give.
-    beside : names of files that lie beside the documents and are not inside the PDF.
+    ``files`` whatever the command writes, by name, with ``results.json``; without the PDF; ``pdf`` the PDF, with the
+    files attached that the given one has; ``None`` where it cannot be set by the same program; ``why_no_pdf`` that is
+    so; ``kept`` files that say on what platform they were made, and are otherwise what the inputs give; ``beside``
+    names of files that lie beside the documents and are not inside the PDF.
     """
 
     files: Mapping[str, bytes]
@@ -53,18 +47,11 @@ class Again:
     beside: tuple[str, ...] = ()
 
 
-Difference = tuple[str, Any, Any]
-"""JSON path, what stands there, and what it should be."""
+Difference = tuple[str, Any, Any]  # JSON path, what stands there, and what it should be
 
 
 def compare_again(inquiry: Inquiry, given: Given, again: Again) -> bool:
-    """Keep every difference of a certificate by this version of the package; whether its documents are the same to the byte.
-
-    Parameters
-    ----------
-    given : to be verified.
-    again : made of its inputs.
-    """
+    """Keep every difference of a certificate by this version of the package; whether documents are the same to the byte."""
     if given.results is None:
         return False
     name, data, content = given.results

@@ -56,13 +56,7 @@ _NAMED: Mapping[str, Any] = {
 
 
 def check_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every decision that does not follow.
-
-    Parameters
-    ----------
-    data : of results.json.
-    file : its name.
-    """
+    """Keep every decision that does not follow."""
     for i, entry in enumerate(data.get("conformity") or ()):
         path = f"conformity[{i}]"
         try:
@@ -227,12 +221,10 @@ DRAWN = 0.03
 """Relative difference of u from that of the draws by which was decided: six standard errors of 100 000 normal draws are a
 hundredth, and errors with heavier tails scatter more."""
 
-_TOGETHER = 0.02
-"""By how much a probability of draws may be off those whose tails are smoothed."""
+_TOGETHER = 0.02  # by how much a probability of draws may be off those whose tails are smoothed
 
 
-Ends = tuple[float | None, float | None]
-"""Smallest and largest value that a rule accepts."""
+Ends = tuple[float | None, float | None]  # smallest and largest value that a rule accepts
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,13 +245,7 @@ class _Stated(Limits):
 
 
 def check_part_decisions(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every decision that does not follow.
-
-    Parameters
-    ----------
-    data : of results.json.
-    file : its name.
-    """
+    """Keep every decision that does not follow."""
     rule, prior = rule_of(data["decision"]["rule"]), data["decision"]["prior"]
     outcomes, chances = [], []
     for i, one in enumerate(data["characteristics"]):

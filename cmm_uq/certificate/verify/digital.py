@@ -18,18 +18,11 @@ if TYPE_CHECKING:
 
 _SIGNATURE = "Signature"
 _MOST = 12
-
-Difference = tuple[str, str, str]
-"""XPath, what stands there, what should."""
+Difference = tuple[str, str, str]  # XPath, what stands there, what should
 
 
 def open_digital(inquiry: Inquiry, given: Given) -> None:
-    """Take the certificate out of the PDF where it is not given by itself, and the page out of it; keep where these differ.
-
-    Raises
-    ------
-    CmmUqError : it is no DCC, or hostile.
-    """
+    """Take the certificate out of the PDF where it is not given by itself, and the page out of it; keep where these differ."""
     from cmm_uq.jobs.dcc import read
 
     attached = _attached(given)
@@ -65,12 +58,7 @@ def _attached(given: Given) -> Attachment | None:
 
 
 def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
-    """Keep every element that results.json and the job do not give; of this version of the package.
-
-    Parameters
-    ----------
-    job : of the inputs.
-    """
+    """Keep every element that results.json and the job do not give; of this version of the package."""
     if given.xml is None or given.results is None:
         return
     import json
@@ -88,16 +76,7 @@ def check_digital(inquiry: Inquiry, given: Given, job: Job) -> None:
 
 
 def check_schema(inquiry: Inquiry, given: Given, folder: Path) -> None:
-    """Keep what the schema of PTB refuses.
-
-    Parameters
-    ----------
-    folder : with the schemas.
-
-    Raises
-    ------
-    CmmUqError : there is no digital certificate, no schema of its version there, or what reads schemas is not installed.
-    """
+    """Keep what the schema of PTB refuses."""
     from cmm_uq.jobs.dcc.schema import checked_by_schema
 
     if given.xml is None:

@@ -19,12 +19,8 @@ from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.jobs.part.characteristic import ASKS
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
 
-QUANTITY = frozenset({"value", "u", "interval95", "U", "k"})
-"""Keys of a quantity."""
-
-_DIGITS = 2e-9
-"""Of numbers of ten digits: what a difference of two of them may be off, of the larger."""
-
+QUANTITY = frozenset({"value", "u", "interval95", "U", "k"})  # keys of a quantity
+_DIGITS = 2e-9  # of numbers of ten digits: what a difference of two of them may be off, of the larger
 _ROOT = 1e-8
 
 
@@ -42,13 +38,7 @@ def quantities(data: Any, path: str = "") -> Iterator[tuple[str, Mapping[str, An
 
 
 def check_figures(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every figure that another one contradicts.
-
-    Parameters
-    ----------
-    data : of results.json.
-    file : its name.
-    """
+    """Keep every figure that another one contradicts."""
     for path, one in quantities(data):
         inquiry.looked("figures")
         try:
@@ -182,12 +172,10 @@ def _check_sampling(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> Non
     inquiry.looked("figures")
 
 
-DIGITS = 2e-9
-"""Of numbers of ten digits: what a difference of two of them may be off, of the larger."""
+DIGITS = 2e-9  # of numbers of ten digits: what a difference of two of them may be off, of the larger
 
 
-Wrong = tuple[str, str, object, object]
-"""Key, problem, what stands there, what should."""
+Wrong = tuple[str, str, object, object]  # key, problem, what stands there, what should
 
 
 def is_zone(one: Mapping[str, Any]) -> bool:
@@ -196,13 +184,7 @@ def is_zone(one: Mapping[str, Any]) -> bool:
 
 
 def check_part_figures(inquiry: Inquiry, data: Mapping[str, Any], file: str) -> None:
-    """Keep every figure that another one contradicts.
-
-    Parameters
-    ----------
-    data : of results.json.
-    file : its name.
-    """
+    """Keep every figure that another one contradicts."""
     causes = [one["cause"] for one in data["budget"]["causes"]] + [one["factor"] for one in data["budget"]["factors"]]
     for i, one in enumerate(data["characteristics"]):
         inquiry.looked("figures", 6)

@@ -10,22 +10,16 @@ from typing import Any, Literal
 from cmm_uq.base.errors import CmmUqError
 
 Word = Literal["VERIFIED", "NOT VERIFIED", "NOT WHOLLY CHECKED"]
-
-LONGEST = 160
-"""Characters of what stands somewhere, as it is shown."""
+LONGEST = 160  # characters of what stands somewhere, as it is shown
 
 
 @dataclass(frozen=True)
 class Finding:
     """Something that is not as it must be.
 
-    Parameters
-    ----------
-    check : that found it, one of :data:`CHECKS`.
-    file : that it is in.
-    place : in the file: page, JSON path, XPath, attachment, byte; empty where it is the file as a whole.
-    problem : in words.
-    stands, should : what stands there, and what should; empty where the words say it.
+    ``check`` that found it, one of :data:`CHECKS`; ``file`` that it is in; ``place`` in the file: page, JSON path,
+    XPath, attachment, byte; empty where it is the file as a whole; ``problem`` in words; ``stands``, ``should`` what
+    stands there, and what should; empty where the words say it.
     """
 
     check: str
@@ -52,10 +46,7 @@ class Finding:
 class Unchecked:
     """Something that was not checked.
 
-    Parameters
-    ----------
-    what : it is.
-    why : not.
+    ``what`` it is; ``why`` not.
     """
 
     what: str
@@ -85,12 +76,8 @@ CHECKS = {
 class Inquiry:
     """A verification under way: what it has found so far.
 
-    Attributes
-    ----------
-    findings : what is wrong.
-    unchecked : what could not be looked at.
-    notes : what the reader must know besides.
-    done : how many things each check compared.
+    ``findings`` what is wrong; ``unchecked`` what could not be looked at; ``notes`` what the reader must know besides;
+    ``done`` how many things each check compared.
     """
 
     findings: list[Finding] = field(default_factory=list)

@@ -26,14 +26,7 @@ _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
 def strict_json(content: bytes, where: str) -> dict[str, Any]:
     """The object of a JSON file.
 
-    Parameters
-    ----------
-    content : the file's bytes.
-    where : of the file.
-
-    Raises
-    ------
-    CmmUqError : it is no JSON object, too large or too deep, has a key twice, or a number that is none.
+    ``content`` the file's bytes.
     """
     if len(content) > JSON_BYTES.most:
         raise CmmUqError(f"is larger than {JSON_BYTES.most} bytes", where=where, fix=_FIX)
@@ -93,7 +86,6 @@ def _refuse_depth(text: str, where: str) -> None:
 
 RESULTS, JOB = "results.json", "job.toml"
 RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"
-
 _FIX_of_given = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
 
 
@@ -101,13 +93,9 @@ _FIX_of_given = "Give files that cmm-uq report, diagnose or part wrote, or their
 class Given:
     """The forms of one certificate.
 
-    Attributes
-    ----------
-    pdf, html, xml, results : each with its name; ``None`` where it is not given. ``results`` may be the one inside the PDF.
-    digital_inside : whether the XML is the one inside the PDF.
-    page_inside : the page that the XML carries.
-    others : further files by name: inputs, draws of the posterior.
-    manifest : of a folder.
+    ``pdf``, ``html``, ``xml``, ``results`` each with its name; ``None`` where it is not given. ``results`` may be the
+    one inside the PDF; ``digital_inside`` whether the XML is the one inside the PDF; ``page_inside`` the page that the
+    XML carries; ``others`` further files by name: inputs, draws of the posterior; ``manifest`` of a folder.
     """
 
     pdf: tuple[str, PdfFile] | None = None
@@ -135,13 +123,7 @@ class Given:
 def read_given(paths: Iterable[Path]) -> Given:
     """Files and folders, read within limits.
 
-    Parameters
-    ----------
-    paths : of files, or of a report's folder.
-
-    Raises
-    ------
-    CmmUqError : one cannot be read, is nothing of a certificate, or there are two of a form.
+    ``paths`` of files, or of a report's folder.
     """
     read: dict[str, tuple[bytes, str]] = {}
     for name, path in _files(paths):
@@ -153,12 +135,7 @@ def read_given(paths: Iterable[Path]) -> Given:
 
 
 def given_of(files: Mapping[str, bytes]) -> Given:
-    """The same of files that were read already, by name, or by their path in a folder that holds one certificate.
-
-    Raises
-    ------
-    CmmUqError : see :func:`read_given`.
-    """
+    """The same of files that were read already, by name, or by their path in a folder that holds one certificate."""
     return _given({name.rpartition("/")[2]: (content, name) for name, content in files.items()})
 
 
@@ -311,12 +288,7 @@ def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
 
 
 def language_of(data: Mapping[str, Any]) -> Code:
-    """Language of the documents, as results.json names it; English where it names none.
-
-    Raises
-    ------
-    CmmUqError : documents know no such language.
-    """
+    """Language of the documents, as results.json names it; English where it names none."""
     language: Code = data["job"].get("language", ENGLISH)
     if language not in get_args(Code):
         raise CmmUqError(f"{language!r} is no language of documents", where=f"{RESULTS}: job.language")

@@ -18,7 +18,6 @@ from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.limits import HTML_BYTES, HTML_DEPTH
 
 _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
-
 _NAMES = {"id", "class", "role", "dir", "aria-labelledby", "aria-label", "aria-hidden"}
 ALLOWED: Mapping[str, frozenset[str]] = MappingProxyType({
     tag: frozenset(_NAMES | set(more.split())) for tag, more in {
@@ -60,16 +59,10 @@ class HtmlDecision:
 class HtmlPage:
     """What a page shows.
 
-    Attributes
-    ----------
-    text : all of it, in order.
-    title : of the window: title and number of the document.
-    banner : at the head of every page, if any.
-    language : of the text.
-    style : its style sheet.
-    tables, decisions : in order.
-    pictures : contents of pictures that are no drawings: the logo.
-    problems : what does not belong there, each with its place.
+    ``text`` all of it, in order; ``title`` of the window: title and number of the document; ``banner`` at the head of
+    every page, if any; ``language`` of the text; ``style`` its style sheet; ``tables``, ``decisions`` in order;
+    ``pictures`` contents of pictures that are no drawings: the logo; ``problems`` what does not belong there, each with
+    its place.
     """
 
     text: str = ""
@@ -85,12 +78,7 @@ class HtmlPage:
 
 
 def read_html(content: bytes, where: str) -> HtmlPage:
-    """What a certificate's HTML shows.
-
-    Raises
-    ------
-    CmmUqError : it is no text, too large, or nested too deeply.
-    """
+    """What a certificate's HTML shows."""
     if len(content) > HTML_BYTES.most:
         raise CmmUqError(f"is larger than {HTML_BYTES.most} bytes", where=where, fix=_FIX)
     reader = _Reader(where)

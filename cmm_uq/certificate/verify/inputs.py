@@ -149,9 +149,7 @@ _OF_THE_MACHINE = (
 """Of ``machine``, what its certificate says; what was verified of it depends on the version that did."""
 
 _SAME = 1e-9
-_NEAR_MM = 1e-7
-"""Features that are found by going on from a start agree so well on any processor."""
-
+_NEAR_MM = 1e-7  # features that are found by going on from a start agree so well on any processor
 Asked = tuple[str, object, object]
 
 
@@ -160,13 +158,7 @@ def check_part_job(
 ) -> None:
     """Keep what the job says otherwise: names, dates, what the drawing asks for, limits, rule, and measured values.
 
-    Parameters
-    ----------
-    job : of the inputs.
-    plan : of the job.
-    measured : (c,) values of the measured points, mm and rad; ``None`` where there are none.
-    data : of results.json.
-    file : its name.
+    ``measured`` (c,) values of the measured points, mm and rad; ``None`` where there are none.
     """
     facts, said = job.facts, data["job"]
     part, decision = data["part"], data["decision"]
@@ -206,14 +198,7 @@ def check_part_job(
 
 
 def check_standing(inquiry: Inquiry, standing: CertificateStatus, data: Mapping[str, Any], file: str) -> None:
-    """Keep what the machine's certificate says otherwise.
-
-    Parameters
-    ----------
-    standing : as the certificate inside has it.
-    data : of results.json.
-    file : its name.
-    """
+    """Keep what the machine's certificate says otherwise."""
     should, said = standing_data(standing), data["machine"]
     _compare(inquiry, [(f"machine.{key}", said[key], should[key]) for key in _OF_THE_MACHINE], file,
              "is not what the machine's certificate says")  # fmt: skip

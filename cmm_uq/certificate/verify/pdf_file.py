@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from pypdf import PdfReader
 
 _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
-SECONDS = 60.0
-"""Longest time that reading the text of a PDF may take."""
+SECONDS = 60.0  # longest time that reading the text of a PDF may take
 
 ACTIVE = frozenset({
     "/JavaScript", "/JS", "/Launch", "/OpenAction", "/AA", "/RichMedia", "/RichMediaContent", "/SubmitForm", "/ImportData",
@@ -34,9 +33,7 @@ ACTIVE = frozenset({
 })  # fmt: skip
 """Names, as keys or as values of a dictionary, of what acts or leads outside."""
 
-HIDING = frozenset({"/OCProperties", "/OCG", "/OCMD", "/OC"})
-"""The same of what may be shown or not."""
-
+HIDING = frozenset({"/OCProperties", "/OCG", "/OCMD", "/OC"})  # the same of what may be shown or not
 _END = re.compile(rb"startxref\s+(\d{1,12})\s+%%EOF(?:\r\n|\n|\r)?")
 _TRAILER = re.compile(rb"trailer\s*<<(?P<told>(?s:.{0,2000}?))>>\s*(?P<end>startxref)")
 _BEFORE = re.compile(rb"/Prev\s+(\d{1,12})")
@@ -49,11 +46,7 @@ _UNTOLD = frozenset({"/Type", "/Length", "/Filter"})
 class Attachment:
     """A file inside a PDF.
 
-    Parameters
-    ----------
-    name : of it.
-    content : its bytes.
-    relationship : to the document (ISO 19005-3): ``Source`` or ``Data``.
+    ``name`` of it; ``content`` its bytes; ``relationship`` to the document (ISO 19005-3): ``Source`` or ``Data``.
     """
 
     name: str
@@ -65,17 +58,10 @@ class Attachment:
 class PdfFile:
     """What a PDF holds.
 
-    Attributes
-    ----------
-    content : the file's bytes.
-    attachments : in the order of their names in the file.
-    information : title, dates and the like, as the file says.
-    xmp : the same as its metadata stream says.
-    language : of the text.
-    ends : bytes up to the end of each revision.
-    signatures : signature fields.
-    problems : what does not belong there, each with its place.
-    reader : of its pages.
+    ``content`` the file's bytes; ``attachments`` in the order of their names in the file; ``information`` title, dates
+    and the like, as the file says; ``xmp`` the same as its metadata stream says; ``language`` of the text; ``ends``
+    bytes up to the end of each revision; ``signatures`` signature fields; ``problems`` what does not belong there, each
+    with its place; ``reader`` of its pages.
     """
 
     content: bytes
@@ -91,12 +77,7 @@ class PdfFile:
 
     @cached_property
     def pages(self) -> list[str]:
-        """Text of each page, as a reader copies it; looked for when it is first asked for.
-
-        Raises
-        ------
-        CmmUqError : they are damaged, or beyond the limits.
-        """
+        """Text of each page, as a reader copies it; looked for when it is first asked for."""
         with reading(self.where):
             return list(_texts(self))
 
@@ -110,12 +91,7 @@ class PdfFile:
 
 
 def read_pdf(content: bytes, where: str) -> PdfFile:
-    """A certificate's PDF.
-
-    Raises
-    ------
-    CmmUqError : it is damaged, encrypted, or beyond the limits.
-    """
+    """A certificate's PDF."""
     if len(content) > PDF_BYTES.most:
         raise CmmUqError(f"is larger than {PDF_BYTES.most} bytes", where=where, fix=_FIX)
     found = PdfFile(content, where=where)

@@ -21,9 +21,7 @@ _OPENING = b"http://www.w3.org/2000/09/xmldsig#"
 def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> None:
     """Keep whatever is wrong with the signatures of a certificate.
 
-    Parameters
-    ----------
-    trust : whom the reader trusts; ``None`` where that was not said, and then nothing need be signed.
+    ``trust`` whom the reader trusts; ``None`` where that was not said, and then nothing need be signed.
     """
     if given.pdf is not None:
         name, pdf = given.pdf

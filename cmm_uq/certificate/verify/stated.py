@@ -37,19 +37,11 @@ GROUPS = ("accuracy_uncertainty", "estimates", "differences")
 
 _ONE_HILL = 1.6
 _NO_FACTOR = "–"
-
-Stated = tuple[str, str, str]
-"""Value, U and k as printed."""
+Stated = tuple[str, str, str]  # value, U and k as printed
 
 
 def check_stated(inquiry: Inquiry, data: Mapping[str, Any], page: HtmlPage, *, files: tuple[str, str]) -> None:
-    """Keep every quantity and every decision that a page states otherwise, or not at all.
-
-    Parameters
-    ----------
-    data : of results.json.
-    files : names of the page and of results.json.
-    """
+    """Keep every quantity and every decision that a page states otherwise, or not at all."""
     name, source = files
     known = set((data["job"].get("inputs_sha256") or {}).values())
     for picture in page.pictures:
@@ -239,14 +231,7 @@ class _One(PrintedFigures):
 
 
 def check_part_stated(inquiry: Inquiry, data: Mapping[str, Any], text: str, *, files: tuple[str, str]) -> None:
-    """Keep every result, limit and decision that a text states otherwise, or not in its place.
-
-    Parameters
-    ----------
-    data : of results.json.
-    text : of the page, or of all pages of a PDF.
-    files : names of the document and of results.json.
-    """
+    """Keep every result, limit and decision that a text states otherwise, or not in its place."""
     name, source = files
     language = data["job"].get("language", "en")
     whole, at = squashed(text), 0

@@ -22,23 +22,14 @@ from cmm_uq.certificate.verify.pdf_file import PdfFile, reading
 _NO_TEXT = re.compile(r"[\s\u00ad\u200b-\u200d\u2060\ufeff•—]+")
 """What a view may have and the other not: white space, marks where words break, signs of lists and about the end."""
 
-MISSING = "□"
-"""In place of a character that a PDF's fonts lack."""
-
-_ANCHOR = 24
-"""Characters by which the views are brought together again behind a difference."""
-
+MISSING = "□"  # in place of a character that a PDF's fonts lack
+_ANCHOR = 24  # characters by which the views are brought together again behind a difference
 _MOST_SHOWN = 20
 _CONTEXT = 24
 
 
 def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tuple[str, str]) -> None:
-    """Keep every difference between the text of a PDF and that of a page.
-
-    Parameters
-    ----------
-    files : names of the PDF and of the HTML.
-    """
+    """Keep every difference between the text of a PDF and that of a page."""
     name, beside = files
     banner = squashed(page.banner)
     whole, count = squashed(page.text).removeprefix(banner), 0
@@ -65,13 +56,7 @@ def compare_views(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, *, files: tupl
 
 
 def check_style(inquiry: Inquiry, page: HtmlPage, name: str) -> None:
-    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else.
-
-    Parameters
-    ----------
-    page : of this version of the package.
-    name : of its file.
-    """
+    """Keep a style sheet that is not the template's: it could hide what a page says, or say something else."""
     from cmm_uq.certificate.render.html import style_sheet
 
     inquiry.looked("files")
@@ -160,23 +145,14 @@ def _compare_information(inquiry: Inquiry, pdf: PdfFile, page: HtmlPage, name: s
     inquiry.looked("forms", 4)
 
 
-MOST = 8
-"""Differences that are told."""
-
+MOST = 8  # differences that are told
 _PAGE = re.compile(r"^/Root/Pages/Kids\[(\d+)\]")
 _NOT_STATED = frozenset({"/ID", "/Prev", "/Size", "/XRefStm", "/Length", "/Filter", "/Parent", "/DecodeParms"})
-
-Part = tuple[str, str, str]
-"""Path, what stands there, what should."""
+Part = tuple[str, str, str]  # path, what stands there, what should
 
 
 def differing_parts(stands: bytes, should: bytes) -> list[Part]:
-    """The first parts that differ; none where only the writing does.
-
-    Parameters
-    ----------
-    stands, should : two PDFs, of which the second is known to be whole and the first was read before.
-    """
+    """The first parts that differ; none where only the writing does."""
     from pypdf import PdfReader
 
     with reading("the PDF"):

@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.coverage.stated_doubt import held, recorded
 from cmm_uq.app.commands.report import analyse
-from cmm_uq.artefacts.ballbar.analysis import figures as bar_figures
+from cmm_uq.artefacts.ballbar.page import figures as bar_figures
 from cmm_uq.artefacts.gauge_lines.analysis import figures
 from cmm_uq.certificate.result import Result
 from cmm_uq.machine.model.certified_places import CALIBRATION

@@ -10,11 +10,10 @@ import pytest
 
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts.digitizer.analysis import DigitizerFigures, results
-from cmm_uq.artefacts.digitizer.attitudes import words
 from cmm_uq.artefacts.digitizer.observe import Digitizer
+from cmm_uq.artefacts.digitizer.page import DigitizerFigures, results
 from cmm_uq.artefacts.digitizer.plan import THREE as PLANNED
-from cmm_uq.artefacts.digitizer.plan import scan
+from cmm_uq.artefacts.digitizer.plan import scan, words
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.certificate.sections.first_page import summary

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cmm_uq.artefacts.distances.adjustment import turns
+from cmm_uq.artefacts.distances.lengths import turns
 from cmm_uq.machine.physics.kinematics import Chain
 
 ARCSEC = np.pi / 180 / 3600

@@ -8,8 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
-from cmm_uq.artefacts.distances.equations import PLACINGS, SOLUTIONS, missing_placings, solve_distances
-from cmm_uq.artefacts.distances.symmetric_systems import by_doolittle, by_jacobi, jacobi_eigenvalues
+from cmm_uq.artefacts.distances.equations import (
+    PLACINGS,
+    SOLUTIONS,
+    by_doolittle,
+    by_jacobi,
+    jacobi_eigenvalues,
+    missing_placings,
+    solve_distances,
+)
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, PPM

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.gauge_lines.lines import lines_of, periodic_part
+from cmm_uq.artefacts.gauge_lines.analysis import lines_of, periodic_part
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from tests.artefacts.constructions import indicated, step_gauge
 

@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.app.commands.report import analyse, outcome_of
 from cmm_uq.artefacts.shift_axis.analysis import ShiftResult
-from cmm_uq.artefacts.shift_axis.results import shift_results
+from cmm_uq.artefacts.shift_axis.page import shift_results
 from cmm_uq.certificate.document import Document, Plot
 from cmm_uq.certificate.results.plain import as_json
 from tests.artefacts.reading import number, tables

@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan, integrated, integrated_by_monte_carlo
-from cmm_uq.artefacts.shift_axis.shift_integration import (
+from cmm_uq.artefacts.shift_axis.integration import (
+    KnownSpan,
     Method,
     calibration_curve,
     estimated_shift,
+    integrated,
+    integrated_by_monte_carlo,
     local_sensitivity,
     with_known_length,
 )

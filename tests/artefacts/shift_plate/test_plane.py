@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from cmm_uq.artefacts.shift_axis.integration_uncertainty import KnownSpan
+from cmm_uq.artefacts.shift_axis.integration import KnownSpan
 from cmm_uq.artefacts.shift_plate.model import plane_model
 from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate
 from cmm_uq.artefacts.shift_plate.plane import PlaneEstimate, estimate_plane

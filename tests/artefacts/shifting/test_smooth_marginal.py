@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.artefacts.shifting.smooth_marginal import ByCoefficients, ByObservations, Marginal, marginal
+from cmm_uq.artefacts.shifting.smooth_function import ByCoefficients, ByObservations, Marginal, marginal
 
 RANDOM = np.random.default_rng(4)
 EVEN, ENDS, COLUMNS = (RANDOM.standard_normal((9, k)) for k in (4, 4, 2))
