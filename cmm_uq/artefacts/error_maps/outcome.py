@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from cmm_uq.artefacts.error_maps.analysis import MapsDiagnosed, diagnose_error_maps
 from cmm_uq.artefacts.error_maps.overview import told
-from cmm_uq.artefacts.error_maps.page import MapsDiagnosed, diagnose_error_maps, maps_document, maps_results
+from cmm_uq.artefacts.error_maps.page import maps_document, maps_results
 from cmm_uq.certificate.diagnosis.overview import summary_of
 from cmm_uq.certificate.outcome import Outcome, OwnAnalysis, Recipe
 from cmm_uq.certificate.plots.style import lettered_in

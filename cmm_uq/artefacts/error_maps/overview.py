@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from cmm_uq.artefacts.error_maps.analysis import MapsDiagnosed
 from cmm_uq.artefacts.error_maps.diagnosis import Difference, MapsDiagnosis
-from cmm_uq.artefacts.error_maps.page import MapsDiagnosed
 from cmm_uq.artefacts.error_maps.words import VERDICTS, difference_words, next_words, noise_words
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, lines, plural, say, semicolons, signed
 from cmm_uq.certificate.diagnosis.overview import STANDING, gained, share_of
