@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.diagnosis.diagnosis import diagnose
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 
 TRAVEL = np.array([[0.0, 1200.0], [0.0, 900.0], [-700.0, 0.0]])
 LENGTH, BARS, NOISE_UM, SEED = 500.0, 60, 1.0, 2026
@@ -106,7 +106,7 @@ def case(seed: int, *, of_gauge: bool = False) -> tuple[list[str], list[tuple[st
         if of_gauge
         else artefact_facts(kind="ballbar", length_mm=LENGTH, u_um=0.5)
     )
-    found = diagnose(MeasurementModel(artefact_of(facts, points), ()), stated_um=None, alpha=0.01, seed=0)
+    found = diagnose(RecordingModel(artefact_of(facts, points), ()), stated_um=None, alpha=0.01, seed=0)
     return hidden, [(item.effect, item.probability) for item in found.effects], found.verdict
 
 

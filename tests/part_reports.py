@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.analysis.parts.ways import Way, spread
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.documents import contents_of
@@ -78,7 +78,9 @@ def pages_once(file: PdfFile) -> list[str]:
     return _TEXTS[key]
 
 
-def unchanged(plan: Plan, given: Circumstances, draws: int, seed: int, *, planned: Virtual, **_: object) -> list[Way]:
+def unchanged(
+    plan: Plan, given: MeasurementConditions, draws: int, seed: int, *, planned: Virtual, **_: object
+) -> list[Way]:
     """The measurement as planned alone, for tests that are not about what would change its uncertainty."""
     return [Way(say("as planned"), spread(planned, draws, seed), draws)]
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.geometry.association import Association
@@ -37,47 +37,47 @@ def ring(centre: ArrayLike, radius: float, z: float, count: int, start: float = 
 
 def circle(
     name: str, centre: ArrayLike, radius: float, count: int = 8, *, hole: bool = True, **more: object
-) -> Feature:
+) -> PartFeature:
     points, out = ring(centre, radius, 0.0, count)
     nominal = Nominal(np.asarray(centre, dtype=np.float64), UP, 2 * radius)
-    return Feature(name, "circle", points, -out if hole else out, nominal=nominal, **{"stylus": "stylus", **more})  # type: ignore[arg-type]
+    return PartFeature(name, "circle", points, -out if hole else out, nominal=nominal, **{"stylus": "stylus", **more})  # type: ignore[arg-type]
 
 
 def bore(
     name: str, centre: ArrayLike, radius: float, depths: Sequence[float] = (-3.0, -12.0, -20.0), count: int = 8,
     *, hole: bool = True, stylus: str = "stylus",
-) -> Feature:  # fmt: skip
+) -> PartFeature:  # fmt: skip
     rings = [ring(centre, radius, z, count, 0.3 * k) for k, z in enumerate(depths)]
     points, out = np.vstack([r[0] for r in rings]), np.vstack([r[1] for r in rings])
     nominal = Nominal(np.asarray(centre, dtype=np.float64), UP, 2 * radius)
-    return Feature(name, "cylinder", points, -out if hole else out, stylus, nominal)
+    return PartFeature(name, "cylinder", points, -out if hole else out, stylus, nominal)
 
 
 def plane(
     name: str, normal: ArrayLike, origin: ArrayLike, sides: ArrayLike, counts: tuple[int, int] = (4, 4),
     *, stylus: str = "stylus", association: Association = "least_squares",
-) -> Feature:  # fmt: skip
+) -> PartFeature:  # fmt: skip
     """A grid on a rectangle from ``origin`` over two ``sides`` (2, 3), mm."""
     one, other = np.asarray(sides, dtype=np.float64)
     start = np.asarray(origin, dtype=np.float64)
     grid = [start + a * one + b * other for a in np.linspace(0, 1, counts[0]) for b in np.linspace(0, 1, counts[1])]
     out = np.asarray(normal, dtype=np.float64)
-    return Feature(
+    return PartFeature(
         name, "plane", np.array(grid), np.tile(out, (len(grid), 1)), stylus, Nominal(start, out), association
     )
 
 
-def ball(name: str, centre: ArrayLike, radius: float, toward: Floats) -> Feature:
+def ball(name: str, centre: ArrayLike, radius: float, toward: Floats) -> PartFeature:
     middle = np.asarray(centre, dtype=np.float64)
-    return Feature(name, "sphere", middle + radius * toward, toward, "stylus", Nominal(middle, None, 2 * radius))
+    return PartFeature(name, "sphere", middle + radius * toward, toward, "stylus", Nominal(middle, None, 2 * radius))
 
 
-def spot(name: str, place: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0), stylus: str = "stylus") -> Feature:
+def spot(name: str, place: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0), stylus: str = "stylus") -> PartFeature:
     at = np.asarray(place, dtype=np.float64)
-    return Feature(name, "point", at[None], np.asarray(normal, dtype=np.float64)[None], stylus, Nominal(at))
+    return PartFeature(name, "point", at[None], np.asarray(normal, dtype=np.float64)[None], stylus, Nominal(at))
 
 
-def block() -> tuple[tuple[Feature, ...], tuple[Characteristic, ...]]:
+def block() -> tuple[tuple[PartFeature, ...], tuple[PartCharacteristic, ...]]:
     """A plate of 200 × 100 mm with two bores: 100 points, ten characteristics of features alone."""
     features = (
         plane("A", UP, [0, 0, 0], [[200, 0, 0], [0, 100, 0]]),
@@ -89,14 +89,14 @@ def block() -> tuple[tuple[Feature, ...], tuple[Characteristic, ...]]:
     )
     abc = ("A", "B", "C")
     return features, (
-        Characteristic("d1", "size", ("h1",)),
-        Characteristic("d2", "size", ("h2",)),
-        Characteristic("apart", "distance", ("h1", "h2")),
-        Characteristic("x1", "x", ("h1",), abc),
-        Characteristic("y2", "y", ("h2",), abc),
-        Characteristic("position 1", "position", ("h1",), abc),
-        Characteristic("position 2", "position", ("h2",), abc),
-        Characteristic("length", "distance", ("C", "D")),
-        Characteristic("upright", "perpendicularity", ("h1",), ("A",)),
-        Characteristic("corner", "angle", ("B", "C")),
+        PartCharacteristic("d1", "size", ("h1",)),
+        PartCharacteristic("d2", "size", ("h2",)),
+        PartCharacteristic("apart", "distance", ("h1", "h2")),
+        PartCharacteristic("x1", "x", ("h1",), abc),
+        PartCharacteristic("y2", "y", ("h2",), abc),
+        PartCharacteristic("position 1", "position", ("h1",), abc),
+        PartCharacteristic("position 2", "position", ("h2",), abc),
+        PartCharacteristic("length", "distance", ("C", "D")),
+        PartCharacteristic("upright", "perpendicularity", ("h1",), ("A",)),
+        PartCharacteristic("corner", "angle", ("B", "C")),
     )

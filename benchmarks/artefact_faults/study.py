@@ -33,7 +33,7 @@ from benchmarks.artefact_faults.recordings import (
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 
 IN_PLANE = ("scale_x", "scale_y", "squareness_xy")
@@ -184,7 +184,7 @@ def diagnosed(cell: Cell, seed: int) -> Diagnosis:
     s = cell.made(random)
     points = columns_of(cell, s, recorded(random, s, cell.deviations(random, s), cell.machine, cell.size))
     facts = artefact_facts(**cell.facts)
-    model = MeasurementModel(artefact_of(facts, points), effects(cell.named))
+    model = RecordingModel(artefact_of(facts, points), effects(cell.named))
     return diagnose(model, stated_um=1.0, alpha=0.01, seed=0, observe=lambda some: artefact_of(facts, some))
 
 

@@ -14,7 +14,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.bryan.observe import Bryan
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 
 NAMES = ("scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx")
@@ -39,7 +39,7 @@ def swept(everywhere: bool) -> Points:
 def estimates(facts: ArtefactFacts, points: Points) -> tuple[Floats, Floats, Floats, Floats]:
     """Estimates and standard uncertainties, jointly and in two steps; without a certified length, scales about their mean."""
     bar = Bryan(facts, points)
-    joint = MeasurementModel(bar, effects(NAMES), SIGMA).estimate().least_squares
+    joint = RecordingModel(bar, effects(NAMES), SIGMA).estimate().least_squares
     two_steps, _ = bar.in_two_steps()
     about = np.eye(6)
     if facts.length_mm is None:
@@ -52,7 +52,7 @@ def estimates(facts: ArtefactFacts, points: Points) -> tuple[Floats, Floats, Flo
 def row(name: str, everywhere: bool, length: float | None) -> str:
     facts = artefact_facts(kind="bryan", length_mm=length)
     points = swept(everywhere)
-    truth_model = MeasurementModel(Bryan(artefact_facts(kind="bryan", length_mm=LENGTH), points), effects(NAMES))
+    truth_model = RecordingModel(Bryan(artefact_facts(kind="bryan", length_mm=LENGTH), points), effects(NAMES))
     about = np.eye(6)
     if length is None:
         about[:3, :3] -= 1 / 3

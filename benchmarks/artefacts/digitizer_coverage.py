@@ -16,12 +16,12 @@ import numpy as np
 from scipy import stats
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.digitizer.observe import Digitizer
+from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact
 from cmm_uq.artefacts.digitizer.plan import THREE, scan
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.digitizer import euler_313
 from cmm_uq.maths.inference.marginal import Marginal
@@ -51,7 +51,7 @@ def recording(times: int, radius: float) -> Points:
     return Points(np.vstack(xyz), numbers, np.concatenate(point), np.ones_like(numbers), Machine("bridge"), columns)
 
 
-def posterior(model: MeasurementModel, random: np.random.Generator, part: float = 1.0) -> Floats:
+def posterior(model: RecordingModel, random: np.random.Generator, part: float = 1.0) -> Floats:
     """Draws (N, 3) of the offset, by importance: sizes of the noise from their prior, ln σ about the residuals' scatter.
 
     ``part`` of the usual number of draws.
@@ -80,16 +80,16 @@ class Case:
     noise_um: float
     stated: bool
 
-    def draws(self, seed: int, part: float = 1.0) -> tuple[MeasurementModel, Floats]:
+    def draws(self, seed: int, part: float = 1.0) -> tuple[RecordingModel, Floats]:
         """A recording drawn anew, and the posterior draws (N, 3) of its offset."""
         random, sigma = np.random.default_rng(seed), self.noise_um * MICROMETRE
-        model = MeasurementModel(Digitizer(self.facts, self.points), ())
+        model = RecordingModel(DigitizerArtefact(self.facts, self.points), ())
         sizes = np.array([
             size.nominal if np.isinf(size.sd) else random.normal(size.nominal, size.sd) for size in model.artefact.sizes
         ])  # fmt: skip
         sizes[:3] = OFFSET
         drawn = self.points.at(model.simulate(np.zeros(0), sizes, Noise(coordinate=sigma), random))
-        made = replace(model, artefact=Digitizer(self.facts, drawn), sigma=sigma if self.stated else None)
+        made = replace(model, artefact=DigitizerArtefact(self.facts, drawn), sigma=sigma if self.stated else None)
         return made, posterior(made, random, part)
 
     def coverage(self, recordings: int, part: float = 1.0) -> tuple[Floats, Floats]:

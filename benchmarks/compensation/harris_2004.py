@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import differential_evolution, minimize
 
-from cmm_uq.machine.physics.compensation import Circumstances, Compensation
+from cmm_uq.machine.physics.compensation import Compensation, PointConditions
 from cmm_uq.machine.physics.digitizer import euler_313
 from cmm_uq.machine.physics.error_map import read_error_map
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
@@ -42,7 +42,7 @@ def bars(spheres: np.ndarray) -> np.ndarray:
 
 
 def errors(readings: np.ndarray, tip: np.ndarray | None = None) -> tuple[np.ndarray, int]:
-    when = Circumstances(tip=None if tip is None else tip.reshape(-1, 3))
+    when = PointConditions(tip=None if tip is None else tip.reshape(-1, 3))
     e, outside = Compensation(MAPS, beyond="extrapolate").error(readings.reshape(-1, 3), when)
     return e.reshape(20, 2, 3), int(outside.sum())
 

@@ -33,11 +33,9 @@ from benchmarks.drift.policies import (
 )
 from cmm_uq import __version__
 from cmm_uq.laboratory.due.crossing import DAYS, Crossings, crossings
-from cmm_uq.laboratory.due.drift import DriftHistory as History
-from cmm_uq.laboratory.due.drift import default_prior, side_by_side
+from cmm_uq.laboratory.due.drift import DriftHistory as History, default_prior, side_by_side
 from cmm_uq.laboratory.due.drift_filter import filtered
-from cmm_uq.laboratory.due.fleet import Fleet, belonging, fit_fleet
-from cmm_uq.laboratory.due.fleet import FleetMember as Member
+from cmm_uq.laboratory.due.fleet import Fleet, FleetMember as Member, belonging, fit_fleet
 
 HERE = Path(__file__).parent
 SEAL, RESULT = HERE / "seal.json", HERE / "result.json"

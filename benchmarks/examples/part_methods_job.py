@@ -34,10 +34,10 @@ from cmm_uq.analysis.parts.causes.surroundings import TEMPERATURE
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.methods.of_job import methods_of
 from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import forms_of, plan_of, surroundings_of
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.part.job import PartJob, part_of
@@ -157,7 +157,7 @@ class Bench:
         """(n, 3) points of each, in the frame of the part."""
         names = {one.name for one in plan.features}
         rough = tuple(replace(one, field_um=0.0) for one in forms_of(self.job) if one.feature in names)
-        at = AtPose(plan, Circumstances(state(), (pose,), surroundings_of(self.job), rough), pose)
+        at = AtPose(plan, MeasurementConditions(state(), (pose,), surroundings_of(self.job), rough), pose)
         once, found = at.drawn(self.random, 1), []
         for _ in range(repeats):
             drawn = at.drawn(self.random, 1)
@@ -181,15 +181,15 @@ def standards(plan: Plan) -> tuple[Plan, Plan]:
     """A length along the plate's own, between faces that are met from one side, and a ring in the plate's middle."""
     faces = [MIDDLE_MM + x * np.array([1.0, 0.0, 0.0]) for x in (-0.5 * BAR_MM, 0.5 * BAR_MM)]
     along = np.array([[1.0, 0.0, 0.0]])
-    bar = tuple(Feature(name, "point", at[None], along, "down", Nominal(at))
+    bar = tuple(PartFeature(name, "point", at[None], along, "down", Nominal(at))
                 for name, at in zip("ab", faces, strict=True))  # fmt: skip
     angles = 2 * np.pi * np.arange(24) / 24
     out = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(24)])
     nominal = Nominal(MIDDLE_MM, np.array([0.0, 0.0, 1.0]), RING_MM)
-    ring = Feature("ring", "circle", MIDDLE_MM + 0.5 * RING_MM * out, -out, "down", nominal)
+    ring = PartFeature("ring", "circle", MIDDLE_MM + 0.5 * RING_MM * out, -out, "down", nominal)
     return (
-        Plan(bar, (Characteristic("bar", "distance", ("a", "b")),), plan.styli),
-        Plan((ring,), (Characteristic("ring", "size", ("ring",)),), plan.styli),
+        Plan(bar, (PartCharacteristic("bar", "distance", ("a", "b")),), plan.styli),
+        Plan((ring,), (PartCharacteristic("ring", "size", ("ring",)),), plan.styli),
     )
 
 

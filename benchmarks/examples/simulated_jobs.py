@@ -20,7 +20,7 @@ from cmm_uq.artefacts.digitizer.plan import THREE, scan
 from cmm_uq.artefacts.triangle.observe import placed_triangle
 from cmm_uq.artefacts.triangle.standard import TriangleStandard
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Size
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.digitizer import euler_313
@@ -270,7 +270,7 @@ def write(example: Simulated, folder: Path) -> None:
     for name, truth in (("recording.csv", example.truth), ("earlier.csv", example.before)):
         if truth is None:
             continue
-        model = MeasurementModel(artefact, effects(list(truth)))
+        model = RecordingModel(artefact, effects(list(truth)))
         xyz = model.simulate(_coefficients(truth), sizes, Noise(coordinate=example.noise_um * 1e-3), random)
         (place / name).write_text(_csv(example, xyz), encoding="utf-8", newline="\n")
     (place / "job.toml").write_text(_toml(example), encoding="utf-8", newline="\n")

@@ -22,9 +22,9 @@ from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_pos
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan, Stylus
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.artefacts.ballbar.observe import Ballbar
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.drawn_noise import Noise
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
@@ -47,7 +47,7 @@ def main(machines: int, *, free: bool = False) -> None:
     facts = job.facts.artefact
     if free:
         facts = facts.model_copy(update={"length_mm": None, "u_um": None})
-    designed = MeasurementModel(Ballbar(facts, bars), tuple(e for e in every if not e.columns))
+    designed = RecordingModel(Ballbar(facts, bars), tuple(e for e in every if not e.columns))
     used = np.array([not effect.columns for effect in every for _ in effect.coefficients])
     features, characteristics = block()
     tip = Stylus("stylus", np.array([0.0, 0, -80.0]), 4.0, qualified_at_mm=np.array([100.0, 100, -400]))
@@ -58,7 +58,7 @@ def main(machines: int, *, free: bool = False) -> None:
         length = designed.artefact.sizes[0]
         size = length.nominal + (0.0 if free else length.sd * random.standard_normal())
         xyz = designed.simulate(truth[used], np.array([size]), Noise(coordinate=SIGMA), random)
-        model = MeasurementModel(Ballbar(facts, bars.at(xyz)), named)
+        model = RecordingModel(Ballbar(facts, bars.at(xyz)), named)
         _, mean, covariance = joint_posterior(model, (), SIGMA)
         noise = StatedNoise(np.full(3, SIGMA))
         stated = MachineState(
@@ -66,12 +66,12 @@ def main(machines: int, *, free: bool = False) -> None:
         )
         pose = PartPose(np.eye(3), PLACES[random.integers(len(PLACES))] - bars.machine.origin_mm)
         real = MachineState(bars.machine, every, truth[None], noise, corrections=np.append(mean, np.zeros(len(sd) - 6)))
-        seen = AtPose(plan, Circumstances(real), pose)
+        seen = AtPose(plan, MeasurementConditions(real), pose)
         error = seen.errors(seen.drawn(random, 1), exact=True)[0]
         apart = replace(stated, unmodelled=unmodelled)
         states = {"a": stated, "b": apart, "c": given_recording(apart, model, SIGMA, 4000)}
         for name, state in states.items():
-            at = AtPose(plan, Circumstances(state), pose)
+            at = AtPose(plan, MeasurementConditions(state), pose)
             drawn = at.errors(at.drawn(random, DRAWS))
             low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
             inside[name].append((low <= error) & (error <= high))

@@ -20,10 +20,10 @@ import cmm_uq
 from benchmarks.examples.part_iota import COPY, FOLDER, MACHINE, ROOT, chosen, ends
 from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_posterior
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.artefacts.ballbar.observe import Ballbar
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.parts_drawn import spot
 
@@ -76,7 +76,7 @@ def left_out() -> dict[str, np.ndarray]:
     found: dict[str, list[tuple[float, float]]] = {"modelled alone": [], "given the recording": []}
     for left in sorted(set(points.measurement.tolist()) - {COPY}):
         kept = points.select((points.measurement != left) & (points.measurement != COPY))
-        model = MeasurementModel(Ballbar(job.facts.artefact, kept), named)
+        model = RecordingModel(Ballbar(job.facts.artefact, kept), named)
         _, mean, covariance = joint_posterior(model, (), SIGMA)
         draws, noise = random.multivariate_normal(mean, covariance, 4000), StatedNoise(np.full(3, SIGMA))
         unmodelled = unmodelled_errors([effect.name for effect in named], {})
@@ -84,10 +84,12 @@ def left_out() -> dict[str, np.ndarray]:
         certificate = MachineState(points.machine, named, draws, noise, corrected=False, unmodelled=unmodelled)
         rows = np.flatnonzero(points.measurement == left)
         one, other = compensated.points.xyz[rows]
-        plan = Plan((spot("one", one), spot("other", other)), (Characteristic("length", "distance", ("one", "other")),))
+        plan = Plan(
+            (spot("one", one), spot("other", other)), (PartCharacteristic("length", "distance", ("one", "other")),)
+        )
         seen = float(np.linalg.norm(points.xyz[rows[1]] - points.xyz[rows[0]]) - np.linalg.norm(other - one))
         for name, state in zip(found, (alone, given_recording(certificate, model)), strict=True):
-            simulated = Virtual(plan, Circumstances(state)).simulated(10_000)
+            simulated = Virtual(plan, MeasurementConditions(state)).simulated(10_000)
             found[name].append((seen - float(simulated.value[0]), float(simulated.u[0])))
     return {name: np.array(pairs) for name, pairs in found.items()}
 

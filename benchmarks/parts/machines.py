@@ -31,11 +31,11 @@ from cmm_uq.analysis.parts.machine.conditional import given_recording, joint_pos
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, unmodelled_errors
 from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.result import evaluated, stated
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.jobs.tables.artefact import ArtefactFacts, ReferencedFacts
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
@@ -148,7 +148,7 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
     unmodelled = tuple(one for one in UNMODELLED if made.periods or not one.effect.name.startswith("periodic"))
     sigma = 1e-3 * float(np.exp(random.uniform(*np.log([0.7, 2.0]))))
     offset = sigma * float(random.uniform(0.5, 2.0)) if cell.noise == "set-up" else 0.0
-    model = MeasurementModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
+    model = RecordingModel(calibrated(cell, hidden, sigma, offset, random), NAMED)
     given = sigma if cell.noise == "stated" else None
     _, mean, _ = joint_posterior(model, (), sigma)
     certificate = MachineState(MACHINE, NAMED, mean[None], StatedNoise(np.full(3, sigma)), unmodelled=unmodelled,
@@ -167,7 +167,7 @@ def _measured(cell: Cell, random: np.random.Generator, made: Made) -> dict[str, 
     normals = np.concatenate([normal for _, normal in truth.nominal_part().values()])
     points = measuring.measured(joined(part), normals, random)
     true = truth.characteristics(part)
-    how = Circumstances(state, (pose,), Surroundings(PART), measured=points)
+    how = MeasurementConditions(state, (pose,), Surroundings(PART), measured=points)
     virtual = Virtual(plan(), how, dict(_nominal()), PILOT)
     errors = virtual.errors(random, TRIALS)
     simulated = from_source(Source(virtual.names, lambda _, n: np.ascontiguousarray(errors[:n].T)), TRIALS)

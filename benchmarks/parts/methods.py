@@ -35,9 +35,9 @@ from cmm_uq.analysis.parts.methods.method import (
 )
 from cmm_uq.analysis.parts.methods.of_job import sensitivities
 from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Characteristic, Plan, Stylus
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan, Stylus
 from cmm_uq.analysis.parts.result import evaluated
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import Floats, Machine
 from tests.parts_drawn import block, circle, spot
 
@@ -72,7 +72,7 @@ class Bench:
     def __init__(self, plan: Plan, poses: Sequence[PartPose], state: MachineState) -> None:
         warm = Surroundings(Expansion(11.5e-6, u_temperature_k=0.05))
         self.plan = plan
-        self.places = [AtPose(plan, Circumstances(state, tuple(poses), warm), pose) for pose in poses]
+        self.places = [AtPose(plan, MeasurementConditions(state, tuple(poses), warm), pose) for pose in poses]
 
     def errors(self, truth: Floats, tips: Floats, random: np.random.Generator, place: int, repeats: int) -> Floats:
         """(machines, repeats, c) errors in one place: machine and tip stay, temperature too, readings do not."""
@@ -123,8 +123,10 @@ def _orientations(plan: Plan, values: Floats, turns: Sequence[Floats], state: Ma
     """(machines, c) whether the value is within U of the truth, and u."""
     poses = [_pose(turn) for turn in turns]
     bar = Plan((spot("a", [-100.0, 50, 0], X), spot("b", [BAR - 100, 50, 0], X)),
-               (Characteristic("bar", "distance", ("a", "b")),), (TIP,))  # fmt: skip
-    ring = Plan((circle("ring", [100.0, 50, 0], RING / 2, 24),), (Characteristic("ring", "size", ("ring",)),), (TIP,))
+               (PartCharacteristic("bar", "distance", ("a", "b")),), (TIP,))  # fmt: skip
+    ring = Plan(
+        (circle("ring", [100.0, 50, 0], RING / 2, 24),), (PartCharacteristic("ring", "size", ("ring",)),), (TIP,)
+    )
     of = np.repeat(np.arange(ORIENTATIONS), REPEATS)
 
     def read(one: Plan) -> Floats:
@@ -170,7 +172,7 @@ def _calibrated(plan: Plan, values: Floats, beside: float, state: MachineState, 
     return held, u
 
 
-def _print(title: str, characteristics: Sequence[Characteristic], held: Floats, u: Floats) -> None:
+def _print(title: str, characteristics: Sequence[PartCharacteristic], held: Floats, u: Floats) -> None:
     print(f"\n{title}\n{'characteristic':14s}   holds   median u")
     for i, one in enumerate(characteristics):
         unit, name = (1e3, "µm") if one.what != "angle" else (1e6, "µrad")

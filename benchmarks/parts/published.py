@@ -11,8 +11,8 @@ import numpy as np
 
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.maths.geometry import fit_circle
 
@@ -66,11 +66,11 @@ def polar() -> list[Figure]:
     state = MachineState(Machine("polar"), (), np.zeros((1, 0)), StatedNoise(noise))
     found = []
     for off, modulus, u in ((0.001, 0.0126, 0.0066), (0.010, 0.0155, 0.0078), (0.1, 0.1005, 0.0100)):
-        spot = Feature("p", "point", np.zeros((1, 3)), up, "stylus", Nominal(np.zeros(3)))
-        plan = Plan((spot, *_frame(around)), (Characteristic("p", "position", ("p",), ("A", "B", "C")),))
+        spot = PartFeature("p", "point", np.zeros((1, 3)), up, "stylus", Nominal(np.zeros(3)))
+        plan = Plan((spot, *_frame(around)), (PartCharacteristic("p", "position", ("p",), ("A", "B", "C")),))
         measured = plan.points.copy()
         measured[plan.rows["p"], 0] = off
-        at = AtPose(plan, Circumstances(state, measured=measured), PartPose())
+        at = AtPose(plan, MeasurementConditions(state, measured=measured), PartPose())
         drawn = at.drawn(np.random.default_rng(9), TRIALS)
         values = 0.5 * at.read(drawn, exact=True)[:, 0]  # half of a position is the modulus
         where = "JCGM 102:2011, 9.3.2, r = 0"
@@ -81,14 +81,16 @@ def polar() -> list[Figure]:
     return found
 
 
-def _frame(around: Floats) -> list[Feature]:
+def _frame(around: Floats) -> list[PartFeature]:
     """Three planes through the origin, of four points so far out that their noise does not turn them."""
     found = []
     for name, axis in (("A", 2), ("B", 1), ("C", 0)):
         points = np.roll(around, axis - 2, axis=1)
         normal = np.eye(3)[axis]
         found.append(
-            Feature(name, "plane", points, np.tile(normal, (len(points), 1)), "stylus", Nominal(np.zeros(3), normal))
+            PartFeature(
+                name, "plane", points, np.tile(normal, (len(points), 1)), "stylus", Nominal(np.zeros(3), normal)
+            )
         )
     return found
 
@@ -103,9 +105,10 @@ def arcs() -> list[Figure]:
         out = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
         nominal = Nominal(np.zeros(3), np.array([0.0, 0, 1]), 2 * radius)
         plan = Plan(
-            (Feature("c", "circle", radius * out, out, "stylus", nominal),), (Characteristic("c", "size", ("c",)),)
+            (PartFeature("c", "circle", radius * out, out, "stylus", nominal),),
+            (PartCharacteristic("c", "size", ("c",)),),
         )
-        at = AtPose(plan, Circumstances(state), PartPose())
+        at = AtPose(plan, MeasurementConditions(state), PartPose())
         u[degrees] = 0.5 * float(at.errors(at.drawn(np.random.default_rng(3), TRIALS // 4), exact=True).std())
     return [
         Figure("orders of magnitude of u of a circle by three points, 120° against 1° apart",

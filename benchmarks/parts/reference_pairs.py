@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.analysis.parts.evaluation import Evaluator, characteristics_of
-from cmm_uq.analysis.parts.plan import DIRECTED, FORMS, Characteristic, Feature, FeatureKind, Nominal, Plan
+from cmm_uq.analysis.parts.plan import DIRECTED, FORMS, FeatureKind, Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association
 from cmm_uq.maths.geometry.reference_sets import points_with_known_fit, points_with_known_zone
@@ -55,10 +55,10 @@ def pair(kind: FeatureKind, how: Association, seed: int, count: int = 40) -> dic
         leaned, moved = (leaned @ up) * up, moved - (moved @ up) * up
     lean = Rotation.from_rotvec(leaned).as_matrix() @ turn
     planned = where @ lean.T + shift + moved
-    feature = Feature("f", kind, planned, normals[:, 0] @ lean.T, "stylus", nominal)
-    asked = [Characteristic("form", FORM_OF[kind], ("f",), association=how)] if kind in FORM_OF else []
-    asked += [Characteristic("size", "size", ("f",), association=how)] if kind in SIZED else []
-    asked += [Characteristic("angle", "angle", ("f",), association=how)] if kind == "cone" else []
+    feature = PartFeature("f", kind, planned, normals[:, 0] @ lean.T, "stylus", nominal)
+    asked = [PartCharacteristic("form", FORM_OF[kind], ("f",), association=how)] if kind in FORM_OF else []
+    asked += [PartCharacteristic("size", "size", ("f",), association=how)] if kind in SIZED else []
+    asked += [PartCharacteristic("angle", "angle", ("f",), association=how)] if kind == "cone" else []
     plan = Plan((feature,), tuple(asked))
     found = dict(zip((one.name for one in asked), characteristics_of(plan, carried), strict=True))
     built = {"form": form, "size": 2 * RADIUS, "angle": 2 * HALF_ANGLE}

@@ -19,21 +19,21 @@ from scipy.optimize import least_squares
 
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.machine.state import StatedNoise, unmodelled_errors
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Plan, Stylus
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, Plan, Stylus
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.points import Floats
 from tests.parts_drawn import POSE, block, circle, machine, plane
 
 NAMES = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
 
 
-def circumstances() -> Circumstances:
+def circumstances() -> MeasurementConditions:
     draws = np.random.default_rng(1).standard_normal((10_000, 6)) * [3, 3, 3, 2, 2, 2]
     state = machine(
         NAMES, draws, unmodelled=unmodelled_errors(NAMES, {}), noise=StatedNoise(np.full(3, 1e-3), 5e-4, 5e-4)
     )
     part = Expansion(11.5e-6, 1e-6, 21.0, 0.3)
-    return Circumstances(state, (POSE,), Surroundings(part, u_gradient_k_per_m=np.full(3, 0.5)))
+    return MeasurementConditions(state, (POSE,), Surroundings(part, u_gradient_k_per_m=np.full(3, 0.5)))
 
 
 def styli() -> tuple[Stylus, ...]:
@@ -96,7 +96,7 @@ def by_scipy(plan: Plan, points: Floats) -> list[Floats]:
     return found
 
 
-def _start(feature: Feature) -> Floats:
+def _start(feature: PartFeature) -> Floats:
     x, y, _ = feature.nominal.point
     return np.array([x, y, 0.0, 0.0, 0.5 * (feature.nominal.diameter_mm or 0.0)])
 
@@ -140,8 +140,8 @@ def main() -> None:
         virtual.simulated(100_000)
     flat = Plan(
         (plane("A", [0, 0, 1], [0, 0, 0], [[200, 0, 0], [0, 100, 0]], (10, 10)), circle("c", [100, 50, 0], 20.0, 100)),
-        (Characteristic("flat", "flatness", ("A",), association="minimum_zone"),
-         Characteristic("round", "roundness", ("c",), association="minimum_zone")),
+        (PartCharacteristic("flat", "flatness", ("A",), association="minimum_zone"),
+         PartCharacteristic("round", "roundness", ("c",), association="minimum_zone")),
         styli(), times_s=3.0 * np.arange(200),
     )  # fmt: skip
     zones = Virtual(flat, circumstances())

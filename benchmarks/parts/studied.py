@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from benchmarks.parts import truth
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, FeatureKind, Nominal, Plan, Stylus
+from cmm_uq.analysis.parts.plan import FeatureKind, Nominal, PartCharacteristic, PartFeature, Plan, Stylus
 from cmm_uq.base.points import Floats, Machine, Points
 
 KINDS: Mapping[str, FeatureKind] = {
@@ -18,21 +18,21 @@ U_TIP_UM = 0.6
 _ABC = ("A", "B", "C")
 
 CHARACTERISTICS = (
-    Characteristic("d1", "size", ("h1",)),
-    Characteristic("d2", "size", ("h2",)),
-    Characteristic("ball", "size", ("S",)),
-    Characteristic("apart", "distance", ("h1", "h2")),
-    Characteristic("x1", "x", ("h1",), _ABC),
-    Characteristic("y2", "y", ("h2",), _ABC),
-    Characteristic("z ball", "z", ("S",), _ABC),
-    Characteristic("length", "distance", ("C", "D")),
-    Characteristic("upright", "perpendicularity", ("h1",), ("A",)),
-    Characteristic("corner", "angle", ("B", "C")),
-    Characteristic("parallel", "parallelism", ("D",), ("C",)),
-    Characteristic("flat", "flatness", ("A",)),
-    Characteristic("round", "cylindricity", ("h1",)),
-    Characteristic("position 1", "position", ("h1",), _ABC),
-    Characteristic("position 2", "position", ("h2",), _ABC),
+    PartCharacteristic("d1", "size", ("h1",)),
+    PartCharacteristic("d2", "size", ("h2",)),
+    PartCharacteristic("ball", "size", ("S",)),
+    PartCharacteristic("apart", "distance", ("h1", "h2")),
+    PartCharacteristic("x1", "x", ("h1",), _ABC),
+    PartCharacteristic("y2", "y", ("h2",), _ABC),
+    PartCharacteristic("z ball", "z", ("S",), _ABC),
+    PartCharacteristic("length", "distance", ("C", "D")),
+    PartCharacteristic("upright", "perpendicularity", ("h1",), ("A",)),
+    PartCharacteristic("corner", "angle", ("B", "C")),
+    PartCharacteristic("parallel", "parallelism", ("D",), ("C",)),
+    PartCharacteristic("flat", "flatness", ("A",)),
+    PartCharacteristic("round", "cylindricity", ("h1",)),
+    PartCharacteristic("position 1", "position", ("h1",), _ABC),
+    PartCharacteristic("position 2", "position", ("h2",), _ABC),
 )
 WORDS = {
     "d1": "diameter of a bore of 20 mm", "d2": "diameter of a bore of 30 mm", "ball": "diameter of a ball of 25 mm",
@@ -54,7 +54,7 @@ def plan() -> Plan:
             nominal = Nominal(np.array([*truth.CENTRES[name], 0.0]), np.array([0.0, 0, 1]), 2 * truth.RADII[name])
         else:
             nominal = Nominal(truth.BALL, None, 2 * truth.SPHERE_RADIUS)
-        features.append(Feature(name, kind, points, normals, "stylus", nominal))
+        features.append(PartFeature(name, kind, points, normals, "stylus", nominal))
     tip = Stylus("stylus", truth.TIP, 2 * truth.RADIUS, U_TIP_UM, qualified_at_mm=truth.SPHERE_AT)
     return Plan(tuple(features), CHARACTERISTICS, (tip,))
 

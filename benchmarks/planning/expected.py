@@ -16,7 +16,7 @@ from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.identifiability import identifiability
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 
 
@@ -30,7 +30,7 @@ def main() -> None:
         points = join(ready_plan(setting)[1])
         found = identifiability(setting.model(points)).parameters
         expected = np.array([p.u for p in found if p.unknown.key[0] != ARTEFACT])
-        acting = MeasurementModel(artefact_of(setting.artefact, points), setting.named)
+        acting = RecordingModel(artefact_of(setting.artefact, points), setting.named)
         random = np.random.default_rng(20260105)
         k = len(expected)
         estimates = np.empty((chosen.recordings, k))

@@ -28,7 +28,7 @@ from cmm_uq.analysis.planning.information import recording_information, set_up_i
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import CATALOGUE
 
 ALPHA = 0.01
@@ -59,7 +59,7 @@ def predicted(setting, placings, rivals):
 def searched(setting, points, effect, amplitude, seed):
     """Whether the test rejects, whether the effect alone is asserted, and whether what was found could be fitted."""
     random = np.random.default_rng(seed)
-    acting = MeasurementModel(artefact_of(setting.artefact, points), (effect,))
+    acting = RecordingModel(artefact_of(setting.artefact, points), (effect,))
     sizes = np.array([
         s.nominal + (s.sd if np.isfinite(s.sd) else 0.0) * random.standard_normal() for s in acting.artefact.sizes
     ])  # fmt: skip

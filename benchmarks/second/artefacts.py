@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.designs import Design, surroundings, unit
-from benchmarks.concealed.designs import ballbar as bars
+from benchmarks.concealed.designs import Design, ballbar as bars, surroundings, unit
 from benchmarks.concealed.physics import KNOWN, TRAVEL
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

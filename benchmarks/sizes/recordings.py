@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 
 TRAVEL = np.array([[0.0, 900.0], [0.0, 1200.0], [-600.0, 0.0]])
@@ -110,7 +110,7 @@ CASES: dict[str, Callable[[], Recorded]] = {
 def write(recorded: Recorded, folder: Path, seed: int = 1) -> Path:
     """A job folder, its recording drawn with a white noise of :data:`NOISE_UM`."""
     artefact = artefact_of(artefact_facts(**recorded.artefact), recorded.points)
-    model = MeasurementModel(artefact, effects(list(recorded.truth)))
+    model = RecordingModel(artefact, effects(list(recorded.truth)))
     sizes = np.array([size.nominal for size in artefact.sizes])
     coefficients = np.array(list(recorded.truth.values()))
     xyz = model.simulate(coefficients, sizes, Noise(NOISE_UM * 1e-3), np.random.default_rng(seed))

@@ -24,7 +24,7 @@ import numpy as np
 from scipy import special
 
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import (
     axis_variances,
     growing_lengths,
@@ -86,7 +86,7 @@ class Readings:
     sigma: float
 
     @classmethod
-    def of(cls, model: MeasurementModel) -> Readings:
+    def of(cls, model: RecordingModel) -> Readings:
         """Of a model's recording, without the time.
 
         Raises

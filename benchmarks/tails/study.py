@@ -24,7 +24,7 @@ from benchmarks.tails.joint import DOF, Found, Readings, prior, sample
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.posterior import sample_with_noise
 
@@ -71,7 +71,7 @@ def _present(found: Found) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _said(model: MeasurementModel, made: Recording, values: np.ndarray, weight: np.ndarray) -> dict[str, list[float]]:
+def _said(model: RecordingModel, made: Recording, values: np.ndarray, weight: np.ndarray) -> dict[str, list[float]]:
     """Of each parameter: u, whether its interval holds, error."""
     found = {}
     for (owner, name), (draws, _) in model.reported(values).items():

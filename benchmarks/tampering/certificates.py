@@ -9,8 +9,7 @@ import shutil
 from pathlib import Path
 
 from benchmarks.tampering.cases import SEED, SIGNED
-from benchmarks.tampering.signatures import ROOT as ROOT_PEM
-from benchmarks.tampering.signatures import signed
+from benchmarks.tampering.signatures import ROOT as ROOT_PEM, signed
 from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.report import write_report
 

@@ -24,7 +24,7 @@ from cmm_uq.jobs.reading import sha256
 from cmm_uq.jobs.recording.prediction import SimulationFacts
 from cmm_uq.jobs.tables.identification import Capability
 from cmm_uq.jobs.verdicts import Verdicts
-from cmm_uq.machine.model import Estimate, MeasurementModel
+from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.predicted_errors import PredictedErrors
@@ -63,7 +63,7 @@ class SimulatedTwin:
 
     @classmethod
     def of(
-        cls, facts: SimulationFacts, job: Job, found: PredictedErrors, named: Sequence[Effect], model: MeasurementModel
+        cls, facts: SimulationFacts, job: Job, found: PredictedErrors, named: Sequence[Effect], model: RecordingModel
     ) -> SimulatedTwin:
         files = [given.file for given in facts.map] if facts.file is None else [facts.file]
         hashes = sha256(job.inputs)
@@ -272,7 +272,7 @@ class Result:
     """
 
     job: Job
-    model: MeasurementModel
+    model: RecordingModel
     findings: tuple[Finding, ...]
     estimate: Estimate
     posterior: NoisyPosterior

@@ -168,7 +168,7 @@ def right(chain: Traceability) -> Text:
 
 
 @dataclass(frozen=True)
-class Chain:
+class TraceabilityChain:
     """To what the results of a job are traceable.
 
     links : the certificates that they rest on.
@@ -202,22 +202,22 @@ class Chain:
         )  # fmt: skip
 
 
-def chain_of(job: Job, read: Collection[str] = ()) -> Chain:
+def chain_of(job: Job, read: Collection[str] = ()) -> TraceabilityChain:
     """To what the results of a job are traceable."""
     facts = job.facts
     if job.origin != MEASURED:
-        return Chain((), NOT_MEASURED, "not shown")
+        return TraceabilityChain((), NOT_MEASURED, "not shown")
     if facts.recording.earlier:
-        return Chain((), CHANGES, "none needed")
+        return TraceabilityChain((), CHANGES, "none needed")
     links = tuple(_lengths(facts))
     if not links:
-        return Chain((), UNCALIBRATED, "none needed")
+        return TraceabilityChain((), UNCALIBRATED, "none needed")
     links = (*links, *_temperatures(job, read))
     if facts.artefact.traced and certified_on_this_machine(facts):
-        return Chain((), OWN_MACHINE, "not shown")
+        return TraceabilityChain((), OWN_MACHINE, "not shown")
     claims = {link.claim for link in links}
     worst: Claim = "not shown" if "not shown" in claims else "by evidence" if "by evidence" in claims else "traceable"
-    return Chain(links, NOTHING if facts.artefact.traced else GAUGE_ALONE, worst)
+    return TraceabilityChain(links, NOTHING if facts.artefact.traced else GAUGE_ALONE, worst)
 
 
 def _lengths(facts: JobFile) -> Iterator[Link]:

@@ -19,8 +19,14 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.importing.keys import FileKeys, ImportKeys
 from cmm_uq.jobs.job import Job, JobFile
-from cmm_uq.jobs.recording.prediction import KEY as SIMULATION
-from cmm_uq.jobs.recording.prediction import NOMINAL_C, Prediction, SimulationFacts, is_error_map, read_prediction
+from cmm_uq.jobs.recording.prediction import (
+    KEY as SIMULATION,
+    NOMINAL_C,
+    Prediction,
+    SimulationFacts,
+    is_error_map,
+    read_prediction,
+)
 from cmm_uq.jobs.recording.references import reference_file
 from cmm_uq.jobs.tables.origin import DERIVING, MEASURED, SIMULATED
 

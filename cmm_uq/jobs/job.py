@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, create_model, field
 
 from cmm_uq.base.errors import suggestion
 from cmm_uq.base.files.limits import CONFORMITY, EFFECTS, LISTED
-from cmm_uq.base.files.table import Limit, Names, Number, Table, at_least
+from cmm_uq.base.files.table import JobTable, Limit, Names, Number, at_least
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.base.points import Points
@@ -78,7 +78,7 @@ class JobFacts(Identification):
         return self
 
 
-class SetAside(Table):
+class SetAside(JobTable):
     """A measurement that the laboratory leaves out of the estimates."""
 
     measurement: Number
@@ -95,7 +95,7 @@ def _as_entry(given: Any) -> Any:
 Aside = Annotated[SetAside, BeforeValidator(_as_entry, json_schema_input_type=SetAside | Number)]
 
 
-class Recorded(Table):
+class Recorded(JobTable):
     """Which recording, and what is stated of it."""
 
     file: str
@@ -124,7 +124,7 @@ class RecordingFacts(ImportKeys, Recorded):
     """
 
 
-class ModelFacts(Table):
+class ModelFacts(JobTable):
     """``[model]``: the physics that the simulation is told about.
 
     ``tolerances``: largest permissible size of an effect's (first) parameter, by its name and in its unit.
@@ -145,7 +145,7 @@ class ModelFacts(Table):
         return self
 
 
-class JobFile(Table):
+class JobFile(JobTable):
     """All of job.toml. A job of a kind without a recording has no ``[recording]``."""
 
     job: JobFacts

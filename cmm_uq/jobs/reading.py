@@ -34,8 +34,7 @@ from cmm_uq.jobs.recording.references import (
     with_references,
     with_uncertainties,
 )
-from cmm_uq.jobs.recording.short_gauge import KEY as SHORT_GAUGE
-from cmm_uq.jobs.recording.short_gauge import ShortGauge, short_gauge_of
+from cmm_uq.jobs.recording.short_gauge import KEY as SHORT_GAUGE, ShortGauge, short_gauge_of
 from cmm_uq.jobs.recording.temperature_log import KEY, log_of, with_logged
 from cmm_uq.jobs.reports import as_found_of, results_named
 from cmm_uq.jobs.source import FilesInFolder, FilesInMemory, JobFiles, check_distinct

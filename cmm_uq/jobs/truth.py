@@ -18,11 +18,11 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS, EFFECTS
-from cmm_uq.base.files.table import AnyFloat, Column, Table, Uncertainty
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Uncertainty
 from cmm_uq.jobs.importing.recording import REQUIRED, largest
 
 
-class ByAxis(Table):
+class ByAxis(JobTable):
     """One number for each axis."""
 
     x: Uncertainty
@@ -33,7 +33,7 @@ class ByAxis(Table):
     """Along z."""
 
 
-class NoiseFacts(Table):
+class NoiseFacts(JobTable):
     """``[noise]``: standard deviations of a coordinate.
 
     ``coordinate_um`` is that of each reading, of every coordinate or ``{ x = …, y = …, z = … }``; ``placing_um`` that of each
@@ -66,7 +66,7 @@ class NoiseFacts(Table):
         return (given.x, given.y, given.z) if isinstance(given, ByAxis) else (given, given, given)
 
 
-class Truth(Table):
+class Truth(JobTable):
     """All of truth.toml.
 
     ``effects`` gives the reported parameters of each effect that acts, whatever the job's model names; ``artefact`` the true

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.least_squares import LeastSquares
 from tests.recordings import TRAVEL
@@ -87,8 +87,8 @@ def plate(attitudes: Sequence[Sequence[float]] = FOUR_ATTITUDES, pitch: float = 
     )  # fmt: skip
 
 
-def model(facts: ArtefactFacts, points: Points, names: Sequence[str], sigma: float | None = 1e-3) -> MeasurementModel:
-    return MeasurementModel(artefact_of(facts, points), effects(names), sigma)
+def model(facts: ArtefactFacts, points: Points, names: Sequence[str], sigma: float | None = 1e-3) -> RecordingModel:
+    return RecordingModel(artefact_of(facts, points), effects(names), sigma)
 
 
 def indicated(

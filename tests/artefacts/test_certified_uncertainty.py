@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.gauge_lines.observe import GaugeBlocks, StepGauge
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.tables.artefact import ReferencedFacts
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects as effects_of
 from cmm_uq.maths.inference.doubt import Doubt, gain
 
@@ -164,7 +163,7 @@ def several(artefact: StepGauge | Plate, effects: list[str]) -> tuple[Floats, Fl
     what each set-up is free in.
     """
     sigma = 1e-3
-    model = MeasurementModel(artefact, effects_of(effects), sigma)
+    model = RecordingModel(artefact, effects_of(effects), sigma)
     linear, size = model.estimate().linear, artefact.sizes[0]
     free = linear.freedoms.dense()
     rows = np.hstack([linear.design, free])
@@ -223,7 +222,7 @@ def test_with_a_covariance_every_estimate_is_dense_gum_propagation() -> None:
     covariance = root @ root.T
     gauge = StepGauge(facts().with_covariances((1, 2, 3, 4, 5, 6), (covariance,)), lines_along(SIX_LINES))
     sigma, effects = 1e-3, ["scale_x", "scale_y", "scale_z", "squareness_xy"]
-    model = MeasurementModel(gauge, effects_of(effects), sigma)
+    model = RecordingModel(gauge, effects_of(effects), sigma)
     linear = model.estimate().linear
     known = np.zeros((1, linear.design.shape[1] + 6))
     known[0, len(effects)] = sigma / gauge.sizes[0].sd

@@ -5,8 +5,7 @@ from __future__ import annotations
 import unicodedata
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import LONGEST_MESSAGE, CmmUqError, Gathered, printable, shortened, suggestion
 from cmm_uq.machine.physics.catalogue import EVERY

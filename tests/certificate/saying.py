@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from cmm_uq.base.languages.translation import Catalogue, Code, catalogue
-from cmm_uq.base.languages.translation import Translation as Said
+from cmm_uq.base.languages.translation import Catalogue, Code, Translation as Said, catalogue
 from cmm_uq.base.messages import Day, Message, Number, Plural, Text, Verbatim
 from cmm_uq.base.units import Unit
 from cmm_uq.certificate.document import Document, Plot

@@ -8,7 +8,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.document import Table
 from cmm_uq.certificate.sections.conformity import budget_table
-from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, Line
+from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 
 
@@ -49,7 +49,7 @@ def test_what_acts_through_a_temperature_has_its_own_unit_and_sensitivity() -> N
 
 
 def test_a_budget_in_micrometres_stays_in_them() -> None:
-    two = Line(say("alignment, twice"), 0.5, JUDGEMENT, unit=unit("µm"), sensitivity=2**0.5)
+    two = BudgetLine(say("alignment, twice"), 0.5, JUDGEMENT, unit=unit("µm"), sensitivity=2**0.5)
     table = budget_table(say("x"), Budget(say("x"), [two], unit=unit("µm")))
     assert (table.rows[0][1], table.rows[0][3]) == ("0.50 µm", "0.71")
     assert float(table.rows[0][2]) == pytest.approx(2**0.5, abs=1e-3)

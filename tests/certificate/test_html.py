@@ -9,8 +9,7 @@ from html.parser import HTMLParser
 
 import jinja2
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.certificate.document import Document, Section
 from cmm_uq.certificate.render.html import render_html

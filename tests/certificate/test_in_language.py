@@ -18,9 +18,7 @@ from pypdf import PdfReader
 
 from cmm_uq.app.commands.reading import in_language, read_job
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import LANGUAGES, Code
-from cmm_uq.base.languages.translation import Translation as Said
-from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.languages.translation import LANGUAGES, Code, Translation as Said, translated as said_in
 from cmm_uq.base.messages import Day, Message, Number, Text, Verbatim, commas, say
 from cmm_uq.certificate.document import Document, Paragraph, Plot, Section, translated
 from cmm_uq.certificate.plots import style as fonts

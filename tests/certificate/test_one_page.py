@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 from pypdf import PdfReader
 
-from cmm_uq.base.languages.translation import LANGUAGES, Code
-from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.languages.translation import LANGUAGES, Code, translated as said_in
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.certificate.clauses import STATEMENTS
 from cmm_uq.certificate.document import Document, Facts, Signature, translated

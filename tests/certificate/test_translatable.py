@@ -20,8 +20,7 @@ from cmm_uq.certificate.origin import NAME, marked
 from cmm_uq.certificate.pages.budget import budget_document
 from cmm_uq.jobs.job import JobFacts
 from cmm_uq.jobs.tables.artefact import Traceability
-from cmm_uq.jobs.tables.identification import Laboratory
-from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced
+from cmm_uq.jobs.tables.identification import Laboratory, ReplacedCertificate as Replaced
 from cmm_uq.jobs.tables.machine import MachineFacts
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES

@@ -18,7 +18,7 @@ from benchmarks.second.maps import JUMPS, SQUARENESS, concealed, error, without_
 from benchmarks.second.twins import fields
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import CATALOGUE
 from cmm_uq.machine.physics.error_map import read_error_map
 from cmm_uq.machine.physics.kinematics import first_order
@@ -54,7 +54,7 @@ def outside(some: np.ndarray, of: np.ndarray, placed: Placed) -> float:
     return float(np.abs(some - basis @ (basis.T @ some)).max() / size) if size > 1e-12 else 0.0
 
 
-def as_read(placed: Placed, folder: Path) -> MeasurementModel:
+def as_read(placed: Placed, folder: Path) -> RecordingModel:
     """The package's model of an artefact that is where it should be, nothing taken off for being a copy."""
     white = noises.Noise("white", 1e-3)
     one = Case("exact", placed, white, (), placed.size is not None, None, placed.recorded, placed.true,

@@ -14,7 +14,7 @@ from benchmarks.coverage.recordings import recording
 from benchmarks.tails.joint import DOF, Readings, log_tails
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.maths.inference.marginal import Marginal
 from cmm_uq.maths.inference.noise import Sizes
 
@@ -26,12 +26,12 @@ SIZES = Sizes(
 
 
 @pytest.fixture(params=["step gauge", "plate"])
-def model(request: pytest.FixtureRequest, tmp_path: Path) -> MeasurementModel:
+def model(request: pytest.FixtureRequest, tmp_path: Path) -> RecordingModel:
     """Observations of one point's three coordinates, and of a point along a line; every second recording has no time."""
     return screened_model(read_job(recording(Cell(request.param, "t3"), 3, 0).write(tmp_path / "job")))[0]
 
 
-def test_with_equal_weights_the_density_is_that_without_any(model: MeasurementModel) -> None:
+def test_with_equal_weights_the_density_is_that_without_any(model: RecordingModel) -> None:
     """Of readings alike in all axes, of which the mean and the contrasts of repeats are independent to the last digit."""
     of, estimate = Readings.of(model), model.estimate()
     alike = replace(SIZES, reading=1e-3 * np.array([[1.4] * 3, [0.9] * 3]), growth=np.zeros(2))
@@ -40,7 +40,7 @@ def test_with_equal_weights_the_density_is_that_without_any(model: MeasurementMo
     assert float(np.diff(found)[0]) == pytest.approx(float(np.diff(log - 0.5 * squares)[0]), abs=1e-4)
 
 
-def test_with_weights_it_is_the_normal_density_of_the_dense_covariance(model: MeasurementModel) -> None:
+def test_with_weights_it_is_the_normal_density_of_the_dense_covariance(model: RecordingModel) -> None:
     """Differences between weights; coefficients and placings, whose prior is wide or none, are integrated out with V⁻¹."""
     of = Readings.of(model)
     weight = np.random.default_rng(1).chisquare(3, (2, len(of.whole))) / 3 / of.variances(SIZES)

@@ -21,7 +21,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model.artefact import Artefact
-from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
+from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import nominal
 
 _OPPOSITE = -0.9
@@ -48,13 +48,13 @@ def volumetric_performance(test: Test) -> Statement:
 def _budget(test: Test) -> tuple[Budget, Text]:
     """Of the difference of two lengths of the bar, and what it says in words."""
     stated, size = test.circumstances.uncertainty, test.artefact.sizes[0]
-    two = partial(Line, origin=JUDGEMENT, unit=unit("µm"), sensitivity=float(np.sqrt(2.0)))
+    two = partial(BudgetLine, origin=JUDGEMENT, unit=unit("µm"), sensitivity=float(np.sqrt(2.0)))
     expansion = abs(test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE
     u = u_of_repeats(size.nominal, test.circumstances)
     lines = [
-        Line(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
+        BudgetLine(say("repeated readings of the bar"), stated.u_repeat_um, JUDGEMENT, unit=unit("µm")),
     ] if u == stated.u_repeat_um else [
-        Line(say("temperature of the bar, twice"), stated.u_temperature_k, JUDGEMENT, unit=unit("K"),
+        BudgetLine(say("temperature of the bar, twice"), stated.u_temperature_k, JUDGEMENT, unit=unit("K"),
              sensitivity=float(np.sqrt(2.0)) * expansion),
         two(say("fixturing of the bar, twice"), stated.u_fixturing_um),
     ]  # fmt: skip

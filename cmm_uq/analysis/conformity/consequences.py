@@ -17,7 +17,7 @@ from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis
 from cmm_uq.analysis.screening.screening import counted_with
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.noise import noise_of
@@ -138,7 +138,7 @@ class _Correction:
     values; ``drawn``: from its posterior; ``corrected``: the artefact.
     """
 
-    model: MeasurementModel
+    model: RecordingModel
     ours: NDArray[np.bool_]
     value: Floats
     drawn: _Drawn
@@ -146,7 +146,7 @@ class _Correction:
 
     @classmethod
     def of(
-        cls, fitted: MeasurementModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
+        cls, fitted: RecordingModel, found: Collection[str], value: Floats, drawn: _Drawn, observe: Observed
     ) -> _Correction:
         """For the effects of these names, by what a model estimates of them (k,)."""
         model = replace(fitted, used=np.ones_like(fitted.used))

@@ -45,7 +45,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.circumstances import Circumstances, TestUncertainty
 from cmm_uq.jobs.tables.conformity import ConformityFacts, needed
 from cmm_uq.machine.model.artefact import Artefact, Indications
-from cmm_uq.maths.uncertainty.budget import Budget, Line
+from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 NOT_CONSIDERED = say(
@@ -263,7 +263,7 @@ class Test:
         least = float(self.least_u(np.array([length_mm]))[0]) * scale
         if not 0 < budget.u < least:
             return budget
-        more = Line(say("raised to the laboratory's capability"), float(np.sqrt(least**2 - budget.variance)), CMC,
+        more = BudgetLine(say("raised to the laboratory's capability"), float(np.sqrt(least**2 - budget.variance)), CMC,
                     unit=budget.unit)  # fmt: skip
         return replace(budget, lines=[*budget.lines, more])
 

@@ -26,7 +26,7 @@ from cmm_uq.analysis.diagnosis.observations import thin_out
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.recorded import of_last_digit
 from cmm_uq.machine.physics.effect import Effect
@@ -106,8 +106,8 @@ class Diagnosis:
     rivals: tuple[tuple[Text, float], ...]
     noise: NoiseDiagnosis
     improvement: Improvement
-    before: MeasurementModel
-    after: MeasurementModel
+    before: RecordingModel
+    after: RecordingModel
     components: Components
     posterior: NoisyPosterior
     compared: int
@@ -117,7 +117,7 @@ class Diagnosis:
 
 
 def diagnose(
-    model: MeasurementModel,
+    model: RecordingModel,
     *,
     stated_um: float | None,
     alpha: float,
@@ -146,7 +146,7 @@ def diagnose(
 
 
 def _asserted(
-    result: SearchResult, model: MeasurementModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
+    result: SearchResult, model: RecordingModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
 ) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...]]:
     """What of a search may be asserted, estimated from all observations, and what is withheld.
 
@@ -175,14 +175,14 @@ def _asserted(
             result, gone = withhold(result, frozenset({least})), (*gone, places.get(least, more[least]))
 
 
-def _of_all(result: SearchResult, model: MeasurementModel) -> SearchResult:
+def _of_all(result: SearchResult, model: RecordingModel) -> SearchResult:
     """The same, its model that of all observations."""
     if not result.chosen or result.model.artefact is model.artefact:
         return result if result.chosen else replace(result, model=model)
     return replace(result, model=replace(result.model, artefact=model.artefact, used=model.used))
 
 
-def _with_last_digit(model: MeasurementModel) -> MeasurementModel:
+def _with_last_digit(model: RecordingModel) -> RecordingModel:
     """The model whose noise is no less than the last digit of what was recorded: exact figures, and copies, have no other."""
     least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
     return replace(model, least_noise=least) if least > model.least_noise else model
@@ -196,7 +196,7 @@ def _verdict(result: SearchResult, alpha: float) -> str:
     return "partial" if result.rough or result.unexplained > _UNKNOWN else "explained"
 
 
-def _left_out(result: SearchResult, joint: JointPosterior, before: MeasurementModel) -> tuple[OmittedEffect, ...]:
+def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingModel) -> tuple[OmittedEffect, ...]:
     index = {str.__str__(result.first.explanations[i].name): i for i in result.chosen}
     posterior = joint.posterior
     column = {unknown.key: i for i, unknown in enumerate(posterior.unknowns)}

@@ -12,7 +12,7 @@ from cmm_uq.analysis.diagnosis.observations import numbered_by_place
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.posterior import Density
 
@@ -38,7 +38,7 @@ class Improvement:
     unseen: Text = say("set-ups")
 
 
-def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvement:
+def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
     """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups.
 
     Repeats are left out together. The predictive density is normal, with the noise of each model's own fit.
@@ -54,7 +54,7 @@ def improvement(before: MeasurementModel, after: MeasurementModel) -> Improvemen
     return Improvement(rms[0], rms[1], first[0], second[0], float(gain.sum()), se, unseen)
 
 
-def _held_out(model: MeasurementModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
+def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
     """Rms of predictions, µm, and log predictive density of each fold.
 
     What a set-up leaves open is taken from its other points, where there are some, and else is no part of the prediction.
@@ -92,7 +92,7 @@ def _root(covariance: Floats) -> Floats:
     return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-def _groups(model: MeasurementModel) -> tuple[NDArray[np.int64], Text]:
+def _groups(model: RecordingModel) -> tuple[NDArray[np.int64], Text]:
     """What is left out together, and what it is: set-ups; of few set-ups their points. Each with its repeats.
 
     Without one of a few set-ups the rest would often determine nothing: a gauge on seven lines has one along Y.

@@ -12,7 +12,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import STEP, effect_of, e
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import Unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import with_curvature
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
@@ -149,7 +149,7 @@ def joint_posterior(
     )
 
 
-def _shaped(result: SearchResult, model: MeasurementModel, effect: Effect, values: Floats) -> Shaped:
+def _shaped(result: SearchResult, model: RecordingModel, effect: Effect, values: Floats) -> Shaped:
     """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
     nodes = _nodes(result, effect)
     table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])

@@ -27,7 +27,7 @@ from cmm_uq.analysis.diagnosis.comparison.search import ModelComparison
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
@@ -247,7 +247,7 @@ class ResidualField:
         return np.asarray(np.sqrt(squares) * self.scale * noise.value, dtype=np.float64)
 
 
-def residual_field(before: MeasurementModel, after: MeasurementModel) -> ResidualField | None:
+def residual_field(before: RecordingModel, after: RecordingModel) -> ResidualField | None:
     """The residuals of two models of one recording as vectors; ``None`` where an observation is of more than two points."""
     artefact, used = before.artefact, before.used
     rows = artefact.rows[used]

@@ -20,7 +20,7 @@ from cmm_uq.analysis.diagnosis.joint import JointPosterior
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.posterior import Density
 from cmm_uq.maths.uncertainty.quantity import Quantity, mixed
@@ -53,7 +53,7 @@ class Rival:
     functions: tuple[Text, ...]
     named: EffectParameters
     added: EffectParameters
-    model: MeasurementModel
+    model: RecordingModel
     draws: Floats
 
 
@@ -77,7 +77,7 @@ class ModelAverage:
         return [rival.probability for rival in self.rivals]
 
 
-def average_models(result: SearchResult, joint: JointPosterior, before: MeasurementModel, seed: int) -> ModelAverage:
+def average_models(result: SearchResult, joint: JointPosterior, before: RecordingModel, seed: int) -> ModelAverage:
     """What remains of a search.
 
     ``before`` the job's model.
@@ -101,7 +101,7 @@ def average_models(result: SearchResult, joint: JointPosterior, before: Measurem
     return ModelAverage(rivals, _reported(before, draws), draws)
 
 
-def _over_all(rivals: Sequence[Rival], before: MeasurementModel, seed: int) -> Floats:
+def _over_all(rivals: Sequence[Rival], before: RecordingModel, seed: int) -> Floats:
     """Draws (N, k) of the unknowns of the job's model, whichever explanation is the right one."""
     keys, each = [unknown.key for unknown in before.unknowns], []
     for rival in rivals:
@@ -129,7 +129,7 @@ def needed_combinations(combinations: Combinations) -> dict[Key, float]:
 
 def _rival(
     result: SearchResult,
-    combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: MeasurementModel,
+    combinations: Combinations, noise: tuple[Callable[[Floats], Floats], float], before: RecordingModel,
     key: Key, probability: float, seed: int,
 ) -> Rival:  # fmt: skip
     """One that remains; ``noise`` is what whitens observations, and its standard deviation of a reading, mm."""
@@ -160,7 +160,7 @@ def _rival(
     )  # fmt: skip
 
 
-def _about(model: MeasurementModel, *estimated: MeasurementModel) -> Floats:
+def _about(model: RecordingModel, *estimated: RecordingModel) -> Floats:
     """Parameters (k,) that a model is linear about: as the last of others estimates them, else as they are known beforehand.
 
     It is not estimated by itself: what it cannot tell apart is held by what physics allows alone.
@@ -200,7 +200,7 @@ def _drawn(linear: LinearModel, sigma: float, stated: float | None, seed: int) -
     return np.asarray(mean + wider[:, None] * (normal @ root.T))
 
 
-def _reported(model: MeasurementModel, draws: Floats) -> dict[str, dict[str, Quantity]]:
+def _reported(model: RecordingModel, draws: Floats) -> dict[str, dict[str, Quantity]]:
     found: dict[str, dict[str, Quantity]] = {}
     column = 0
     for effect in model.effects:

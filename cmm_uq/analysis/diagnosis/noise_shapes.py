@@ -17,7 +17,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import EFFECT, UNKNOWN, E
 from cmm_uq.analysis.diagnosis.noise import TAILS, NoiseKind, heavy_tails, shape_of
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.maths.inference.least_squares import LeastSquares
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
@@ -239,7 +239,7 @@ def _without_rivals(estimate: LeastSquares, count: int) -> LeastSquares:
 _FEW = 2  # columns
 
 
-def noise_kinds(model: MeasurementModel, candidates: Sequence[Explanation]) -> list[NoiseKind]:
+def noise_kinds(model: RecordingModel, candidates: Sequence[Explanation]) -> list[NoiseKind]:
     estimate = model.estimate()
     columns = [e.members[0].columns for e in candidates if e.kind == EFFECT and not e.shaped and not _doubled(e)]
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))

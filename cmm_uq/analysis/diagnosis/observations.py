@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Ints
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 
 
-def numbered_by_place(model: MeasurementModel, group: Ints) -> Ints:
+def numbered_by_place(model: RecordingModel, group: Ints) -> Ints:
     """Numbers (m,) of groups of used observations, from that nearest to the middle of the recording.
 
     No order of rows, numbering or frame changes how far the groups are from it.
@@ -38,7 +38,7 @@ MOST = 1000  # observations that candidates are compared on
 LEAST_OF_SET_UP = 30  # observations that a set-up keeps where it has as many: its freedoms cost six of them at most
 
 
-def thin_out(model: MeasurementModel, observe: Observed, seed: int, most: int = MOST) -> MeasurementModel:
+def thin_out(model: RecordingModel, observe: Observed, seed: int, most: int = MOST) -> RecordingModel:
     """The model of at most ``most`` observations, or a few more; as it is with no more than these.
 
     Whole quantities are drawn, with their repeats, evenly from every set-up, and where there are many set-ups, from some

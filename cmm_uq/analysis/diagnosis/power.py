@@ -27,7 +27,7 @@ from cmm_uq.analysis.diagnosis.comparison.prior import CombinationPrior
 from cmm_uq.analysis.diagnosis.comparison.search import NOT_TOLD_APART, model_comparison
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.noise import Components, Sizes
@@ -109,7 +109,7 @@ class DrawnNoise:
         return np.asarray(scale * (turn.T @ (variances[:, None] * (turn @ (scale * column)))))
 
 
-def without_fault(observe: Observed, model: MeasurementModel, noise: Noise, seed: int) -> MeasurementModel:
+def without_fault(observe: Observed, model: RecordingModel, noise: Noise, seed: int) -> RecordingModel:
     """The same model of a recording drawn with nothing left out, in the set-ups of its own."""
     artefact = model.artefact
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(8,)))
@@ -119,7 +119,7 @@ def without_fault(observe: Observed, model: MeasurementModel, noise: Noise, seed
 
 
 def powers(
-    model: MeasurementModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
+    model: RecordingModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
     draws: int = 20, noise: DrawnNoise | None = None,
 ) -> Iterator[Power]:  # fmt: skip
     """Power of the diagnosis of a model's recording, for effects that the model does not name.
@@ -132,7 +132,7 @@ def powers(
         yield _power(rule, model, compared.values, effect, seed, draws)
 
 
-def _power(rule: _Rule, model: MeasurementModel, values: Floats, effect: Effect, seed: int, draws: int) -> Power:
+def _power(rule: _Rule, model: RecordingModel, values: Floats, effect: Effect, seed: int, draws: int) -> Power:
     points = model.artefact.points.at(model.placed(values))
     column = model.seen(effect.basis(points)[:, :, :1], values) / rule.comparison.noise_scale[:, None]
     shown = rule.comparison.rest(column)

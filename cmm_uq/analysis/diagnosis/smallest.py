@@ -22,7 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import Unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import CONTRACT, Effect
 
@@ -92,7 +92,7 @@ class SmallestEffect:
         return self.common and there and (self.detected is None or self.detected > BLIND * self.allowed)
 
 
-def smallest_effects(result: SearchResult, alpha: float, model: MeasurementModel) -> tuple[SmallestEffect, ...]:
+def smallest_effects(result: SearchResult, alpha: float, model: RecordingModel) -> tuple[SmallestEffect, ...]:
     """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
 
     Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
@@ -125,7 +125,7 @@ def _never(effect: Effect) -> SmallestEffect:
     return SmallestEffect(effect.name, effect.title, name, parameter.unit, allowed, None, None, 0.0, (), common)
 
 
-def _motionless(model: MeasurementModel, known: set[str]) -> Iterator[Effect]:
+def _motionless(model: RecordingModel, known: set[str]) -> Iterator[Effect]:
     """Common effects of which nothing shows in such observations, though they could act and all that they need is recorded."""
     points = model.artefact.points
     for effect in every().values():

@@ -23,7 +23,7 @@ from cmm_uq.analysis.diagnosis.comparison.prior import EFFECTS
 from cmm_uq.analysis.diagnosis.comparison.search import SearchResult
 from cmm_uq.analysis.diagnosis.power import CERTAIN, Naming
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import reached
 from cmm_uq.maths.inference.slow import root
 
@@ -125,7 +125,7 @@ def aliased(view: Visibility, lefts: Floats, values: Floats) -> NDArray[np.bool_
     return np.asarray((alike & ~near).any(axis=1))
 
 
-def _imitators(model: MeasurementModel, raw: Floats) -> tuple[str, ...]:
+def _imitators(model: RecordingModel, raw: Floats) -> tuple[str, ...]:
     """Names of what is fitted that together looks like a column (m,): those with a share of it that counts.
 
     What the free places of the artefact take up is theirs; for the rest, of many solutions the smallest counts.

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cmm_uq.analysis.parts.plan import DIRECTED, Feature, FeatureKind
+from cmm_uq.analysis.parts.plan import DIRECTED, FeatureKind, PartFeature
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association
@@ -60,7 +60,7 @@ class ProbedFeature:
     """
 
     def __init__(
-        self, feature: Feature, points: Floats, association: Association, looked_at: ProbedFeature | None = None
+        self, feature: PartFeature, points: Floats, association: Association, looked_at: ProbedFeature | None = None
     ) -> None:
         self.feature, self.points, self.association = feature, points, association
         self.n = len(points)

@@ -28,9 +28,9 @@ from cmm_uq.analysis.parts.plan import (
     RUNOUTS,
     SIZED,
     ZONES,
-    Characteristic,
-    Feature,
     FeatureKind,
+    PartCharacteristic,
+    PartFeature,
     Plan,
 )
 from cmm_uq.base.errors import CmmUqError
@@ -66,7 +66,7 @@ class MeasuredFeatures:
 class CharacteristicEvaluation:
     """How one characteristic follows from features."""
 
-    characteristic: Characteristic
+    characteristic: PartCharacteristic
     plan: Plan  # in which it is
     nominal: Mapping[str, Features]  # values of its features, without errors, by name
 
@@ -117,7 +117,7 @@ class CharacteristicEvaluation:
         return measured.frames[self.frame_of]
 
     @cached_property
-    def feature(self) -> Feature:
+    def feature(self) -> PartFeature:
         """Its first feature, as planned."""
         return self.plan.feature(self.characteristic.features[0])
 
@@ -185,7 +185,7 @@ def never_negative(plan: Plan) -> NDArray[np.bool_]:
     return np.array(found, dtype=bool)
 
 
-def _coinciding(one: Characteristic, plan: Plan) -> bool:
+def _coinciding(one: PartCharacteristic, plan: Plan) -> bool:
     if one.what not in RELATIONS or len(one.features) < 2:
         return False
     of = CharacteristicEvaluation(one, plan, {})
@@ -193,7 +193,7 @@ def _coinciding(one: Characteristic, plan: Plan) -> bool:
     return bool(of(MeasuredFeatures(nominal, {}))[0] < _COINCIDE)
 
 
-def _values(feature: Feature) -> Floats:
+def _values(feature: PartFeature) -> Floats:
     """(1, 8) of a nominal feature, as far as relations are of it."""
     place, direction = feature.nominal.point, feature.nominal.direction
     return np.hstack([place, np.zeros(3) if direction is None else direction, np.zeros(VALUES - 6)])[None]
@@ -299,7 +299,7 @@ _OF: Mapping[str, Callable[[CharacteristicEvaluation, MeasuredFeatures], Floats]
 }  # fmt: skip
 
 
-def _refuse(one: Characteristic, plan: Plan) -> None:
+def _refuse(one: PartCharacteristic, plan: Plan) -> None:
     """What a characteristic needs of its features and datums."""
     where, kinds = f"characteristic {one.name!r}", [plan.feature(name).kind for name in one.features]
     wanted = {"distance": (2,), "angle": (1, 2)}.get(one.what, (1,))
@@ -324,7 +324,7 @@ def _refuse(one: Characteristic, plan: Plan) -> None:
         raise CmmUqError(f"{one.what} needs datums", where=where, fix="Name datums, or an alignment of the plan")
 
 
-def _refuse_without_datum(one: Characteristic, plan: Plan, where: str) -> None:
+def _refuse_without_datum(one: PartCharacteristic, plan: Plan, where: str) -> None:
     if not one.datums:
         raise CmmUqError(f"{one.what} needs a datum", where=where, fix="Name one")
     kind = plan.feature(one.datums[0]).kind

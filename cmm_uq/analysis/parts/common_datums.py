@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.analysis.parts.association import VALUES, Features, ProbedFeature
-from cmm_uq.analysis.parts.plan import Feature, FeatureKind, as_datum
+from cmm_uq.analysis.parts.plan import FeatureKind, PartFeature, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
@@ -24,7 +24,7 @@ _UNSEEN = 1e-6  # singular value, of the largest, below which the points do not 
 _KEPT = 1e-3  # by how much a motion that is not seen may move a datum, of what the points as a whole would move
 _BLOCK = 50_000  # points worked on together, so that their derivatives take some tens of megabytes
 _THREE = 3  # numbers of a shift; as many follow of a rotation
-_Surface = Callable[[Feature, Floats], tuple[Floats, Floats]]
+_Surface = Callable[[PartFeature, Floats], tuple[Floats, Floats]]
 
 
 class ProbedCommon(ProbedFeature):
@@ -34,7 +34,7 @@ class ProbedCommon(ProbedFeature):
     mm.
     """
 
-    def __init__(self, feature: Feature, points: Floats) -> None:
+    def __init__(self, feature: PartFeature, points: Floats) -> None:
         self.feature, self.points, self.association = feature, points, "least_squares"
         self.n, ends = len(points), np.cumsum([0, *(len(one.points) for one in feature.members)])
         self._rows = [slice(a, b) for a, b in pairwise(ends.tolist())]
@@ -84,7 +84,7 @@ class ProbedCommon(ProbedFeature):
         """The datum, and each member's, where the whole has gone."""
         shift, turn = motion[:, :_THREE], Rotation.from_rotvec(motion[:, _THREE : 2 * _THREE]).as_matrix()
 
-        def moved(one: Feature) -> Features:
+        def moved(one: PartFeature) -> Features:
             values = np.zeros((len(motion), VALUES))
             values[:, :3] = (one.nominal.point - self._middle) @ np.swapaxes(turn, 1, 2) + self._middle + shift
             if one.nominal.direction is not None:
@@ -146,7 +146,7 @@ class ProbedCommon(ProbedFeature):
                     raise CmmUqError(f"its members leave {one.name!r} free to move", where=where,
                                      fix="Name more features, or probe them at more places")  # fmt: skip
 
-    def _moves(self, one: Feature, shift: Floats, rotation: Floats) -> bool:
+    def _moves(self, one: PartFeature, shift: Floats, rotation: Floats) -> bool:
         """Whether a motion takes a datum out of itself; rotations are times the extent."""
         moved, w = shift + np.cross(rotation, one.nominal.point - self._middle) / self._extent, one.nominal.direction
         if w is None:
@@ -156,18 +156,18 @@ class ProbedCommon(ProbedFeature):
         return bool(max(off, np.linalg.norm(np.cross(rotation, w))) > _KEPT)
 
 
-def _flat(one: Feature, points: Floats) -> tuple[Floats, Floats]:
+def _flat(one: PartFeature, points: Floats) -> tuple[Floats, Floats]:
     normal = np.asarray(as_datum(one).nominal.direction)
     return (points - one.nominal.point) @ normal, np.broadcast_to(normal, points.shape)
 
 
-def _ball(one: Feature, points: Floats) -> tuple[Floats, Floats]:
+def _ball(one: PartFeature, points: Floats) -> tuple[Floats, Floats]:
     apart = points - one.nominal.point
     far = np.linalg.norm(apart, axis=2)
     return far - 0.5 * (one.nominal.diameter_mm or 0.0), apart / far[:, :, None]
 
 
-def _about_an_axis(one: Feature, points: Floats) -> tuple[Floats, Floats]:
+def _about_an_axis(one: PartFeature, points: Floats) -> tuple[Floats, Floats]:
     """Of a circle, cylinder or cone, as :mod:`cmm_uq.maths.geometry.minimax` has them."""
     w, apart = np.asarray(one.nominal.direction), points - one.nominal.point
     height, half = apart @ w, one.nominal.half_angle_rad or 0.0

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.analysis.parts.association import Features
-from cmm_uq.analysis.parts.plan import Feature, FeatureKind, as_datum
+from cmm_uq.analysis.parts.plan import FeatureKind, PartFeature, as_datum
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 
@@ -103,7 +103,7 @@ class DatumSystem:
     without any error, which says how the frame is made.
     """
 
-    def __init__(self, features: Sequence[Feature], nominal: Sequence[Features]) -> None:
+    def __init__(self, features: Sequence[PartFeature], nominal: Sequence[Features]) -> None:
         self.features = tuple(
             each for one in features for each in (map(as_datum, one.members) if one.members else (one,))
         )

@@ -18,7 +18,7 @@ from cmm_uq.analysis.parts.causes.cause import Drawn, PartCause, Rows
 from cmm_uq.analysis.parts.characteristics import CharacteristicEvaluation, Key, MeasuredFeatures
 from cmm_uq.analysis.parts.common_datums import ProbedCommon
 from cmm_uq.analysis.parts.datums import BEST_FIT, BestFit, DatumSystem
-from cmm_uq.analysis.parts.plan import FORMS, Feature, Plan
+from cmm_uq.analysis.parts.plan import FORMS, PartFeature, Plan
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.association import Association
 
@@ -228,7 +228,9 @@ class Evaluator:
         return np.asarray(followed[drawn.rows])
 
 
-def _of(feature: Feature, points: Floats, how: Association, looked_at: ProbedFeature | None = None) -> ProbedFeature:
+def _of(
+    feature: PartFeature, points: Floats, how: Association, looked_at: ProbedFeature | None = None
+) -> ProbedFeature:
     return ProbedCommon(feature, points) if feature.members else ProbedFeature(feature, points, how, looked_at)
 
 

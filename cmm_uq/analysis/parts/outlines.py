@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cmm_uq.analysis.parts.plan import Feature
+from cmm_uq.analysis.parts.plan import PartFeature
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.feature import frame_about
 
@@ -16,7 +16,7 @@ _ALONG = 1e-6  # sine of the angle to the view below which an axis is seen end o
 _FLAT = 1e-9  # of the size of a set of points, below which it has no second direction
 
 
-def outline(feature: Feature, view: Floats) -> list[Floats]:
+def outline(feature: PartFeature, view: Floats) -> list[Floats]:
     """Polylines (m, 3) of a nominal feature as far as it is probed; none of a point.
 
     ``view``: (3,) direction along which one looks.

@@ -73,7 +73,7 @@ class Nominal:
 
 
 @dataclass(frozen=True, eq=False)
-class Feature:
+class PartFeature:
     """A feature with the points at which it is probed.
 
     Parameters
@@ -104,7 +104,7 @@ class Feature:
     association: Association = "least_squares"
     surface: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     surface_normals: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    members: tuple[Feature, ...] = ()
+    members: tuple[PartFeature, ...] = ()
 
     def __post_init__(self) -> None:
         where = f"feature {self.name!r}"
@@ -137,7 +137,7 @@ class Feature:
         return bool(np.einsum("ni,ni->", out, self.normals) < 0)
 
 
-def as_datum(one: Feature) -> Feature:
+def as_datum(one: PartFeature) -> PartFeature:
     """A member of a common datum as what it fixes: a circle its axis, a sphere its centre, a point the plane there."""
     if one.kind == "point":
         return replace(one, kind="plane", points=np.repeat(one.points, FEWEST["plane"], axis=0),
@@ -171,7 +171,7 @@ class PartAlignment:
 
 
 @dataclass(frozen=True)
-class Characteristic:
+class PartCharacteristic:
     """What the drawing asks for.
 
     Parameters
@@ -212,8 +212,8 @@ class Plan:
     CmmUqError : a name that stands twice or is not there, an order that is none.
     """
 
-    features: tuple[Feature, ...]
-    characteristics: tuple[Characteristic, ...]
+    features: tuple[PartFeature, ...]
+    characteristics: tuple[PartCharacteristic, ...]
     styli: tuple[Stylus, ...] = (Stylus("stylus"),)
     alignment: PartAlignment = field(default_factory=PartAlignment)
     order: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -281,13 +281,13 @@ class Plan:
         """Names of the members of a common datum; of a feature its own."""
         return next((datum.features for datum in self.common if datum.name == name), (name,))
 
-    def feature(self, name: str) -> Feature:
+    def feature(self, name: str) -> PartFeature:
         """A feature by its name, or a common datum as one."""
         for datum in self.common:
             if datum.name == name:
                 parts = tuple(self.feature(each) for each in datum.features)
                 points, normals = np.vstack([one.points for one in parts]), np.vstack([one.normals for one in parts])
-                return Feature(name, datum.kind, points, normals, parts[0].stylus, datum.nominal, members=parts)
+                return PartFeature(name, datum.kind, points, normals, parts[0].stylus, datum.nominal, members=parts)
         _refuse_unknown([name], list(self.rows), "plan", "feature")
         return next(feature for feature in self.features if feature.name == name)
 
@@ -302,7 +302,7 @@ def _refuse_ill_shaped(points: Floats, normals: Floats, where: str) -> None:
         raise CmmUqError("a normal is no unit vector", where=where, fix="Divide each by its length")
 
 
-def _refuse_common(datum: CommonDatum, members: Sequence[Feature]) -> None:
+def _refuse_common(datum: CommonDatum, members: Sequence[PartFeature]) -> None:
     where = f"common datum {datum.name!r}"
     for one in members:
         if one.kind == "line":

@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from cmm_uq.analysis.conformity.limits import SCARCE
 from cmm_uq.analysis.parts.characteristics import never_negative
 from cmm_uq.analysis.parts.evaluation import characteristics_of
-from cmm_uq.analysis.parts.plan import FEWEST as FEWEST_POINTS
-from cmm_uq.analysis.parts.plan import Feature, Plan
+from cmm_uq.analysis.parts.plan import FEWEST as FEWEST_POINTS, PartFeature, Plan
 from cmm_uq.analysis.parts.zones import tails
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
@@ -158,7 +157,7 @@ def deviations_of(plan: Plan, measured: Floats) -> Floats:
     return found
 
 
-def _deviations(feature: Feature, points: Floats) -> Floats:
+def _deviations(feature: PartFeature, points: Floats) -> Floats:
     if feature.kind == "point":
         return np.asarray(np.einsum("ni,ni->n", points - points.mean(axis=0), feature.normals))
     if feature.kind == "line" and feature.nominal.direction is not None:

@@ -13,8 +13,16 @@ from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, o
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.placing import PartPose, around, placed
-from cmm_uq.analysis.parts.plan import Characteristic, CommonDatum, Feature, Nominal, PartAlignment, Plan, Stylus
-from cmm_uq.analysis.parts.virtual import Circumstances
+from cmm_uq.analysis.parts.plan import (
+    CommonDatum,
+    Nominal,
+    PartAlignment,
+    PartCharacteristic,
+    PartFeature,
+    Plan,
+    Stylus,
+)
+from cmm_uq.analysis.parts.virtual import MeasurementConditions
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.base.units import MICROMETRE
@@ -91,9 +99,9 @@ def refuse_out_of_reach(job: PartJob, machine: Machine) -> None:
             raise CmmUqError(error.problem, where=f"{job.folder / 'job.toml'}: [placing]", fix=error.fix) from error
 
 
-def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> Circumstances:
+def circumstances_of(job: PartJob, machine: MachineState, plan: Plan, places: int) -> MeasurementConditions:
     """How and where the part is measured."""
-    return Circumstances(
+    return MeasurementConditions(
         machine, poses_of(job, places, machine.machine), surroundings_of(job), forms_of(job), job.facts.probing.repeats,
         (*clamping_of(job, plan), *operators_of(job, plan)),
     )  # fmt: skip
@@ -197,20 +205,20 @@ def _stylus(one: StylusFacts) -> Stylus:
                   one.lobing_um, at)  # fmt: skip
 
 
-def _feature(one: Probed, stylus: str, form: FormFacts) -> Feature:
+def _feature(one: Probed, stylus: str, form: FormFacts) -> PartFeature:
     facts = one.facts
     half = None if facts.angle_deg is None else float(np.radians(facts.angle_deg / 2))
     sized = facts.diameter_mm if facts.kind != "plane" else None
     nominal = Nominal(np.array(facts.point_mm), one.direction, sized, half)
-    given = Feature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
+    given = PartFeature(facts.name, facts.kind, one.points, one.normals, stylus, nominal, facts.association)
     whole = whole_surface(facts, form.surface_points)
     return given if whole is None else replace(given, surface=whole.points, surface_normals=whole.normals)
 
 
-def _characteristic(one: CharacteristicFacts) -> Characteristic:
+def _characteristic(one: CharacteristicFacts) -> PartCharacteristic:
     lower, upper = one.lower_mm, one.upper_mm
     if one.asks.limits == "angles":
         lower, upper = (None if limit is None else float(np.radians(limit)) for limit in (one.lower_deg, one.upper_deg))
     elif one.asks.limits == "zone":
         upper = one.tolerance_mm
-    return Characteristic(one.name, one.what, tuple(one.features), tuple(one.datums), lower, upper, one.association)
+    return PartCharacteristic(one.name, one.what, tuple(one.features), tuple(one.datums), lower, upper, one.association)

@@ -53,7 +53,7 @@ _PilotBlock = Callable[[], tuple[Movement, Floats]]
 
 
 @dataclass(frozen=True, eq=False)
-class Circumstances:
+class MeasurementConditions:
     """How and where a part is measured.
 
     Parameters
@@ -88,7 +88,7 @@ class AtPose:
     """
 
     def __init__(
-        self, plan: Plan, given: Circumstances, pose: PartPose, known: Known | None = None, pilot: int = PILOT
+        self, plan: Plan, given: MeasurementConditions, pose: PartPose, known: Known | None = None, pilot: int = PILOT
     ) -> None:
         surroundings = given.surroundings.since(given.machine.temperature_c)
         self.points = points = placed(plan, pose, given.machine.machine, surroundings.columns)
@@ -294,7 +294,9 @@ class Virtual:
     off : (c,) by how much first order is off in the first place, of the standard deviation.
     """
 
-    def __init__(self, plan: Plan, given: Circumstances, known: Known | None = None, pilot: int = PILOT) -> None:
+    def __init__(
+        self, plan: Plan, given: MeasurementConditions, known: Known | None = None, pilot: int = PILOT
+    ) -> None:
         self.plan = plan
         self.known: Known = {} if known is None else known
         self.places = [AtPose(plan, given, pose, self.known, pilot) for pose in given.poses]

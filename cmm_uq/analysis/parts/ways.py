@@ -13,7 +13,7 @@ from cmm_uq.analysis.parts.causes.machine import NOISE
 from cmm_uq.analysis.parts.causes.surroundings import FIXTURE, OPERATOR
 from cmm_uq.analysis.parts.placing import PartPose
 from cmm_uq.analysis.parts.plan import Plan
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances, Virtual, in_parts
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual, in_parts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say, signed
 from cmm_uq.base.points import Floats
@@ -26,7 +26,7 @@ ANEW = (NOISE, OPERATOR, FIXTURE)
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 _QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 # the plan with twice the points in every feature, and its circumstances
-Doubled = Callable[[], tuple[Plan, Circumstances]]
+Doubled = Callable[[], tuple[Plan, MeasurementConditions]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ def _means_drawn(places: Sequence[AtPose], random: np.random.Generator, n: int, 
 
 
 def ways(
-    plan: Plan, given: Circumstances, draws: int = DRAWS, seed: int = 0, *,
+    plan: Plan, given: MeasurementConditions, draws: int = DRAWS, seed: int = 0, *,
     doubled: Doubled | None = None, planned: Virtual | None = None,
 ) -> list[Way]:  # fmt: skip
     """The measurement as it is planned first, then what changes it, each alone.
@@ -89,7 +89,7 @@ def ways(
     return found + _means(plan, given, first, draws, seed)
 
 
-def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: int) -> list[Way]:
+def _means(plan: Plan, given: MeasurementConditions, first: Virtual, draws: int, seed: int) -> list[Way]:
     """Means of several measurements, in several orientations or in one place."""
     found, still = list[Way](), np.eye(3)
     places = {still.tobytes(): first.places[0]}
@@ -112,8 +112,8 @@ def _means(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: i
 
 
 def _changes(
-    plan: Plan, given: Circumstances, doubled: Doubled | None
-) -> Iterator[tuple[Text, Callable[[], tuple[Plan, Circumstances]]]]:
+    plan: Plan, given: MeasurementConditions, doubled: Doubled | None
+) -> Iterator[tuple[Text, Callable[[], tuple[Plan, MeasurementConditions]]]]:
     """Each change of the plan or its circumstances."""
     yield say("each point four times"), lambda: (plan, replace(given, repeats=4 * given.repeats))
     if doubled is not None:
@@ -128,7 +128,7 @@ def _changes(
     yield say("part turned by 90° about Z"), lambda: (plan, replace(given, poses=turned))
 
 
-def _elsewhere(plan: Plan, given: Circumstances, first: Virtual, draws: int, seed: int) -> list[Way]:
+def _elsewhere(plan: Plan, given: MeasurementConditions, first: Virtual, draws: int, seed: int) -> list[Way]:
     """The best of the corners and the middle of what the travel leaves, at the height where the part is; none without travel.
 
     Best is the place with the least mean of the uncertainties over those where it was planned.

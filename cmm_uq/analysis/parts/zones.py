@@ -36,7 +36,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from cmm_uq.analysis.parts.evaluation import Movement
-from cmm_uq.analysis.parts.plan import Feature, Plan
+from cmm_uq.analysis.parts.plan import PartFeature, Plan
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.slow import root
 
@@ -189,7 +189,7 @@ def _left(moved: Floats, normals: Floats, motions: Floats) -> Floats:
     return np.asarray(along - (along @ motions) @ motions.T)
 
 
-def _motions(features: list[Feature]) -> tuple[Floats, Floats]:
+def _motions(features: list[PartFeature]) -> tuple[Floats, Floats]:
     """Normals (m, 3) of the points of features, and (m, r) orthonormal motions and sizes of each; of points all is such."""
     normals = np.concatenate([feature.normals for feature in features])
     found, start = list[Floats](), 0
@@ -201,7 +201,7 @@ def _motions(features: list[Feature]) -> tuple[Floats, Floats]:
     return normals, np.hstack(found)
 
 
-def _own(feature: Feature) -> Floats:
+def _own(feature: PartFeature) -> Floats:
     about = feature.points - feature.points.mean(axis=0)
     about = about / max(float(np.abs(about).max()), 1.0)
     moved = [feature.normals, np.cross(about, feature.normals)]

@@ -19,7 +19,7 @@ from cmm_uq.analysis.planning.noise import PlannedNoise
 from cmm_uq.analysis.planning.set_up import SetUp, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown, reached
@@ -41,7 +41,7 @@ class ExpectedUncertainty:
     with_prior: Floats
 
 
-def expected_uncertainty(model: MeasurementModel, noise: PlannedNoise) -> ExpectedUncertainty:
+def expected_uncertainty(model: RecordingModel, noise: PlannedNoise) -> ExpectedUncertainty:
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear, components = model.linearised(values), noise.components(model, values)
     sizes, weight = noise.spread(components)

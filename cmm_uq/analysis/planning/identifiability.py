@@ -17,7 +17,7 @@ from cmm_uq.analysis.planning.expected import ExpectedUncertainty, expected_unce
 from cmm_uq.analysis.planning.information import FAINT, certified, cosines, gram, imitators, left_of, scales, visible
 from cmm_uq.analysis.planning.noise import PlannedNoise, uncorrelated, white_noise
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.least_squares import LeastSquares, solve
@@ -73,7 +73,7 @@ class Identifiability:
 
 
 def identifiability(
-    model: MeasurementModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
+    model: RecordingModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
 ) -> Identifiability:
     """What the set-ups of a model's artefact determine of its effects, and how rivals would show besides.
 
@@ -139,7 +139,7 @@ def _free(estimate: LeastSquares) -> tuple[Mapping[tuple[str, str], float], ...]
 
 
 def _among_rivals(
-    model: MeasurementModel, rivals: Sequence[Effect], noise: PlannedNoise | None
+    model: RecordingModel, rivals: Sequence[Effect], noise: PlannedNoise | None
 ) -> tuple[list[Pair], tuple[tuple[str, tuple[str, ...]], ...], tuple[str, ...]]:
     """Pairs of rivals not told apart, everything named fitted; rivals taken for named effects; rivals that do not show."""
     wider = replace(model, effects=(*model.effects, *rivals))

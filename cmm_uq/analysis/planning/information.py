@@ -21,7 +21,7 @@ from cmm_uq.analysis.planning.noise import PlannedNoise, uncorrelated
 from cmm_uq.analysis.planning.set_up import SetUp, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.linear_model import Unknown
@@ -76,7 +76,7 @@ def recording_information(setting: Setting, points: Points, also: tuple[Effect, 
     return gram(model, np.array([u.prior_mean for u in model.unknowns]), setting.noise)
 
 
-def gram(model: MeasurementModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
+def gram(model: RecordingModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
     """Information (k, k) of all that a model's recording says about the parameters (k,), without any prior.
 
     ``noise`` in its typical sizes; ``None`` for the white noise that the model states.
@@ -85,14 +85,14 @@ def gram(model: MeasurementModel, values: Floats, noise: PlannedNoise | None = N
     return np.asarray(white.T @ white, dtype=np.float64)
 
 
-def by_measurement(model: MeasurementModel, values: Floats) -> Floats:
+def by_measurement(model: RecordingModel, values: Floats) -> Floats:
     """The same for each measurement (c, k, k), in ascending order, under the white noise that the model states."""
     white = _white(model, values, None)
     index = np.unique(model.artefact.measurement[model.used], return_inverse=True)[1].ravel()
     return np.stack([rows.T @ rows for rows in (white[index == i] for i in range(int(index.max()) + 1))])
 
 
-def _white(model: MeasurementModel, values: Floats, noise: PlannedNoise | None) -> Floats:
+def _white(model: RecordingModel, values: Floats, noise: PlannedNoise | None) -> Floats:
     """Design (m, k) over the noise, the set-up projected out, in the units of :func:`scales`."""
     linear = uncorrelated(model, values, noise)
     return np.asarray(linear.reduced.design * scales(linear.unknowns) / _sigma(model, noise))
@@ -112,7 +112,7 @@ def certified(unknowns: Sequence[Unknown], more: int = 0) -> Floats:
     return np.diag(values)
 
 
-def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Information:
+def shared(model: RecordingModel, noise: PlannedNoise | None = None) -> Information:
     """Information of each measurement of a recording whose set-up's freedoms are common to all of them: a swept bar."""
     values = np.array([u.prior_mean for u in model.unknowns])
     linear = uncorrelated(model, values, noise)
@@ -124,7 +124,7 @@ def shared(model: MeasurementModel, noise: PlannedNoise | None = None) -> Inform
     return Information(linear.unknowns, each, certified(linear.unknowns, linear.freedoms.count))
 
 
-def _sigma(model: MeasurementModel, noise: PlannedNoise | None) -> float:
+def _sigma(model: RecordingModel, noise: PlannedNoise | None) -> float:
     sigma = model.sigma if noise is None else noise.coordinate
     if sigma is None:
         raise ValueError("the information of a measurement needs the noise")

@@ -15,7 +15,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import ABSENT, GROWTH, LARGEST_RATIO, PLACING, RATIO, SLOW, Components, Sizes
@@ -71,7 +71,7 @@ class PlannedNoise:
         sizes = _sizes(self, np.repeat(placing, len(growth)), np.tile(growth, len(placing)))
         return sizes, np.outer(p, g).ravel()
 
-    def components(self, model: MeasurementModel, values: Floats) -> Components:
+    def components(self, model: RecordingModel, values: Floats) -> Components:
         """The noise of a model's observations about parameters (k,), without what depends on the time of a reading."""
         found = noise_of(model, values=values)
         possible = tuple(name for name in found.possible if name != SLOW)
@@ -82,18 +82,18 @@ class PlannedNoise:
         none = np.zeros((len(shares), 0))
         return replace(found, shares=shares, slow=none, frequency=np.zeros(0), possible=possible)
 
-    def over(self, model: MeasurementModel, values: Floats) -> PlannedNoise:
+    def over(self, model: RecordingModel, values: Floats) -> PlannedNoise:
         """The same, growing up to the longest length of this model."""
         return replace(self, longest=float(growing_lengths(model, model.placed(values)).max(initial=0.0)))
 
 
-def white_noise(model: MeasurementModel) -> PlannedNoise:
+def white_noise(model: RecordingModel) -> PlannedNoise:
     """That which a model states; of one µm where it states none."""
     each = model.sigma or MICROMETRE
     return PlannedNoise((each, each, each))
 
 
-def uncorrelated(model: MeasurementModel, values: Floats, noise: PlannedNoise | None) -> LinearModel:
+def uncorrelated(model: RecordingModel, values: Floats, noise: PlannedNoise | None) -> LinearModel:
     """The model about parameters (k,) in observations of which each has the noise of one reading, and none is correlated.
 
     ``noise`` ``None`` for white noise.

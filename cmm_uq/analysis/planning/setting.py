@@ -16,7 +16,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import noise_found, results_named
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Kind, Observe
 from cmm_uq.machine.physics.catalogue import effects, every
@@ -106,9 +106,9 @@ class Setting:
         longest = self.observed(points).sizes[0].nominal
         return replace(self, artefact=self.artefact.model_copy(update={"length_mm": longest}))
 
-    def model(self, points: Points, also: tuple[Effect, ...] = ()) -> MeasurementModel:
+    def model(self, points: Points, also: tuple[Effect, ...] = ()) -> RecordingModel:
         """The model that the job names, with further effects, of the artefact at these points."""
-        return MeasurementModel(self.observed(points), (*self.named, *also), self.sigma)
+        return RecordingModel(self.observed(points), (*self.named, *also), self.sigma)
 
     def observed(self, points: Points) -> Artefact:
         if self.observe is None:

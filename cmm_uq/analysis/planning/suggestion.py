@@ -29,7 +29,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.plan import PlanFacts
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observe, Observed
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.machine.physics.catalogue import every
@@ -159,7 +159,7 @@ def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
     return 1.0, offset**2
 
 
-def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel:
+def _with_all(after: RecordingModel, names: Sequence[str]) -> RecordingModel:
     """The model with further effects, periods as found or the longest."""
     shape = dict(after.shapes)
     for name in names:
@@ -171,8 +171,8 @@ def _with_all(after: MeasurementModel, names: Sequence[str]) -> MeasurementModel
 
 
 def _information(
-    after: MeasurementModel,
-    model: MeasurementModel,
+    after: RecordingModel,
+    model: RecordingModel,
     observe: Observed,
     places: Sequence[SetUp],
     *,
@@ -180,7 +180,7 @@ def _information(
 ) -> _Information:
     fitted = frozenset({ARTEFACT, *(effect.name for effect in after.effects)})
     joint = observe(append(model.artefact.points, places))
-    together = MeasurementModel(joint, model.effects, model.sigma, shapes=model.shapes)
+    together = RecordingModel(joint, model.effects, model.sigma, shapes=model.shapes)
     names = tuple(unknown.key[0] for unknown in together.unknowns)
     if shared_freedoms:
         whole = shared(together)
@@ -196,12 +196,12 @@ def _information(
     return _Information(told, (*names, *[ARTEFACT] * more), fitted, recorded)
 
 
-def _sizes(after: MeasurementModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
+def _sizes(after: RecordingModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
     """Size of each effect of each group, by its first and its own name, without the others of the group."""
     return {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
 
 
-def _size(after: MeasurementModel, name: str, group: Sequence[str]) -> Floats:
+def _size(after: RecordingModel, name: str, group: Sequence[str]) -> Floats:
     """Size at which one effect of a group, without the others, explains the recording, over its prior standard deviation."""
     others = tuple(effect for effect in after.effects if effect.name not in group)
     model = _with_all(replace(after, effects=others), [name])

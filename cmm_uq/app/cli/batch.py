@@ -75,8 +75,7 @@ def command(
 ) -> None:
     """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.laboratory.batch import BatchOptions as Asked
-        from cmm_uq.app.commands.laboratory.batch import write_batch
+        from cmm_uq.app.commands.laboratory.batch import BatchOptions as Asked, write_batch
 
         asked = Asked(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
         batch = write_batch(folders, out, asked, parquet=parquet, stage=stage, records=records)
@@ -93,8 +92,7 @@ def command(
 def _summary(batch: Batch, *, verbose: bool) -> Summary:
     """What came of it, and which jobs failed."""
     from cmm_uq.base.messages import Text, Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.wording import Headline as Verdict, Summary
     from cmm_uq.laboratory.schedule.progress import duration, pace
 
     counted: list[Text] = [say("{count} written", count=batch.written)]

@@ -23,8 +23,7 @@ from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange, Figures
-    from cmm_uq.jobs.dcc.shown import CertificateView as Shown
-    from cmm_uq.jobs.dcc.shown import Grid
+    from cmm_uq.jobs.dcc.shown import CertificateView as Shown, Grid
 
 
 def release(

@@ -40,10 +40,9 @@ from cmm_uq.base.languages.translation import ENGLISH
 
 if TYPE_CHECKING:
     from cmm_uq.base.messages import Text
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.wording import Headline as Verdict, Summary
     from cmm_uq.maths.uncertainty.evaluation import Evaluation
-    from cmm_uq.maths.uncertainty.selftest import Outcome
+    from cmm_uq.maths.uncertainty.selftest import SelfTestResult as Outcome
 
 
 def report(
@@ -170,8 +169,7 @@ def budget(
 def _budget_summary(evaluation: Evaluation) -> Summary:
     """Each output as a certificate could state it; in full as the row of a table too."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.wording import Headline as Verdict, Summary
     from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
 
     names = tuple(evaluation.stated)
@@ -209,8 +207,7 @@ def _selftest_summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool
     """The count, what fails or all figures, and how many there are of each source."""
     from cmm_uq import __version__
     from cmm_uq.base.messages import NOTHING, Verbatim, say
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.wording import Headline as Verdict, Summary
     from cmm_uq.maths.uncertainty.selftest import as_text
 
     def verdict(what: Text, passed: bool, *remarks: Text) -> Verdict:

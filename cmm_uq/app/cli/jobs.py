@@ -246,8 +246,7 @@ def _show_clauses(check: JobCheck) -> None:
 def _check_summary(check: JobCheck) -> Summary:
     """Whether anything would stop report, and all that is wrong."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.wording import Headline as Verdict, Summary
 
     count = len(check.problems)
     if check.sound:

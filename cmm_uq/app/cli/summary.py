@@ -23,8 +23,7 @@ from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED
 
 if TYPE_CHECKING:
     from cmm_uq.certificate.document import Standing
-    from cmm_uq.certificate.wording import Headline as Verdict
-    from cmm_uq.certificate.wording import Summary
+    from cmm_uq.certificate.wording import Headline as Verdict, Summary
 
 FILES = {
     "certificate.html": "the certificate",

@@ -18,7 +18,7 @@ from cmm_uq.certificate.result import SimulatedTwin as Simulated
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY, SimulationFacts
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.model.machine_maps import maps_named
@@ -50,7 +50,7 @@ class Against:
     simulated : for the page.
     """
 
-    model: MeasurementModel
+    model: RecordingModel
     findings: tuple[Finding, ...]
     observe: Observe
     stated_um: float | None
@@ -119,7 +119,7 @@ def _of_maps(job: Job, facts: SimulationFacts, points: Points) -> PredictedError
     return PredictedErrors(errors, exact + facts.u_um * MICROMETRE, exact, SAME, 0.0, 0)
 
 
-def _ratios(model: MeasurementModel, u: Floats, usual: float, stated_um: float | None) -> Floats:
+def _ratios(model: RecordingModel, u: Floats, usual: float, stated_um: float | None) -> Floats:
     """Uncertainty (n,) of each point, recorded and predicted, over that of a typical one."""
     if np.ptp(u) == 0:
         return np.ones(len(u))

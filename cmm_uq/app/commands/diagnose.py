@@ -28,13 +28,12 @@ from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
-from cmm_uq.certificate.outcome import AnalysisResult as Found
-from cmm_uq.certificate.outcome import Outcome, Recipe
+from cmm_uq.certificate.outcome import AnalysisResult as Found, Outcome, Recipe
 from cmm_uq.certificate.result import JobDiagnosis as Diagnosed
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.laboratory.records.place import NONE
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.posterior import NoisyPosterior
 
@@ -74,7 +73,7 @@ def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = 
     return diagnose_model(job, model, findings, seed=seed, alpha=alpha, progress=progress, show=True, against=against)
 
 
-def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+def screened_model(job: Job) -> tuple[RecordingModel, tuple[Finding, ...]]:
     """The model that a job names, without gross outliers, and all that the screening found."""
     model, findings = recorded_model(job)
     model, outliers = without_outliers(model)
@@ -82,7 +81,7 @@ def screened_model(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
 
 
 def diagnose_model(
-    job: Job, model: MeasurementModel, findings: tuple[Finding, ...], *, seed: int, alpha: float = FALSE_ALARMS,
+    job: Job, model: RecordingModel, findings: tuple[Finding, ...], *, seed: int, alpha: float = FALSE_ALARMS,
     progress: Progress | None = None, known: NoisyPosterior | None = None, show: bool = False,
     against: Against | None = None,
 ) -> Diagnosed:  # fmt: skip

@@ -16,10 +16,8 @@ from cmm_uq.analysis.screening.screening import counted_with, gross_outliers
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction
-from cmm_uq.certificate.result import NoiseComponent as Component
-from cmm_uq.certificate.result import RecordingNoise as Noise
-from cmm_uq.machine.model import Estimate, MeasurementModel
+from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction, NoiseComponent as Component, RecordingNoise as Noise
+from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
 from cmm_uq.machine.model.measurement import ARTEFACT
@@ -39,7 +37,7 @@ _ON_LINE = 0.05
 """Extent of points across a line over that along it."""
 
 
-def without_outliers(model: MeasurementModel) -> tuple[MeasurementModel, list[Finding]]:
+def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Finding]]:
     """The model without gross outliers, and what they are; the figures of performance still count them."""
     artefact, used = model.artefact, model.used.copy()
     chosen, estimate = np.flatnonzero(used), model.estimate()
@@ -85,7 +83,7 @@ def _told(
             yield replace(finding("outlier", points, artefact.rows[i], why), set_aside=True)
 
 
-def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, float | None]:
+def with_noise(model: RecordingModel) -> tuple[RecordingModel, Estimate, float | None]:
     """Estimate; where the residuals contradict the stated noise, they replace it. Also the χ² test's probability."""
     estimate = model.estimate()
     result = estimate.least_squares
@@ -99,14 +97,14 @@ def with_noise(model: MeasurementModel) -> tuple[MeasurementModel, Estimate, flo
     return model, estimate, p_value
 
 
-def parameters(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Quantity]]:
+def parameters(model: RecordingModel, values: Floats) -> dict[str, dict[str, Quantity]]:
     """Reported parameters of each effect, by effect and name, of draws (N, k) of the unknowns."""
     found = _quantities(model, values)
     return {effect.name: found[effect.name] for effect in model.effects}
 
 
 def named_draws(
-    model: MeasurementModel, components: Components, posterior: NoisyPosterior, values: Floats, *, mixture: bool
+    model: RecordingModel, components: Components, posterior: NoisyPosterior, values: Floats, *, mixture: bool
 ) -> Draws:  # fmt: skip
     """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
 
@@ -128,12 +126,12 @@ def named_draws(
     return Draws(units, np.concatenate([*mixed, chains], axis=2))
 
 
-def sizes(model: MeasurementModel, values: Floats) -> dict[str, Quantity]:
+def sizes(model: RecordingModel, values: Floats) -> dict[str, Quantity]:
     """Sizes of the artefact, by name, of draws (N, k) of the unknowns."""
     return _quantities(model, values).get(ARTEFACT, {})
 
 
-def _quantities(model: MeasurementModel, values: Floats) -> dict[str, dict[str, Quantity]]:
+def _quantities(model: RecordingModel, values: Floats) -> dict[str, dict[str, Quantity]]:
     found: dict[str, dict[str, Quantity]] = {}
     for (owner, name), (draws, own) in model.reported(values).items():
         found.setdefault(owner, {})[name] = Quantity.of_draws(draws, own)
@@ -180,7 +178,7 @@ def _wider(estimate: Estimate, posterior: Posterior) -> float:
 
 
 def with_doubt(
-    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, draws: Floats, causes: Sequence[Cause]
+    model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, draws: Floats, causes: Sequence[Cause]
 ) -> tuple[Floats, Doubt]:  # fmt: skip
     """Draws (N, k) of the model's unknowns with what is in doubt about all observations together; as they are without."""
     if not causes:
@@ -191,7 +189,7 @@ def with_doubt(
 
 
 def contradictions(
-    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, averaged: Floats
+    model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, averaged: Floats
 ) -> tuple[Contradiction, ...]:  # fmt: skip
     """Averaged scales of axes that lines along these deny: of each the line that does most.
 
@@ -234,7 +232,7 @@ def contradictions(
     return tuple(found)
 
 
-def _lines(model: MeasurementModel, along: Floats, placings: Freedoms) -> Iterator[tuple[int, Floats]]:
+def _lines(model: RecordingModel, along: Floats, placings: Freedoms) -> Iterator[tuple[int, Floats]]:
     """Each measurement of points on one line, and the weights (m,) of the used observations in its slope, mm/mm."""
     measurement, points = model.artefact.measurement[model.used], model.artefact.points
     for number in np.unique(measurement).tolist():
@@ -247,7 +245,7 @@ def _lines(model: MeasurementModel, along: Floats, placings: Freedoms) -> Iterat
 
 
 def accuracy(
-    model: MeasurementModel, estimate: Estimate, posterior: NoisyPosterior, causes: Sequence[Cause], seed: int
+    model: RecordingModel, estimate: Estimate, posterior: NoisyPosterior, causes: Sequence[Cause], seed: int
 ) -> Mapping[str, Quantity]:
     """Figures of performance of all recorded lengths, the noise drawn anew; empty for an artefact that has none.
 

@@ -20,7 +20,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.outcome import OwnAnalysis, Recipe
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import MEASURED
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT, Artefact
 from cmm_uq.machine.model.kind import Kind
 from cmm_uq.machine.model.recorded import NANOMETRE, display_step
@@ -32,7 +32,7 @@ FEWEST_LEFT = 3
 """Observations that the noise is estimated from, beside those that sizes and set-ups could explain."""
 
 
-def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
+def model_of(job: Job, artefact: Artefact) -> RecordingModel:
     """The model that the job names."""
     if len(artefact.noise_scale) > OBSERVATIONS.most:
         raise CmmUqError(
@@ -57,7 +57,7 @@ def model_of(job: Job, artefact: Artefact) -> MeasurementModel:
     named = effects(job.facts.model.effects, where="job.toml [model] effects")
     if unfit := next(filter(None, (effect.unfit(artefact.points) for effect in named)), None):
         raise unfit
-    model = MeasurementModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
+    model = RecordingModel(artefact, named, None if stated is None else stated * MICROMETRE, used)
     _refuse_open_sizes(model, job.recording_path)
     _refuse_hidden_noise(model, job.recording_path)
     return model
@@ -69,7 +69,7 @@ def _copies(artefact: Artefact, aside: Sequence[int]) -> NDArray[np.bool_]:
     return np.asarray(group[counted_with(artefact.points, aside)[rows]] != group[rows])
 
 
-def _refuse_open_sizes(model: MeasurementModel, where: str) -> None:
+def _refuse_open_sizes(model: RecordingModel, where: str) -> None:
     """Refuse measurements that leave open, whatever the machine's errors, what the measurement is made for."""
     sought = [i for i, size in enumerate(model.artefact.sizes) if size.role == "sought"]
     if not sought:
@@ -81,14 +81,14 @@ def _refuse_open_sizes(model: MeasurementModel, where: str) -> None:
                          fix="Set fewer measurements aside, or record more")  # fmt: skip
 
 
-def _rank(model: MeasurementModel, columns: Sequence[int] | slice = slice(None)) -> tuple[int, int]:
+def _rank(model: RecordingModel, columns: Sequence[int] | slice = slice(None)) -> tuple[int, int]:
     """Rank of some columns of the design, and how many observations there are, what is of no interest projected out."""
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     design = (linear.reduced.design * np.array([unknown.scale for unknown in model.unknowns]))[:, columns]
     return int(np.linalg.matrix_rank(design, tol=RANK_TOLERANCE * np.linalg.norm(design, 2))), linear.reduced.count
 
 
-def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
+def _refuse_hidden_noise(model: RecordingModel, where: str) -> None:
     """Refuse to estimate the noise where what is in doubt about each set-up could explain every residual."""
     if model.sigma is not None or all(size.role != "set-up" for size in model.artefact.sizes):
         return
@@ -102,7 +102,7 @@ def _refuse_hidden_noise(model: MeasurementModel, where: str) -> None:
         )  # fmt: skip
 
 
-def recorded_model(job: Job, *, placings: bool = False) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+def recorded_model(job: Job, *, placings: bool = False) -> tuple[RecordingModel, tuple[Finding, ...]]:
     """The model that a job names, of what the screening leaves of its recording, and what it found.
 
     placings : whether nothing but the placings is of interest, for which nominal coordinates serve as well.
@@ -122,7 +122,7 @@ def recorded_model(job: Job, *, placings: bool = False) -> tuple[MeasurementMode
     return model, (*recording.findings, *_unread(artefact))
 
 
-def _refuse_exact(job: Job, model: MeasurementModel) -> None:
+def _refuse_exact(job: Job, model: RecordingModel) -> None:
     """Refuse what is said to be measured and fits to the last digit, though its digits would show a nanometre."""
     found = model.estimate().least_squares
     if job.origin != MEASURED or found.degrees_of_freedom < FEWEST_LEFT:

@@ -34,7 +34,7 @@ from cmm_uq.laboratory.proving.cases import Case, sha256_of, truth_file
 from cmm_uq.laboratory.proving.design import Design
 from cmm_uq.laboratory.proving.judgement import ANSWER, REFUSED, ProofJudgement, judge
 from cmm_uq.laboratory.schedule.processes import check_workers
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import every, plugins
 from cmm_uq.maths.inference.posterior import sample_with_noise
@@ -204,7 +204,7 @@ def _placings(job: Job) -> Points:
     return make_plan(job, power=False).outlook.points
 
 
-def _noise_found(model: MeasurementModel) -> Noise:
+def _noise_found(model: RecordingModel) -> Noise:
     """What a recording shows of its noise: each component in its median size, absent where it is more probably so."""
     estimate, components = model.estimate(), noise_of(model)
     posterior = sample_with_noise(estimate.linear, components, estimate.least_squares, 0)

@@ -26,7 +26,7 @@ from cmm_uq.laboratory.proving.cases import Case
 from cmm_uq.laboratory.proving.design import Design
 from cmm_uq.laboratory.proving.judgement import REFUSED
 from cmm_uq.laboratory.schedule.processes import serve
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
@@ -51,7 +51,7 @@ class CaseSetting:
     alpha: float
 
 
-def model_on(job: Job, points: Points) -> MeasurementModel:
+def model_on(job: Job, points: Points) -> RecordingModel:
     """What a job names, of its artefact at points."""
     artefact = kind_of(job).observing("proved")(job.facts.artefact, points, where=job.recording_path)
     return model_of(job, artefact)

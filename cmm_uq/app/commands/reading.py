@@ -8,8 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.analysis.conformity.standards import names as standard_names
-from cmm_uq.analysis.conformity.standards import standard_named
+from cmm_uq.analysis.conformity.standards import names as standard_names, standard_named
 from cmm_uq.artefacts import names, table_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
@@ -17,8 +16,7 @@ from cmm_uq.base.files.limits import TABLE_BYTES
 from cmm_uq.base.files.toml_file import as_toml
 from cmm_uq.base.languages.translation import Code
 from cmm_uq.base.plugins import naming_package
-from cmm_uq.jobs import derived_job as predicted
-from cmm_uq.jobs import reading
+from cmm_uq.jobs import derived_job as predicted, reading
 from cmm_uq.jobs.derived_job import against
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import Nameable

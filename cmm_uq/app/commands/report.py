@@ -29,8 +29,7 @@ from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.origin import DIGITAL
-from cmm_uq.certificate.outcome import AnalysisResult as Found
-from cmm_uq.certificate.outcome import Outcome, Page, Recipe
+from cmm_uq.certificate.outcome import AnalysisResult as Found, Outcome, Page, Recipe
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job

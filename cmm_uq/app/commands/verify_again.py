@@ -142,9 +142,7 @@ def plugins_missing(inquiry: Inquiry, data: Mapping[str, Any]) -> bool:
 
 def _by_another_version(inquiry: Inquiry, given: Given, job: Job, made: str) -> None:
     """Say which corrections touch a certificate of another version, and compute its figures as they are now."""
-    from cmm_uq.app.commands.certificates.affected import JobInputs as Inputs
-    from cmm_uq.app.commands.certificates.affected import between, order
-    from cmm_uq.app.commands.certificates.affected import stated_version as said
+    from cmm_uq.app.commands.certificates.affected import JobInputs as Inputs, between, order, stated_version as said
 
     if said(made) >= order(__version__):
         inquiry.left(AGAIN, f"made by version {made}, and this is {__version__}: install that")

@@ -22,7 +22,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify.again import compare_again
 from cmm_uq.certificate.verify.decisions import check_part_decisions
 from cmm_uq.certificate.verify.figures import check_part_figures, check_verdicts
-from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Finding, Inquiry
+from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry, VerificationFinding
 from cmm_uq.certificate.verify.given import RESULTS, Given, language_of
 from cmm_uq.certificate.verify.inputs import check_part_job, check_results, check_standing, inputs_of
 from cmm_uq.certificate.verify.stated import check_part_stated
@@ -196,7 +196,7 @@ def _merge(inquiry: Inquiry, inner: Inquiry, where: str) -> None:
     """What was found of the certificate inside, named as such."""
     for one in inner.findings:
         inquiry.findings.append(
-            Finding(one.check, _within(where, one.file), one.place, one.problem, one.stands, one.should)
+            VerificationFinding(one.check, _within(where, one.file), one.place, one.problem, one.stands, one.should)
         )
     for left in inner.unchecked:
         if (left.what, left.why) != (AGAIN, NOT_ASKED):

@@ -9,7 +9,7 @@ from typing import Any, cast
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.distances import page as adjustment_section
 from cmm_uq.artefacts.distances.equations import DistanceSolution, second_way_data, solve_distances
-from cmm_uq.artefacts.distances.lengths import Lengths, Setting, lengths_of, settings
+from cmm_uq.artefacts.distances.lengths import AdjustmentSetting, Lengths, lengths_of, settings
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, number, say
 from cmm_uq.base.units import MICROMETRE, unit
@@ -19,7 +19,7 @@ from cmm_uq.certificate.pages.budget import budget_blocks
 from cmm_uq.certificate.plots.residuals import length_plot, residual_volume
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import deviating, numbered, refusal
-from cmm_uq.maths.uncertainty.budget import Budget, Line
+from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budget_results import budget_data
 from cmm_uq.maths.uncertainty.quantity import rounded
 
@@ -30,7 +30,7 @@ class BallbarFigures:
 
     lengths: Lengths
     budget: Budget
-    settings: tuple[Setting, ...]
+    settings: tuple[AdjustmentSetting, ...]
     second_way: DistanceSolution | Text
 
 
@@ -59,7 +59,7 @@ def _budget(result: Result, bar: Ballbar) -> Budget:
     coordinate = result.noise.coordinate
     origin = say("residuals of this recording") if coordinate.u > 0 else say("stated in the job")
     lines = [
-        Line(
+        BudgetLine(
             say("Coordinate of a ball, along the bar, twice"),
             coordinate.value,
             origin,
@@ -73,7 +73,9 @@ def _budget(result: Result, bar: Ballbar) -> Budget:
         chain = result.job.facts.artefact.certificate
         number = chain.number if chain else ""
         source = say("certificate {number}", number=Verbatim(number)) if number else say("certificate")
-        lines.append(Line(say("Certified length"), size.sd / MICROMETRE, source, unit=unit("µm"), sensitivity=-1.0))
+        lines.append(
+            BudgetLine(say("Certified length"), size.sd / MICROMETRE, source, unit=unit("µm"), sensitivity=-1.0)
+        )
     return Budget(say("deviation of one length"), lines, unit=unit("µm"))
 
 

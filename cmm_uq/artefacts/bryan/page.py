@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.artefacts.bryan.observe import Bryan
 from cmm_uq.artefacts.distances import page as adjustment_section
 from cmm_uq.artefacts.distances.equations import FACTORS, DistanceSolution, second_way_data
-from cmm_uq.artefacts.distances.lengths import Lengths, Setting, lengths_of, settings
+from cmm_uq.artefacts.distances.lengths import AdjustmentSetting, Lengths, lengths_of, settings
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, number, say
 from cmm_uq.certificate.document import Section
@@ -25,7 +25,7 @@ class BryanFigures:
     """Distances of the swept ball from the best centre against their mean, what to adjust, and the second way to it."""
 
     lengths: Lengths
-    settings: tuple[Setting, ...]
+    settings: tuple[AdjustmentSetting, ...]
     second_way: DistanceSolution | Text
 
 

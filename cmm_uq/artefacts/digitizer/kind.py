@@ -14,7 +14,7 @@ from cmm_uq.machine.model.kind import Kind
 Uncertainties = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]  # of x, y, z
 
 
-class AlignmentFacts(ArtefactFacts):
+class ReferenceSphereFacts(ArtefactFacts):
     """``length_mm`` is the diameter of the reference sphere, for a recording of scans.
 
     ``offset_mm`` [U1 V1 W1] by the drawing, to hold the result against and to plan by; ``u_attitude_arcsec`` standard
@@ -63,8 +63,8 @@ BEGINNING = Beginning(
 
 KIND = Kind(
     name="digitizer",
-    table=AlignmentFacts,
-    observe="cmm_uq.artefacts.digitizer.observe:Digitizer",
+    table=ReferenceSphereFacts,
+    observe="cmm_uq.artefacts.digitizer.observe:DigitizerArtefact",
     screen="cmm_uq.artefacts.digitizer.observe:SCREENING",
     plan="cmm_uq.artefacts.digitizer.plan:PLANNING",
     page="cmm_uq.artefacts.digitizer.page:PAGE",

@@ -29,7 +29,7 @@ from cmm_uq.analysis.screening.shape import (
     samples_of,
     spread,
 )
-from cmm_uq.artefacts.digitizer.kind import AlignmentFacts
+from cmm_uq.artefacts.digitizer.kind import ReferenceSphereFacts
 from cmm_uq.artefacts.digitizer.plan import ANGLES, alignments, check_angles, refuse_undetermined, scan_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim, say
@@ -109,7 +109,7 @@ OFFSET = ("U1", "V1", "W1")
 _FAR = 0.2  # part of the offset by which a drawing may be off before a unit or a column is taken for mistaken
 
 
-class Digitizer(Artefact):
+class DigitizerArtefact(Artefact):
     """A laser digitizer in several attitudes, each a ``measurement``.
 
     ``facts`` what the job says of it; ``points`` the recording, with ``alpha_deg``, ``beta_deg``, ``gamma_deg``; scale
@@ -121,7 +121,7 @@ class Digitizer(Artefact):
     kind = "digitizer"
     title = say("Laser digitizer")
 
-    def __init__(self, facts: AlignmentFacts, points: Points, *, where: str | None = None) -> None:
+    def __init__(self, facts: ReferenceSphereFacts, points: Points, *, where: str | None = None) -> None:
         check_angles(points, where)
         self.poses = Placings.of(points.measurement)
         self.attitude = attitudes(points)
@@ -227,7 +227,7 @@ class Digitizer(Artefact):
                 ]  # fmt: skip
         return tuple(found)
 
-    def _refuse_another(self, facts: AlignmentFacts, points: Points, where: str | None) -> None:
+    def _refuse_another(self, facts: ReferenceSphereFacts, points: Points, where: str | None) -> None:
         if not np.ptp(points.xyz, axis=0).any():
             raise CmmUqError("the scale readings are all the same: nothing moved between the attitudes", where=where,
                              fix="Record the scale readings D, E, F as x_mm, y_mm, z_mm")  # fmt: skip
@@ -246,7 +246,7 @@ _UNKNOWNS = 6
 _SOUND = 1e-2  # least singular value, over the largest, of three attitudes that tell an offset
 
 
-def shape_of(facts: AlignmentFacts, points: Points) -> ArtefactShape | None:
+def shape_of(facts: ReferenceSphereFacts, points: Points) -> ArtefactShape | None:
     """Spheres, one in each attitude, or centres; ``None`` without attitudes, or with scans of a few points."""
     if any(name not in points.columns for name in ANGLES):
         return None

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cmm_uq.artefacts.digitizer.observe import OFFSET, Digitizer
+from cmm_uq.artefacts.digitizer.observe import OFFSET, DigitizerArtefact
 from cmm_uq.artefacts.digitizer.plan import ANGLES, THREE, words, worst_direction
 from cmm_uq.base.messages import DASH, Text, Verbatim, number, say, semicolons, signed
 from cmm_uq.base.points import Floats
@@ -28,7 +28,7 @@ _SAME_ATTITUDE = 0.01  # degrees within which an attitude is one of the source's
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class AttitudePose:
     """One attitude, aligned by itself.
 
     ``measurement`` number; ``angles_deg`` (3,) α, β, γ; ``points`` recorded in it; ``reading_mm`` (3,) [D0 E0 F0];
@@ -51,9 +51,9 @@ class DigitizerFigures:
     result: Result
 
     @property
-    def digitizer(self) -> Digitizer:
+    def digitizer(self) -> DigitizerArtefact:
         """With its recording."""
-        return cast("Digitizer", self.result.artefact)
+        return cast("DigitizerArtefact", self.result.artefact)
 
     @property
     def offset(self) -> tuple[Quantity, ...]:
@@ -86,7 +86,7 @@ class DigitizerFigures:
         return worst_direction(self.digitizer.alignments)
 
     @cached_property
-    def poses(self) -> tuple[Pose, ...]:
+    def poses(self) -> tuple[AttitudePose, ...]:
         """Every attitude."""
         digitizer, found = self.digitizer, []
         offset = np.array([one.value for one in self.offset])
@@ -100,7 +100,7 @@ class DigitizerFigures:
             angles = np.array([float(digitizer.points.columns[name][rows][0]) for name in ANGLES])
             off = (one.reading - one.attitude @ offset - self.sphere) / MICROMETRE
             rms = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else None
-            found.append(Pose(measurement, angles, int(rows.sum()), one.reading, off, rms))
+            found.append(AttitudePose(measurement, angles, int(rows.sum()), one.reading, off, rms))
         return tuple(found)
 
     @cached_property
@@ -171,7 +171,7 @@ def _offset(found: DigitizerFigures) -> Table:
     return Table(say("Offset of the mount"), columns, tuple(rows), notes)
 
 
-def _assumed(digitizer: Digitizer) -> list[Block]:
+def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
     """What of the set-ups enters the uncertainty, and what does not."""
     known: list[Text] = []
     missing: list[Text] = []
@@ -246,7 +246,7 @@ def _attitudes(found: DigitizerFigures) -> Table:
     return Table(say("Every attitude"), columns, tuple(rows), notes)
 
 
-def _residuals(result: Result, digitizer: Digitizer) -> Plot:
+def _residuals(result: Result, digitizer: DigitizerArtefact) -> Plot:
     after = result.residuals / MICROMETRE
     before = _before(digitizer) / MICROMETRE
     expanded_um = result.noise.expanded
@@ -271,7 +271,7 @@ def _residuals(result: Result, digitizer: Digitizer) -> Plot:
     )  # fmt: skip
 
 
-def _before(digitizer: Digitizer) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _before(digitizer: DigitizerArtefact) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     """Residuals (m,), mm, about the offset from the centres, without any effect of the machine."""
     nominal = np.array([size.nominal for size in digitizer.sizes])
     xyz = digitizer.points.xyz

@@ -9,7 +9,7 @@ import numpy as np
 
 from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.analysis.planning.setting import Planning, Setting, Start
-from cmm_uq.artefacts.digitizer.kind import AlignmentFacts
+from cmm_uq.artefacts.digitizer.kind import ReferenceSphereFacts
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, number, say, signed
 from cmm_uq.base.points import Floats, Points
@@ -138,7 +138,7 @@ def scan(attitude: Floats, offset: Floats, radius: float) -> tuple[Floats, Float
 
 def three_attitudes(setting: Setting) -> tuple[SetUp, ...]:
     """The source's three; scans where the job gives the sphere's diameter, else centres."""
-    facts, plan, volume = cast("AlignmentFacts", setting.artefact), setting.plan, setting.volume
+    facts, plan, volume = cast("ReferenceSphereFacts", setting.artefact), setting.plan, setting.volume
     if facts.offset_mm is None:
         raise CmmUqError("where the mount lies is needed", where="job.toml [artefact] offset_mm",
                          fix="Give [U1, V1, W1] by the drawing, mm; it is not taken as known")  # fmt: skip

@@ -23,7 +23,7 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
-from cmm_uq.machine.physics.kinematics import Chain, axis_directions
+from cmm_uq.machine.physics.kinematics import KinematicChain as Chain, axis_directions
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
@@ -117,7 +117,7 @@ ANGLES: Mapping[str, str] = MappingProxyType(
 
 
 @dataclass(frozen=True)
-class Setting:
+class AdjustmentSetting:
     """What to turn or enter on a machine.
 
     ``adjustment`` which screw; ``parameter`` of its effect that it takes away, a key with its unit; ``figure`` to set,
@@ -161,7 +161,7 @@ def turns(squareness: Floats, z_rides_on_y: bool) -> Floats:
     return np.stack([upright, about_x, about_y], axis=-1)
 
 
-def settings(result: Result) -> tuple[Setting, ...]:
+def settings(result: Result) -> tuple[AdjustmentSetting, ...]:
     """What takes away each of the six factors that the recording determines."""
     machine, turned = result.artefact.points.machine, _turns(result)
     found = []
@@ -173,7 +173,9 @@ def settings(result: Result) -> tuple[Setting, ...]:
         low, high = machine.travel_mm["xyz".index(adjustment.axis)]
         per_unit = (PPM if quantity.unit == "ppm" else ARCSECOND) * float(high - low) / MICROMETRE
         found.append(
-            Setting(adjustment, name, figure, figure.times(per_unit, unit("µm")) if np.isfinite(per_unit) else None)
+            AdjustmentSetting(
+                adjustment, name, figure, figure.times(per_unit, unit("µm")) if np.isfinite(per_unit) else None
+            )
         )
     return tuple(found)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cmm_uq.artefacts.distances.equations import FACTORS, DistanceSolution
-from cmm_uq.artefacts.distances.lengths import ANGLES, Setting
+from cmm_uq.artefacts.distances.lengths import ANGLES, AdjustmentSetting
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, number, say, signed
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
@@ -13,14 +13,14 @@ from cmm_uq.maths.uncertainty.quantity import rounded
 
 
 def section(
-    result: Result, settings: tuple[Setting, ...], second_way: DistanceSolution | Text, *remarks: Text
+    result: Result, settings: tuple[AdjustmentSetting, ...], second_way: DistanceSolution | Text, *remarks: Text
 ) -> Section:
     """What to turn or enter, by the fitted model; beside it the six factors by the distance equations."""
     blocks = [*_adjustments(settings), *_second_way(result, second_way, remarks)]
     return Section(say("The adjustment that the machine needs"), tuple(blocks), opinion=True)
 
 
-def _adjustments(settings: tuple[Setting, ...]) -> list[Block]:
+def _adjustments(settings: tuple[AdjustmentSetting, ...]) -> list[Block]:
     rows: list[tuple[Text, ...]] = []
     for setting in settings:
         value, U, _ = expanded(setting.figure)

@@ -12,7 +12,7 @@ from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.diagnosis.location import region_of
 from cmm_uq.artefacts.error_maps.columns import MapColumn, turned
 from cmm_uq.artefacts.error_maps.fit import expansion, function, held_out, noise_of, residual
-from cmm_uq.artefacts.error_maps.search import ColumnComparison, Rival, column_comparison
+from cmm_uq.artefacts.error_maps.search import CandidateCause, ColumnComparison, column_comparison
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
@@ -39,7 +39,7 @@ class Difference:
     """
 
     column: MapColumn
-    rival: Rival
+    rival: CandidateCause
     probability: float
     instead: tuple[Text, ...]
     maps: frozenset[int]

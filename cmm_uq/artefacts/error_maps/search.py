@@ -36,7 +36,7 @@ _WHITE, _CORRELATIONS = 0.5, (0.4, 0.6, 0.8, 0.9)
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class CandidateCause:
     """An explanation of how the maps of a column differ: over the maps (k,), and over position (p, r) mm.
 
     ``map`` is the one that differs, if one does; ``effect`` the effect's name, if it is one;
@@ -63,8 +63,8 @@ class ColumnComparison:
     """
 
     column: MapColumn
-    rivals: tuple[Rival, ...]
-    given: tuple[Rival, ...]
+    rivals: tuple[CandidateCause, ...]
+    given: tuple[CandidateCause, ...]
     seed: int
 
     @cached_property
@@ -162,8 +162,8 @@ class ColumnComparison:
 
 def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> ColumnComparison:
     """The rivals for how the maps of a column differ."""
-    rivals: list[Rival] = []
-    given: list[Rival] = []
+    rivals: list[CandidateCause] = []
+    given: list[CandidateCause] = []
     place, temperatures = column.positions, column.temperatures
     functions = tuple(smooth_functions(place))
     changes = float(np.ptp(temperatures)) > 0
@@ -173,20 +173,22 @@ def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> Col
             say("{title:small}", title=SCALE_EXPANSION[column.axis].title),
         )
         excess = temperatures - REFERENCE_TEMPERATURE
-        expansion = Rival(Verbatim(effect), short, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect)
+        expansion = CandidateCause(
+            Verbatim(effect), short, excess, (EXPANSION.prior_sd * place[:, None],), effect=effect
+        )
         (given if effect in named else rivals).append(expansion)
     if len(temperatures) == 2:
         short = say("difference of the two maps")
         name = say("{error}, difference of the two maps", error=column.title)
-        rivals.append(Rival(name, short, np.array([-0.5, 0.5]), functions))
+        rivals.append(CandidateCause(name, short, np.array([-0.5, 0.5]), functions))
     else:
         if changes:
             share = (temperatures - temperatures.mean()) / np.ptp(temperatures)
             short = say("in proportion to the temperature")
             name = say("{error}, in proportion to the temperature", error=column.title)
-            rivals.append(Rival(name, short, share, functions))
+            rivals.append(CandidateCause(name, short, share, functions))
         for k, one in enumerate(np.eye(len(temperatures))):
             short = say("in the map at {temperature:g} °C", temperature=temperatures[k])
             name = say("{error} in the map at {temperature:g} °C", error=column.title, temperature=temperatures[k])
-            rivals.append(Rival(name, short, one, functions, map=k))
+            rivals.append(CandidateCause(name, short, one, functions, map=k))
     return ColumnComparison(column, tuple(rivals), tuple(given), seed)

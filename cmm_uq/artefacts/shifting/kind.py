@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import Length, Number, Position, Table, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Number, Position, Uncertainty
 from cmm_uq.base.points import AXES, Machine, Points
 from cmm_uq.jobs.beginning import Beginning
 from cmm_uq.jobs.job import Job
@@ -16,7 +16,7 @@ from cmm_uq.jobs.tables.artefact import LENGTH_WORDS, ArtefactFacts, CertifiedVa
 from cmm_uq.machine.model.kind import Kind
 
 
-class KnownLength(Table):
+class KnownLength(JobTable):
     """A known length between two points of a shifted artefact."""
 
     from_point: Annotated[Number, Field(alias="from")]

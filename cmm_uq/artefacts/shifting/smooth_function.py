@@ -91,7 +91,7 @@ BATCH = 250  # parameter vectors handled at once
 
 
 @dataclass(frozen=True, eq=False)
-class Marginal(ABC):
+class SmoothMarginal(ABC):
     """Observations, whitened and freed of all of which nothing is known beforehand.
 
     ``observed`` (p,) mm; ``even``, ``ends`` (p, J) design of the coefficients; ``columns``, ``column_sd`` (p, c) and
@@ -122,7 +122,7 @@ class Marginal(ABC):
         """One draw of w (N, J) and x (N, c) for each parameter vector, from their exact conditional distribution."""
 
 
-class ByObservations(Marginal):
+class ByObservations(SmoothMarginal):
     """For few observations; draws by Matheron's rule."""
 
     def _covariance(self, sd: Floats, growth: Floats, sigma: Floats) -> tuple[Floats, Floats]:
@@ -155,7 +155,7 @@ class ByObservations(Marginal):
         return w, x
 
 
-class ByCoefficients(Marginal):
+class ByCoefficients(SmoothMarginal):
     """For many observations of few coefficients; draws from the factor of their precision."""
 
     @cached_property
@@ -203,7 +203,7 @@ class ByCoefficients(Marginal):
 
 def marginal(
     observed: Floats, even: Floats, ends: Floats, columns: Floats, column_sd: Floats, squares: float, dof: int
-) -> Marginal:
+) -> SmoothMarginal:
     """In the space that is smaller."""
     few = even.shape[1] + columns.shape[1] < len(observed)
     return (ByCoefficients if few else ByObservations)(observed, even, ends, columns, column_sd, squares, dof)

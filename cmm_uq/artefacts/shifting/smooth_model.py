@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-from cmm_uq.artefacts.shifting.smooth_function import BATCH, LONGEST, Marginal, SmoothFunction, marginal
+from cmm_uq.artefacts.shifting.smooth_function import BATCH, LONGEST, SmoothFunction, SmoothMarginal, marginal
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.inference.draws import evenly
 from cmm_uq.maths.inference.ensembles import Chains, Progress, run_ensembles
@@ -71,7 +71,7 @@ class SmoothModel:
         return len(self.functions) + 2 + (self.sigma is None)
 
     @cached_property
-    def _reduced(self) -> Marginal:
+    def _reduced(self) -> SmoothMarginal:
         """Whitened, and projected on what the flat columns cannot explain."""
         Q, _ = linalg.qr(self.flat / self.noise_scale[:, None])
         rest = Q[:, self.flat.shape[1] :].T / self.noise_scale

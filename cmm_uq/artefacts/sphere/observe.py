@@ -60,7 +60,7 @@ class ProbedSpheres:
     centres: Floats
 
 
-class Sphere(Radial):
+class SphereArtefact(Radial):
     """A probed sphere: ``length_mm`` is its diameter.
 
     ``facts`` what the job says of the sphere; ``points`` the recording, with ``nx, ny, nz`` where they are known.

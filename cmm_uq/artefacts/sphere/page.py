@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.artefacts.sphere.observe import SphereArtefact
 from cmm_uq.base.messages import Number, Text, number, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE, unit
@@ -18,13 +18,13 @@ from cmm_uq.certificate.wording import deviating, numbered
 from cmm_uq.maths.uncertainty.quantity import alike, rounded
 
 
-def deviations_um(sphere: Sphere) -> Floats:
+def deviations_um(sphere: SphereArtefact) -> Floats:
     """(n,) distance of each point from its best centre minus the certified or mean radius, µm."""
     radius = sphere.sizes[0].nominal * sphere.per_size * sphere.expansion
     return np.asarray((sphere.distances(sphere.points.xyz, None) - radius) / MICROMETRE, dtype=np.float64)
 
 
-def about_centre(sphere: Sphere) -> Floats:
+def about_centre(sphere: SphereArtefact) -> Floats:
     """(n, 3) places of the points about their centres, on the sphere of the nominal size, mm."""
     return np.asarray(
         sphere.size_change() * sphere.sizes[0].nominal * sphere.directions(sphere.points.xyz), dtype=np.float64
@@ -33,7 +33,7 @@ def about_centre(sphere: Sphere) -> Floats:
 
 def results(result: Result) -> dict[str, Any]:
     """Form and size errors for results.json."""
-    sphere = cast("Sphere", result.artefact)
+    sphere = cast("SphereArtefact", result.artefact)
     probed, certified = sphere.probed(), sphere.sizes[0].certified
     return {
         "spheres": [
@@ -49,7 +49,7 @@ def results(result: Result) -> dict[str, Any]:
 
 def sections(result: Result) -> list[Section]:
     """Form and size (ISO 10360-5), radial deviations by point, residuals over the sphere."""
-    sphere = cast("Sphere", result.artefact)
+    sphere = cast("SphereArtefact", result.artefact)
     return [
         Section(
             say("Probing of the sphere"), (_table(result, sphere), _by_point(result, sphere), _over(result, sphere))
@@ -57,7 +57,7 @@ def sections(result: Result) -> list[Section]:
     ]
 
 
-def _table(result: Result, sphere: Sphere) -> Table:
+def _table(result: Result, sphere: SphereArtefact) -> Table:
     probed, size = sphere.probed(), sphere.sizes[0]
     noise = result.noise.expanded
     repeated = probed.repeat.max() > 1
@@ -83,7 +83,7 @@ def _table(result: Result, sphere: Sphere) -> Table:
     return Table(say("Probing errors"), tuple(columns), tuple(rows), tuple(notes))
 
 
-def _by_point(result: Result, sphere: Sphere) -> Plot:
+def _by_point(result: Result, sphere: SphereArtefact) -> Plot:
     size = sphere.sizes[0]
     deviations = deviations_um(sphere)
     residuals, expanded = result.residuals / MICROMETRE, result.noise.expanded
@@ -110,7 +110,7 @@ def _by_point(result: Result, sphere: Sphere) -> Plot:
     )  # fmt: skip
 
 
-def _over(result: Result, sphere: Sphere) -> Plot:
+def _over(result: Result, sphere: SphereArtefact) -> Plot:
     residuals = result.residuals / MICROMETRE
     low, high = alike(residuals.min(), residuals.max())
     return volume_plot(

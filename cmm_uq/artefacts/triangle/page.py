@@ -31,7 +31,7 @@ ALIKE = 0.9  # correlation from which on two estimates are hardly told apart
 
 
 @dataclass(frozen=True)
-class Standard:
+class StandardFigures:
     """Figures of the standard at 20 °C, each with U for 95 % by Monte Carlo: sides and height, mm; angles, rad."""
 
     sides: tuple[tuple[float, float], ...]
@@ -116,14 +116,14 @@ class TriangleFigures:
         return cast("Triangle", self.result.artefact)
 
     @cached_property
-    def standard(self) -> Standard:
+    def standard(self) -> StandardFigures:
         standard = self._triangle.standard
         figures, draws = standard.figures(), standard.draws(self.result.posterior.seed)
         sides, angles = (
             tuple((float(values[i]), _expanded(drawn[:, i])) for i in range(3))
             for values, drawn in ((figures.sides, draws.sides), (figures.angles, draws.angles))
         )
-        return Standard(sides, angles, (float(figures.height), _expanded(draws.height)), DRAWS)
+        return StandardFigures(sides, angles, (float(figures.height), _expanded(draws.height)), DRAWS)
 
     @cached_property
     def sides(self) -> Sides:
@@ -223,7 +223,7 @@ def sections(result: Result) -> list[Section]:
     ]
 
 
-def _standard(standard: Standard) -> Table:
+def _standard(standard: StandardFigures) -> Table:
     rows: list[tuple[Text, ...]] = [
         (say("Side {name}", name=Verbatim(name)), *rounded(*side), unit("mm"))
         for name, side in zip(SIDES, standard.sides, strict=True)

@@ -24,7 +24,7 @@ DRAWS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class TriangleFigures:
+class TriangleGeometry:
     """Sides 1–2, 2–3, 3–1 (mm), angles at 1, 2, 3 (rad) and height over the side 1–2 (mm), each (..., ) of a set of draws."""
 
     sides: Floats
@@ -60,18 +60,18 @@ class TriangleStandard:
         """(3,) between cylinder axes, mm."""
         return np.asarray(SIDES_OF_DIMENSIONS @ self.dimensions, dtype=np.float64)
 
-    def figures(self) -> TriangleFigures:
+    def figures(self) -> TriangleGeometry:
         """Sides, angles and height of the dimensions as certified."""
         return figures_of(self.sides)
 
-    def draws(self, seed: int, count: int = DRAWS) -> TriangleFigures:
+    def draws(self, seed: int, count: int = DRAWS) -> TriangleGeometry:
         """The same of normal draws of the dimensions (JCGM 101:2008, 7)."""
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(6,)))
         dimensions = self.dimensions + self.u * random.standard_normal((count, len(DIMENSIONS)))
         return figures_of(dimensions @ SIDES_OF_DIMENSIONS.T)
 
 
-def figures_of(sides: Floats) -> TriangleFigures:
+def figures_of(sides: Floats) -> TriangleGeometry:
     """Angles by the cosine rule, and height, of sides (..., 3)."""
     c, a, b = np.moveaxis(sides, -1, 0)
 
@@ -79,7 +79,7 @@ def figures_of(sides: Floats) -> TriangleFigures:
         return np.asarray(np.arccos((one**2 + other**2 - opposite**2) / (2 * one * other)), dtype=np.float64)
 
     angles = np.stack([angle(a, b, c), angle(b, c, a), angle(c, a, b)], axis=-1)
-    return TriangleFigures(sides, angles, np.asarray(b * np.sin(angles[..., 0]), dtype=np.float64))
+    return TriangleGeometry(sides, angles, np.asarray(b * np.sin(angles[..., 0]), dtype=np.float64))
 
 
 def corners(sides: Floats) -> Floats:

@@ -18,7 +18,7 @@ from cmm_uq.base.files.csv_table import column_problem
 from cmm_uq.base.files.limits import EFFECTS, LISTED
 
 
-class Table(BaseModel):
+class JobTable(BaseModel):
     """A table: no key beyond the known ones, no text where a number belongs, no NaN."""
 
     # most tables are never read: what checks them is made when it is first needed

@@ -14,12 +14,14 @@ from cmm_uq.certificate.diagnosis.sections import explanation, next_sentence, wi
 from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.effect_words import effect_of, size_of, title_of, titles
 from cmm_uq.certificate.result import JobDiagnosis
-from cmm_uq.certificate.sections.findings import VERDICTS as AGAINST
-from cmm_uq.certificate.sections.findings import contained, other_periods
-from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
+from cmm_uq.certificate.sections.findings import (
+    VERDICTS as AGAINST,
+    contained,
+    other_periods,
+    sentences as withheld_sentences,
+)
 from cmm_uq.certificate.sections.where import by_columns, place_words
-from cmm_uq.certificate.wording import Headline as Verdict
-from cmm_uq.certificate.wording import Summary, probability
+from cmm_uq.certificate.wording import Headline as Verdict, Summary, probability
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike

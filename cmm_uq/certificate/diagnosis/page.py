@@ -37,12 +37,12 @@ from cmm_uq.certificate.sections.findings import (
     corrections,
     improvement_table,
     other_periods,
+    sentences as withheld_sentences,
     simulation_section,
 )
-from cmm_uq.certificate.sections.findings import sentences as withheld_sentences
 from cmm_uq.certificate.sections.where import where_section
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, with_uncertainty
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.uncertainty.quantity import alike, figure
 from cmm_uq.maths.uncertainty.type_a import factor_of_noise
@@ -207,7 +207,7 @@ def _before_after(result: JobDiagnosis) -> tuple[Block, ...]:
     return (plot, table, changes) if changes else (plot, table)
 
 
-def _residuals(model: MeasurementModel) -> Floats:
+def _residuals(model: RecordingModel) -> Floats:
     """(m,) µm."""
     return model.residuals(model.estimate().least_squares.value) / MICROMETRE
 
@@ -252,7 +252,7 @@ def _changes(result: JobDiagnosis) -> Table | None:
     return Table(say("What it changes in the estimates (least squares)"), heads, rows) if rows else None
 
 
-def _title_of(key: tuple[str, str], model: MeasurementModel) -> Text:
+def _title_of(key: tuple[str, str], model: RecordingModel) -> Text:
     """A parameter of an effect, or a size of the artefact, in words."""
     owner, name = key
     if owner == ARTEFACT:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.base.languages.translation import ENGLISH, Code
-from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.languages.translation import ENGLISH, Code, translated as said_in
 from cmm_uq.base.messages import Day, Number, Text, Verbatim, say
 from cmm_uq.base.units import UNITS
 from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, draft, replaced_certificate

@@ -12,7 +12,7 @@ from cmm_uq.maths.uncertainty.budget import HEADINGS, Budget
 from cmm_uq.maths.uncertainty.budget_results import COMPARISON, SUMMARY, comparison_rows, statement, summary_rows
 
 if TYPE_CHECKING:
-    from cmm_uq.maths.uncertainty.evaluation import Evaluation, Stated
+    from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult as Stated
     from cmm_uq.maths.uncertainty.model_file import ModelFile
     from cmm_uq.maths.uncertainty.ready import ReadyBudget
 

@@ -19,8 +19,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, 
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
-from cmm_uq.certificate.wording import Figure, Summary, probability
-from cmm_uq.certificate.wording import Headline as Verdict
+from cmm_uq.certificate.wording import Figure, Headline as Verdict, Summary, probability
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import rounded, significant
 

@@ -16,7 +16,7 @@ from cmm_uq.analysis.parts.budget import PointErrors, VarianceShares
 from cmm_uq.analysis.parts.methods.method import MethodComparison
 from cmm_uq.analysis.parts.plan import Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.analysis.parts.ways import Way
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
@@ -101,7 +101,7 @@ class PartMeasurement:
     job: PartJob
     # plan, given: geometry, and circumstances with the machine's state
     plan: Plan
-    given: Circumstances
+    given: MeasurementConditions
     # virtual, simulated: virtual measurements, and what they say of the errors
     virtual: Virtual
     simulated: Simulated

@@ -22,7 +22,7 @@ from cmm_uq.analysis.parts.methods.method import (
 from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, number, plural, say, sentences, signed
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Column, Paragraph, Section, Table
-from cmm_uq.maths.uncertainty.budget import Line
+from cmm_uq.maths.uncertainty.budget import BudgetLine
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 _NOTHING = 5e-4  # share of a variance that is printed as none
@@ -183,7 +183,7 @@ def _lines(one: MethodFigure) -> list[tuple[Text, ...]]:
     return [*rows, (Verbatim(one.name), whole, told, dof, number(100.0, ".1f"))]
 
 
-def _freedom(line: Line) -> Text:
+def _freedom(line: BudgetLine) -> Text:
     return figure(line.dof, 3) if isfinite(line.dof) else Number("∞")
 
 

@@ -28,8 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import ENGLISH, LANGUAGES, Code, Translation
-from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.languages.translation import ENGLISH, LANGUAGES, Code, Translation, translated as said_in
 from cmm_uq.base.messages import Text, Verbatim
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot

@@ -12,8 +12,7 @@ from dataclasses import replace
 from itertools import chain
 from math import ceil
 
-from cmm_uq.base.languages.translation import code_of
-from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.languages.translation import code_of, translated as said_in
 from cmm_uq.base.messages import Message, Plural, Text, Verbatim, say, sentences
 from cmm_uq.certificate.document import WORDS, Document, Facts, Paragraph, Plot, Section, Table, letters
 

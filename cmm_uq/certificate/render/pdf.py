@@ -17,8 +17,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.languages.translation import Code, code_of
-from cmm_uq.base.languages.translation import translated as said_in
+from cmm_uq.base.languages.translation import Code, code_of, translated as said_in
 from cmm_uq.base.messages import Text, Verbatim, commas, say, sentences
 from cmm_uq.certificate.document import Document, attachment_title, view_words
 from cmm_uq.certificate.plots.style import COLOURS, JAPANESE, fonts_of

@@ -12,7 +12,7 @@ from cmm_uq.certificate.document import Block, Column, DecisionBlock, Plot, Sect
 from cmm_uq.certificate.plots.conformity import trumpet
 from cmm_uq.certificate.wording import OUTCOME_WORDS, probability, stated_value
 from cmm_uq.jobs.tables.conformity import ConformityFacts
-from cmm_uq.maths.uncertainty.budget import Budget, Line
+from cmm_uq.maths.uncertainty.budget import Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import figure, limit_in_full, nominal, significant
 
 
@@ -47,19 +47,19 @@ def budget_table(measurand: Text, budget: Budget) -> Table:
     return Table(say("Contributions to {measurand}", measurand=measurand), columns, rows, tuple(notes))
 
 
-def _u(line: Line) -> Text:
+def _u(line: BudgetLine) -> Text:
     factor, shown = _shown(line)
     return say("{u} {unit}", u=significant((line.u or 0.0) * factor), unit=shown)
 
 
-def _sensitivity(line: Line, scale: float) -> Text:
+def _sensitivity(line: BudgetLine, scale: float) -> Text:
     """Change of the value, µm, by one unit of the quantity as it is shown."""
     factor, shown = _shown(line)
     per = figure(scale / factor * (line.sensitivity or 0.0))
     return per if shown == unit("µm") else say("{per} µm per {unit}", per=per, unit=shown)
 
 
-def _shown(line: Line) -> tuple[float, Text]:
+def _shown(line: BudgetLine) -> tuple[float, Text]:
     """By what a figure of the line is multiplied to be shown, and in which unit."""
     if line.unit == unit("mm"):
         return 1 / MICROMETRE, unit("µm")

@@ -15,7 +15,7 @@ from cmm_uq.certificate.document import Block, Column, Facts, Paragraph, Section
 from cmm_uq.certificate.effect_words import parameter_title, titles
 from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.certificate.wording import expanded, probability, with_uncertainty
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
 
@@ -75,7 +75,7 @@ VERDICTS: Mapping[str, Text] = {
 
 
 def corrections(
-    simulated: SimulatedTwin, model: MeasurementModel, posterior: Posterior
+    simulated: SimulatedTwin, model: RecordingModel, posterior: Posterior
 ) -> dict[str, dict[str, Quantity]]:
     """What the effects that were estimated anew differ by from what the simulation contains, by effect and parameter."""
     found: dict[str, dict[str, Quantity]] = {}

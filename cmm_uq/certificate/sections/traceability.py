@@ -9,7 +9,7 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE, Unit, unit
 from cmm_uq.certificate.document import Block, Facts, Paragraph, Section
 from cmm_uq.certificate.wording import NO_FACTOR, expanded
-from cmm_uq.jobs.chain import Chain, chain_of
+from cmm_uq.jobs.chain import TraceabilityChain, chain_of
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.references import OF_POINTS
 from cmm_uq.jobs.recording.short_gauge import ShortGaugeFacts
@@ -70,7 +70,7 @@ def _listed(chain: Traceability | None) -> list[Text]:
     return [text for _, text in certificate_rows(chain) if text]
 
 
-def claimed(job: Job) -> Chain:
+def claimed(job: Job) -> TraceabilityChain:
     """To what the results of a job are traceable, and what of that is not shown: every output reads it here."""
     known = every()
     return chain_of(

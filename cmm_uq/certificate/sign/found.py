@@ -35,7 +35,7 @@ NOBODY = Trust()
 
 
 @dataclass(frozen=True)
-class Signature:
+class FileSignature:
     """One signature, and what holds of it.
 
     ``subject`` whom the certificate names, whole; ``name`` the same, its common name; ``issuer`` who issued the

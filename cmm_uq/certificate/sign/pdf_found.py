@@ -12,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, Verbatim, commas, plural, say
 from cmm_uq.certificate.sign.extra import installed, ran
-from cmm_uq.certificate.sign.found import Signature, Trust
+from cmm_uq.certificate.sign.found import FileSignature, Trust
 
 if TYPE_CHECKING:
     from pyhanko.pdf_utils.reader import PdfFileReader
@@ -31,7 +31,7 @@ NO_PADES = say("the signature is no PAdES signature")
 _TOLD = 6  # kinds of objects that a message names
 
 
-def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> tuple[Signature, ...]:
+def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> tuple[FileSignature, ...]:
     """Every signature in a PDF, in the order in which they were made; time stamps of the document count with these."""
     with installed():
         from pyhanko.pdf_utils.reader import PdfFileReader
@@ -61,15 +61,15 @@ class _File:
         return any(one.signed_revision > embedded.signed_revision for one in self.embedded)
 
 
-def _found(file: _File, embedded: EmbeddedPdfSignature) -> Signature:
+def _found(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     try:
         return _judged(file, embedded)
     except Exception:  # whatever a hostile file makes the library raise
-        return Signature("", "", "", "PDF", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
+        return FileSignature("", "", "", "PDF", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
                          revocation="not known", test_key=False, problems=(UNREADABLE,))  # fmt: skip
 
 
-def _judged(file: _File, embedded: EmbeddedPdfSignature) -> Signature:
+def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     from cmm_uq.certificate.sign.chain import Evidence, standing
 
     certificate = embedded.signer_cert
@@ -87,7 +87,7 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> Signature:
     judged = standing(certificate, evidence, file.trust, at, proven=proven)
     level = _level(file, embedded, stamped, known=judged.revocation == "good")
     signed = embedded.byte_range
-    return Signature(
+    return FileSignature(
         certificate.subject.human_friendly,
         str(certificate.subject.native.get("common_name", certificate.subject.human_friendly)),
         certificate.issuer.human_friendly, f"PAdES B-{level}", at, time_proven=proven,

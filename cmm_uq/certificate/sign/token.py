@@ -22,7 +22,7 @@ _EXAMPLE = f"{SCHEME}token=LABORATORY;object=KEY?module-path=/usr/lib/libsofthsm
 
 
 @dataclass(frozen=True)
-class Place:
+class TokenPlace:
     """Where a key is.
 
     ``module`` library of the token's maker; ``token`` label of the token; ``key`` label of the key and its certificate.
@@ -33,7 +33,7 @@ class Place:
     key: str
 
 
-def place_of(uri: str) -> Place:
+def place_of(uri: str) -> TokenPlace:
     """Where a URI leads."""
     path, _, query = uri.removeprefix(SCHEME).partition("?")
     pairs = [*parse_qsl(path.replace(";", "&")), *parse_qsl(query)]
@@ -47,7 +47,7 @@ def place_of(uri: str) -> Place:
     for name in KNOWN:
         if not parts.get(name):
             raise CmmUqError(f"says no {name}", where=uri, fix=f"As {_EXAMPLE}")
-    return Place(parts["module-path"], parts["token"], parts["object"])
+    return TokenPlace(parts["module-path"], parts["token"], parts["object"])
 
 
 def signer_of_token(uri: str, pin: str) -> Signer:
@@ -86,7 +86,7 @@ def _above(certificate: Certificate, others: Sequence[Certificate]) -> tuple[Cer
 class _Token:
     """A token that is opened for every use, so that nobody finds it open."""
 
-    def __init__(self, place: Place, pin: str, uri: str) -> None:
+    def __init__(self, place: TokenPlace, pin: str, uri: str) -> None:
         self.place, self._pin, self._uri = place, pin, uri
 
     @contextlib.contextmanager

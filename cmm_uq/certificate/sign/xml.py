@@ -17,7 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import SIGNED_BYTES
 from cmm_uq.base.messages import Text, say
 from cmm_uq.certificate.sign.extra import installed
-from cmm_uq.certificate.sign.found import Signature, Trust
+from cmm_uq.certificate.sign.found import FileSignature, Trust
 from cmm_uq.certificate.sign.signer import Signer
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def sign_xml(xml: bytes, signer: Signer, *, at: dt.datetime, where: str = "the X
         from signxml import CanonicalizationMethod, SignatureMethod
         from signxml.xades import XAdESDataObjectFormat, XAdESSigner
 
-    class Stated(XAdESSigner):  # type: ignore[misc]
+    class SignedStatement(XAdESSigner):  # type: ignore[misc]
         """Takes time and names from what is signed, where the library reads the clock and draws them."""
 
         def add_signing_time(self, signed_signature_properties: _Element, sig_root: Any, signing_settings: Any) -> None:
@@ -84,7 +84,7 @@ def sign_xml(xml: bytes, signer: Signer, *, at: dt.datetime, where: str = "the X
             self._tokens_used[token] = True
             return token
 
-    stated = Stated(
+    stated = SignedStatement(
         signature_algorithm={"rsa": SignatureMethod.RSA_SHA256, "ecdsa": SignatureMethod.ECDSA_SHA256}[signer.algorithm],
         c14n_algorithm=CanonicalizationMethod.CANONICAL_XML_1_0,
         data_object_format=XAdESDataObjectFormat("Digital calibration certificate", "text/xml"),
@@ -143,14 +143,14 @@ NO_CERTIFICATE = say("the signature has no certificate that can be read")
 SEVERAL = say("the file has several signatures, and one covers the other")
 
 
-def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file") -> tuple[Signature, ...]:
+def signatures_of_xml(data: bytes, trust: Trust, *, where: str = "the XML file") -> tuple[FileSignature, ...]:
     """Every signature in an XML file."""
     root = root_of(data, where)
     elements = list(root.iter(SIGNATURE))
     return tuple(_found(data, element, several=len(elements) > 1, trust=trust) for element in elements)
 
 
-def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Signature:
+def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> FileSignature:
     with installed():
         from cmm_uq.certificate.sign.chain import Evidence, standing
     problems = _shape(element)
@@ -160,7 +160,7 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Si
     if not certificates:
         problems.append(NO_CERTIFICATE)
     if problems:  # nothing is computed of what could not count
-        return Signature("", "", "", "XML", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
+        return FileSignature("", "", "", "XML", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
                          revocation="not known", test_key=False, problems=tuple(problems))  # fmt: skip
     signer = certificates[0]
     content = _verified(
@@ -168,7 +168,7 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Si
     )
     at = _time(element)
     judged = standing(signer, Evidence(tuple(certificates[1:])), trust, at, proven=False)
-    return Signature(
+    return FileSignature(
         signer.subject.human_friendly, str(signer.subject.native.get("common_name", signer.subject.human_friendly)),
         signer.issuer.human_friendly, LEVEL, at, time_proven=False, intact=bool(content), covers_whole_file=bool(content),
         trusted=judged.trusted, revocation=judged.revocation, test_key=judged.test_key,

@@ -14,7 +14,7 @@ LONGEST = 160  # characters of what stands somewhere, as it is shown
 
 
 @dataclass(frozen=True)
-class Finding:
+class VerificationFinding:
     """Something that is not as it must be.
 
     ``check`` that found it, one of :data:`CHECKS`; ``file`` that it is in; ``place`` in the file: page, JSON path,
@@ -80,14 +80,14 @@ class Inquiry:
     ``done`` how many things each check compared.
     """
 
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[VerificationFinding] = field(default_factory=list)
     unchecked: list[Unchecked] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     done: dict[str, int] = field(default_factory=dict)
 
     def wrong(self, check: str, file: str, place: str, problem: str, stands: object = "", should: object = "") -> None:
         """Keep a finding; what stands there is shortened."""
-        self.findings.append(Finding(check, file, place, problem, shown(stands), shown(should)))
+        self.findings.append(VerificationFinding(check, file, place, problem, shown(stands), shown(should)))
 
     def looked(self, check: str, count: int = 1) -> None:
         """Something was compared, and whatever was wrong with it is kept."""

@@ -13,7 +13,7 @@ from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.given import Given
 
 if TYPE_CHECKING:
-    from cmm_uq.certificate.sign import Signature, Trust
+    from cmm_uq.certificate.sign import FileSignature, Trust
 
 _OPENING = b"http://www.w3.org/2000/09/xmldsig#"
 
@@ -25,7 +25,7 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
     """
     if given.pdf is not None:
         name, pdf = given.pdf
-        signed: Sequence[Signature] = ()
+        signed: Sequence[FileSignature] = ()
         if pdf.signatures:
             from cmm_uq.certificate.sign import Trust, signatures_of_pdf
 
@@ -54,7 +54,7 @@ def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> Non
             _all(inquiry, name, signed, trust)
 
 
-def _all(inquiry: Inquiry, name: str, signed: Sequence[Signature], trust: Trust | None) -> None:
+def _all(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Trust | None) -> None:
     inquiry.looked("signatures", len(signed))
     if not signed:
         if trust is not None:
@@ -65,7 +65,7 @@ def _all(inquiry: Inquiry, name: str, signed: Sequence[Signature], trust: Trust 
         _one(inquiry, name, f"signature {number}", one, trust)
 
 
-def _one(inquiry: Inquiry, name: str, place: str, one: Signature, trust: Trust | None) -> None:
+def _one(inquiry: Inquiry, name: str, place: str, one: FileSignature, trust: Trust | None) -> None:
     """One signature: what is wrong with it, or what holds."""
     from cmm_uq.certificate.sign import TEST_NOTE
     from cmm_uq.certificate.sign.chain import NOBODY

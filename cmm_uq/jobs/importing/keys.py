@@ -15,7 +15,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator
 
 from cmm_uq.base.files.limits import COLUMNS
-from cmm_uq.base.files.table import Column, Table
+from cmm_uq.base.files.table import Column, JobTable
 from cmm_uq.base.points import Floats
 
 
@@ -116,7 +116,7 @@ Sources = Source | Annotated[list[Source], Field(min_length=1, max_length=COLUMN
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "blank": " ", "|": "|"}
 
 
-class FileKeys(Table):
+class FileKeys(JobTable):
     """Of any table that is imported; each is needed only where the file leaves it open."""
 
     columns: Annotated[dict[Column, Sources], Field(max_length=COLUMNS.most)] = {}

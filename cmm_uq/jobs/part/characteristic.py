@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.base.files.table import Length, Position, Table, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Position, Uncertainty
 from cmm_uq.jobs.part.feature import Association, Kind, refuse_not_modelled
 
 What = Literal[
@@ -73,7 +73,7 @@ LIMITS: Mapping[str, tuple[str, ...]] = {
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 
 
-class CharacteristicFacts(Table):
+class CharacteristicFacts(JobTable):
     """One ``[[characteristic]]``."""
 
     name: Annotated[str, Field(min_length=1, max_length=100)]

@@ -19,13 +19,13 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.base.files.limits import INPUTS, LISTED
-from cmm_uq.base.files.table import Length, Table, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Triple, Uncertainty
 
 _COUNT = re.compile(r"[1-9][0-9]{0,3}")
 FEWEST_UNDULATIONS = 2  # one undulation per revolution is a shift, none a change of size
 
 
-class FormFacts(Table):
+class FormFacts(JobTable):
     """What is known of a surface about its nominal one, along its normals."""
 
     field_um: Uncertainty = 0.0
@@ -166,7 +166,7 @@ def _a_direction(vector: list[float] | None) -> list[float] | None:
     return vector
 
 
-class Strategy(Table):
+class Strategy(JobTable):
     """``strategy``: a pattern of points on the nominal surface."""
 
     pattern: Pattern
@@ -212,7 +212,7 @@ class Strategy(Table):
         return self
 
 
-class FeatureFacts(Table):
+class FeatureFacts(JobTable):
     """One ``[[feature]]``."""
 
     name: Annotated[str, Field(min_length=1, max_length=100)]

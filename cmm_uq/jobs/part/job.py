@@ -24,10 +24,7 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.reading import PART
-from cmm_uq.jobs.source import RESULTS
-from cmm_uq.jobs.source import FilesInFolder as InFolder
-from cmm_uq.jobs.source import FilesInMemory as InMemory
-from cmm_uq.jobs.source import JobFiles as Source
+from cmm_uq.jobs.source import RESULTS, FilesInFolder as InFolder, FilesInMemory as InMemory, JobFiles as Source
 from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED, check_examples, check_mark
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"

@@ -10,7 +10,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from cmm_uq.base.files.limits import INPUTS, LISTED
-from cmm_uq.base.files.table import Length, Limit, Table, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Limit, Temperature, Triple, Uncertainty
 from cmm_uq.base.files.toml_file import line_of
 from cmm_uq.base.units import REFERENCE_TEMPERATURE
 from cmm_uq.jobs.part.characteristic import CharacteristicFacts
@@ -37,7 +37,7 @@ class PartJobFacts(Identification):
     """Where measured points come from; all that is made from points that were not measured says so."""
 
 
-class PartFacts(Table):
+class PartFacts(JobTable):
     """``[part]``: what is measured."""
 
     name: Name
@@ -58,7 +58,7 @@ class PartFacts(Table):
     """What the drawing asks for besides and this job leaves out; the certificate says so."""
 
 
-class MachineStateFacts(Table):
+class MachineStateFacts(JobTable):
     """``[machine_state]``: the machine as its certificate states it, and where its axes go."""
 
     certificate: Name | None = None
@@ -93,7 +93,7 @@ class MachineStateFacts(Table):
         return self
 
 
-class StylusFacts(Table):
+class StylusFacts(JobTable):
     """One ``[[stylus]]``: a tip, and what its qualification left uncertain."""
 
     name: Name
@@ -113,7 +113,7 @@ class StylusFacts(Table):
     """Standard deviation of the pre-travel over directions of probing, size and offset taken out of it."""
 
 
-class AlignmentFacts(Table):
+class AlignmentFacts(JobTable):
     """``[alignment]``: how coordinates of the part follow from measured points."""
 
     datums: Annotated[list[Name], Field(max_length=6)] = []
@@ -128,7 +128,7 @@ class AlignmentFacts(Table):
         return self
 
 
-class PlacingFacts(Table):
+class PlacingFacts(JobTable):
     """``[placing]``: where the part lies in the machine."""
 
     origin_mm: Triple | None = None
@@ -143,7 +143,7 @@ class PlacingFacts(Table):
     """Standard uncertainty of each point by what clamping does to the part."""
 
 
-class ProbingFacts(Table):
+class ProbingFacts(JobTable):
     """``[probing]``: in which order, how fast and how often."""
 
     order: Annotated[list[Name], Field(max_length=LISTED.most)] = []
@@ -156,7 +156,7 @@ class ProbingFacts(Table):
     """Standard uncertainty of each coordinate of each point by who measures and how, common to its repeats."""
 
 
-class EnvironmentFacts(Table):
+class EnvironmentFacts(JobTable):
     """``[environment]``: temperatures while the part is measured, and what is known of them."""
 
     part_c: Temperature = 20.0
@@ -179,7 +179,7 @@ class EnvironmentFacts(Table):
     """Standard uncertainty of how much part and scales have warmed from the first point to the last."""
 
 
-class DecisionFacts(Table):
+class DecisionFacts(JobTable):
     """``[decision]``: by which rule conformity with the drawing is decided."""
 
     rule: Rule = "ISO 14253-1"
@@ -197,7 +197,7 @@ class DecisionFacts(Table):
         return self
 
 
-class MeasuredFacts(Table):
+class MeasuredFacts(JobTable):
     """``[recording]``: the points as they were measured."""
 
     file: Name
@@ -208,7 +208,7 @@ class MeasuredFacts(Table):
 Seconds = Annotated[float, Field(gt=0, le=1e6)]
 
 
-class CalibratedFacts(Table):
+class CalibratedFacts(JobTable):
     """One ``[[by_calibrated_part.characteristic]]``."""
 
     name: Name
@@ -241,7 +241,7 @@ class CalibratedFacts(Table):
         return self.value_deg is not None
 
 
-class CalibratedPartFacts(Table):
+class CalibratedPartFacts(JobTable):
     """``[by_calibrated_part]``: a calibrated part like this one, measured again and again (ISO 15530-3)."""
 
     file: Name
@@ -272,7 +272,7 @@ class CalibratedPartFacts(Table):
     """Whether the styli were qualified anew for each set-up."""
 
 
-class LengthStandardFacts(Table):
+class LengthStandardFacts(JobTable):
     """``[by_orientations.length_standard]``."""
 
     length_mm: Length
@@ -290,7 +290,7 @@ class LengthStandardFacts(Table):
     """Standard uncertainty of its coefficient of expansion, 1/K."""
 
 
-class ProbeStandardFacts(Table):
+class ProbeStandardFacts(JobTable):
     """One ``[[by_orientations.probe_standard]]``."""
 
     stylus: str = ""
@@ -307,7 +307,7 @@ class ProbeStandardFacts(Table):
     """Number of its certificate, and whose it is."""
 
 
-class OrientationsFacts(Table):
+class OrientationsFacts(JobTable):
     """``[by_orientations]``: the part in several orientations, with standards beside it (ISO/DTS 15530-2 as described)."""
 
     file: Name
@@ -325,7 +325,7 @@ class OrientationsFacts(Table):
     """Whether the styli were qualified anew for each orientation."""
 
 
-class PartFile(Table):
+class PartFile(JobTable):
     """All of a part's job.toml."""
 
     job: PartJobFacts

@@ -27,7 +27,7 @@ from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.csv_table import Cells, cells_of
 from cmm_uq.base.files.limits import MAPS
 from cmm_uq.base.files.numbers import numbers
-from cmm_uq.base.files.table import Length, Names, Table, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Names, Uncertainty
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.importing.recording import COORDINATES, WHOLE, largest
@@ -45,7 +45,7 @@ NOMINAL_C = 20.0
 """°C of a map that is named without its temperature."""
 
 
-class SimulationFacts(Table):
+class SimulationFacts(JobTable):
     """``[simulation]``."""
 
     file: str | None = None

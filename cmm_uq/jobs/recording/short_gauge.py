@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import field_validator, model_validator
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.files.table import AnyFloat, Length, Limit, Table
+from cmm_uq.base.files.table import AnyFloat, JobTable, Length, Limit
 from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.base.units import MICROMETRE, REFERENCE_TEMPERATURE
 from cmm_uq.jobs.importing.recording import read_recording
@@ -22,7 +22,7 @@ FARTHEST_MM = 1.0
 """From the certified length, or from the first repeat: a gauge farther off is another one, or in another place."""
 
 
-class ShortGaugeFacts(Table):
+class ShortGaugeFacts(JobTable):
     """``[short_gauge]``: a gauge block, or another gauge of two opposite faces, and the recording of it."""
 
     file: str

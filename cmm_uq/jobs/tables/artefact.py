@@ -17,7 +17,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from cmm_uq.base.files.table import AnyFloat, Column, Length, Table
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable, Length
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.jobs.importing.keys import FileKeys
 from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUncertainty, with_standard_uncertainty
@@ -72,7 +72,7 @@ CIPM: Arrangement = "CIPM MRA"
 """The arrangement of national institutes; the others are those of accreditation bodies, of ILAC or recognised by it."""
 
 
-class Traceability(Table):
+class Traceability(JobTable):
     """A certificate of the artefact, the short gauge or a thermometer."""
 
     number: str = ""
@@ -126,7 +126,7 @@ class Traceability(Table):
         return dt.date(year, month + 1, min(self.date.day, monthrange(year, month + 1)[1]))
 
 
-class ThermometerFacts(Table):
+class ThermometerFacts(JobTable):
     """``[[thermometer]]``: a thermometer that recorded temperatures were read from."""
 
     columns: Annotated[list[Column], Field(min_length=1, max_length=50)] = ["temp_artefact_c"]
@@ -147,7 +147,7 @@ class CertificateFile(FileKeys, Traceability):
     every kind; a CSV or a workbook the distances or places of points by their number, which the recording then has not."""
 
 
-class ArtefactFacts(Table):
+class ArtefactFacts(JobTable):
     """``[artefact]``: what every kind of measurement has; a kind with more keys has a table of its own.
 
     ``U_um`` with ``k`` or ``degrees_of_freedom`` may stand for ``u_um``, which is then filled in.

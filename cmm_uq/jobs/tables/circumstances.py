@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import Table, Temperature, Uncertainty
+from cmm_uq.base.files.table import JobTable, Temperature, Uncertainty
 from cmm_uq.jobs.tables.identification import Capability, RequiredText
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.short_gauge import ShortGauge
 
 
-class HeldClause(Table):
+class HeldClause(JobTable):
     """One clause: what the program does of it, and whether that agrees with the laboratory's copy."""
 
     does: str
@@ -52,7 +52,7 @@ class HeldClause(Table):
         return self
 
 
-class ClausesForm(Table):
+class ClausesForm(JobTable):
     """The form of a standard, filled in: ``cmm-uq standards NAME --form FILE`` writes it."""
 
     standard: str
@@ -76,7 +76,7 @@ def _says_something(text: str) -> str:
 Words = Annotated[str, AfterValidator(_says_something)]
 
 
-class Declared(Table):
+class Declared(JobTable):
     """What somebody answers for in place of a figure; the certificate prints both."""
 
     by: Words
@@ -85,7 +85,7 @@ class Declared(Table):
     """Why."""
 
 
-class MachineLines(Table):
+class MachineLines(JobTable):
     """``[test_uncertainty.machine]``: lines of the test uncertainty that are the machine's own, and so what is tested."""
 
     expansion: Declared | None = None
@@ -100,7 +100,7 @@ class MachineLines(Table):
     """What changes between repeated readings is the machine's."""
 
 
-class NegligibleLines(Table):
+class NegligibleLines(JobTable):
     """``[test_uncertainty.negligible]``: lines of the test uncertainty that contribute nothing worth counting."""
 
     calibration: Declared | None = None
@@ -119,7 +119,7 @@ class NegligibleLines(Table):
     """What of the artefact changes between repeated readings."""
 
 
-class TestUncertainty(Table):
+class TestUncertainty(JobTable):
     """``[test_uncertainty]``: what a test value is uncertain by beside the calibration of the artefact (ISO/TS 23165)."""
 
     __test__ = False  # no test of pytest's
@@ -173,7 +173,7 @@ Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2)]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]
 
 
-class RatedConditions(Table):
+class RatedConditions(JobTable):
     """``[rated_conditions]``: under which the limits of the machine hold, by its data sheet."""
 
     temperature_c: Limits | None = None
@@ -196,7 +196,7 @@ class RatedConditions(Table):
         return self
 
 
-class ProbeFacts(Table):
+class ProbeFacts(JobTable):
     """``[probe]``: with what the recording was made; ``sensing`` says whether it touches."""
 
     sensing: Literal["contacting", "optical"] | None = None

@@ -10,14 +10,14 @@ from typing import Annotated, Any, Literal, Protocol, Self
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.table import LARGEST_UM, Limit, Table, Uncertainty, at_least
+from cmm_uq.base.files.table import LARGEST_UM, JobTable, Limit, Uncertainty, at_least
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.circumstances import TEST_KEYS, ClausesForm, TestUncertainty
 from cmm_uq.jobs.tables.length_formula import FLATTEST, mpe_of
 
 
-class MaximumPermissibleError(Table):
+class MaximumPermissibleError(JobTable):
     """``mpe`` in one of three forms: A + L/K, min(A + L/K, B), or B; L in mm, A, B and the result in µm."""
 
     a_um: Uncertainty | None = None
@@ -47,42 +47,42 @@ Permissible = Annotated[
 """``mpe``, as a formula or as a table."""
 
 
-class GuardBand(Table):
+class GuardBand(JobTable):
     """A guard band of so many expanded uncertainties; between acceptance and rejection lies *undecided*."""
 
     guard_band: Annotated[float, Field(ge=0, le=100)]
     """Width of the guard band in expanded uncertainties."""
 
 
-class FalseAccept(Table):
+class FalseAccept(JobTable):
     """Accept only when the probability of not conforming is at most this."""
 
     max_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-12)]
     """Largest probability of not conforming at which a value is accepted."""
 
 
-class UncertaintyRatio(Table):
+class UncertaintyRatio(JobTable):
     """Simple acceptance where the zone of the specification is so many times as wide as the uncertainty interval."""
 
     uncertainty_ratio: Annotated[float, Field(gt=0, le=1e6)]
     """Least width of the specification's zone over that of the uncertainty interval."""
 
 
-class PosteriorProbability(Table):
+class PosteriorProbability(JobTable):
     """Accept when the probability of conforming, with what the prior says, is at least this (JCGM 106:2012, 8.3)."""
 
     posterior_probability: Annotated[float, Field(gt=0.5, lt=1)]
     """Least probability of conforming, with what the prior says, at which a value is accepted."""
 
 
-class UnconditionalRisk(Table):
+class UnconditionalRisk(JobTable):
     """Accept so that of all items tested at most this share is wrongly accepted (JCGM 106:2012, 9.5.3)."""
 
     max_unconditional_false_accept: Annotated[float, Field(gt=0, lt=1), at_least(1e-6)]
     """Largest share of all items tested that may be wrongly accepted."""
 
 
-class Prior(Table):
+class Prior(JobTable):
     """``prior``: what is known of the tested errors beforehand, a normal distribution (JCGM 106:2012, 7.2)."""
 
     sd_um: Limit | None = None
@@ -116,7 +116,7 @@ def needs_prior(rule: Rule) -> bool:
     return isinstance(rule, (PosteriorProbability, UnconditionalRisk)) or rule in _BY_PRIOR
 
 
-class ConformityFacts(Table):
+class ConformityFacts(JobTable):
     """One ``[[conformity]]``: a standard, a limit and a decision rule; ``prior`` for rules and risks that go by one."""
 
     standard: str

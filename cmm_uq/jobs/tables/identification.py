@@ -8,7 +8,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from cmm_uq.base.files.table import Limit, Table, at_least
+from cmm_uq.base.files.table import JobTable, Limit, at_least
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.jobs.source import device_name
 
@@ -38,7 +38,7 @@ _NOTHING_CHANGED = re.compile(
 """The usual ways, in the languages of certificates, of saying that figures or decisions did not change."""
 
 
-class ReplacedCertificate(Table):
+class ReplacedCertificate(JobTable):
     """The certificate that this one replaces, why, and what changed."""
 
     number: RequiredText
@@ -78,7 +78,7 @@ def denies_a_change(words: str) -> bool:
     return _NOTHING_CHANGED.search(" ".join(words.split())) is not None
 
 
-class Identification(Table):
+class Identification(JobTable):
     """Identification, and free text for the certificate."""
 
     id: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=100)]
@@ -142,7 +142,7 @@ _LENGTHS = {"mm": 1e-3, "µm": 1.0}
 _RATIOS, _ANGLES = ("ppm", "µm/m"), ("″",)
 
 
-class LengthCapability(Table):
+class LengthCapability(JobTable):
     """U = A + L/K of a length, L in mm and U in µm; without ``k`` the same for every length."""
 
     a_um: Limit
@@ -151,7 +151,7 @@ class LengthCapability(Table):
     """K of U = A + L/K, with L in mm and U in µm; without it U is the same for every length."""
 
 
-class Capability(Table):
+class Capability(JobTable):
     """``[laboratory.cmc]``: calibration and measurement capability, the least U (95 %, k = 2) that a certificate may state."""
 
     length: LengthCapability | None = None
@@ -171,7 +171,7 @@ class Capability(Table):
         return (self.angle_arcsec or 0.0) if unit in _ANGLES else 0.0
 
 
-class Laboratory(Table):
+class Laboratory(JobTable):
     """``[laboratory]``: who answers for the certificate."""
 
     name: str = ""

@@ -8,14 +8,14 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
-from cmm_uq.base.files.table import Column, Number, Range, Table, Temperature, Triple, at_least
+from cmm_uq.base.files.table import Column, JobTable, Number, Range, Temperature, Triple, at_least
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
 
 Months = Annotated[int, Field(ge=1, le=600)]
 
 
-class Recalibration(Table):
+class Recalibration(JobTable):
     """``calibrate``: without a method a fixed interval, or method A3 where a reliability is given."""
 
     every_months: Months = 12
@@ -61,7 +61,7 @@ Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
 """Columns of the thermocouples on one scale."""
 
 
-class Travel(Table):
+class Travel(JobTable):
     """``travel_mm``: lowest and highest scale reading of each axis."""
 
     x: Range | None = None
@@ -82,7 +82,7 @@ class Travel(Table):
         return self
 
 
-class SquarenessFacts(Table):
+class SquarenessFacts(JobTable):
     """``squareness_arcsec``: beside an error map."""
 
     xy: Angle = 0.0
@@ -100,7 +100,7 @@ def _of_a_workshop(celsius: float) -> float:
     return celsius
 
 
-class ErrorMapFile(Table):
+class ErrorMapFile(JobTable):
     """One error map, the temperature it was taken at, and the squareness of the axes at that temperature."""
 
     file: str
@@ -121,7 +121,7 @@ def _squareness_of_all_or_none(maps: list[ErrorMapFile]) -> list[ErrorMapFile]:
     return maps
 
 
-class ScaleColumns(Table):
+class ScaleColumns(JobTable):
     """``columns`` of a temperature log: the thermocouples on each scale, by the names of their columns."""
 
     x: Sensors
@@ -132,7 +132,7 @@ class ScaleColumns(Table):
     """Columns of the thermocouples on the scale of z."""
 
 
-class TemperatureLogFile(Table):
+class TemperatureLogFile(JobTable):
     """``temperature_log``: what the scales' thermocouples showed while the recording was made."""
 
     file: str
@@ -145,7 +145,7 @@ class TemperatureLogFile(Table):
     """Longest interval of the log that is interpolated over."""
 
 
-class Pose(Table):
+class Pose(JobTable):
     """Attitude of a digitizer in one index of the wrist: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
 
     pose: Number = 1
@@ -158,7 +158,7 @@ class Pose(Table):
     """Third Euler angle."""
 
 
-class DigitizerFacts(Table):
+class DigitizerFacts(JobTable):
     """``digitizer``: a laser digitizer on the ram."""
 
     offset_mm: Triple | None = None
@@ -191,7 +191,7 @@ def check_carriages(chain: str) -> None:
         raise ValueError(f"chain = {chain!r}: give X, Y, Z once each, and F for the frame if the workpiece moves")
 
 
-class MachineFacts(Table):
+class MachineFacts(JobTable):
     """``[machine]``."""
 
     name: str

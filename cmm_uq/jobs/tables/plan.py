@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from cmm_uq.base.files.limits import COLUMNS, LISTED
-from cmm_uq.base.files.table import AnyFloat, Column, Duration, Length, Names, Range, Table, Uncertainty, at_least
+from cmm_uq.base.files.table import AnyFloat, Column, Duration, JobTable, Length, Names, Range, Uncertainty, at_least
 
 Criterion = Literal["separation", "D", "A", "worst"]
 
@@ -18,7 +18,7 @@ _SHORTEST = 1e-6
 Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
 
 
-class FixtureFacts(Table):
+class FixtureFacts(JobTable):
     """``[plan.fixtures]``: how the artefact may stand.
 
     ``directions``: of a bar or gauge along its length, of a plate or triangle across it, either way; any without them.
@@ -42,7 +42,7 @@ class FixtureFacts(Table):
         return self
 
 
-class PlanFacts(Table):
+class PlanFacts(JobTable):
     """``[plan]``.
 
     ``ready`` names the plan to start from where there is no recording. With a ``criterion`` a better one is searched for:
@@ -114,7 +114,7 @@ class PlanFacts(Table):
         return self
 
 
-class DeclaredSource(Table):
+class DeclaredSource(JobTable):
     """One ``[[acquire.source]]``: an instrument, the port it is at, and what of it is recorded."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]+$", max_length=60)]
@@ -134,7 +134,7 @@ class DeclaredSource(Table):
     """How long before the last byte of a message came its quantities were measured."""
 
 
-class AcquireFacts(Table):
+class AcquireFacts(JobTable):
     """``[acquire]``: a recording taken live, by `cmm-uq acquire`."""
 
     plan: str | None = None
@@ -165,7 +165,7 @@ class AcquireFacts(Table):
 Percent = Annotated[float, Field(ge=0, le=100)]
 
 
-class ProveFacts(Table):
+class ProveFacts(JobTable):
     """``[prove]``: what `cmm-uq prove` compares its figures with. It is sealed with the truth of the cases."""
 
     false_alarms_pct: Annotated[float, Field(gt=0, lt=100)] = 2.0

@@ -20,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import LinearModel
 
 LEVEL = 0.95
@@ -61,7 +61,7 @@ class Predicted:
         return np.where(np.isfinite(ratio) & (ratio > 1), ratio, 0.0)
 
 
-def predicted(model: MeasurementModel) -> Predicted | None:
+def predicted(model: RecordingModel) -> Predicted | None:
     """Every observation as all others predict it; ``None`` where neither the job nor the recording says what the noise is."""
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     sigma, degrees = _sigma(linear)
@@ -133,7 +133,7 @@ class RepeatScatter:
         )  # fmt: skip
 
 
-def scatter(model: MeasurementModel, measurement: int) -> RepeatScatter | None:
+def scatter(model: RecordingModel, measurement: int) -> RepeatScatter | None:
     """The scatter of the repeats of a measurement where it asks for another; else, or where it is unknown, ``None``."""
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     try:
@@ -154,7 +154,7 @@ def scatter(model: MeasurementModel, measurement: int) -> RepeatScatter | None:
     return RepeatScatter(measurement, s, usual, limit) if s > limit else None
 
 
-def _within(model: MeasurementModel, residuals: Floats, chosen: Floats) -> tuple[float, int]:
+def _within(model: RecordingModel, residuals: Floats, chosen: Floats) -> tuple[float, int]:
     """Sum of squares about the means of the same observation repeated, and its degrees of freedom."""
     artefact = model.artefact
     point = artefact.points.point[artefact.rows]

@@ -20,7 +20,7 @@ from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES
 from cmm_uq.laboratory.live.story import Place, Point, Story
 from cmm_uq.laboratory.live.table import Row
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observe
 from cmm_uq.machine.physics.effect import Effect
 
@@ -110,7 +110,7 @@ class Judge:
             return (), None
         artefact = self.observe(self.facts, points, where=self.where)
         acting = tuple(one for one in self.effects if set(one.columns) <= set(points.columns) and not one.shape)
-        model = MeasurementModel(artefact, acting, self.sigma)
+        model = RecordingModel(artefact, acting, self.sigma)
         own = (artefact.measurement == run[0]) & (artefact.repeat == run[1])
         found = predicted(model)
         if found is None:

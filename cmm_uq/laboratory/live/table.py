@@ -18,8 +18,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output.manifest import sha256_of
-from cmm_uq.jobs.acquired import AcquisitionRecord as Acquired
-from cmm_uq.jobs.acquired import as_file, provenance_name
+from cmm_uq.jobs.acquired import AcquisitionRecord as Acquired, as_file, provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.laboratory.live.folder import EVENTS, FOLDER
 from cmm_uq.laboratory.live.journal import written_whole

@@ -28,12 +28,11 @@ from cmm_uq.laboratory.proving.unknown_causes import (
     nodes,
     possible_faults,
 )
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import LAST_DIGIT
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.inference.noise import AXES as AXIS_NOISE
-from cmm_uq.maths.inference.noise import GROWTH, PLACING, SLOW
+from cmm_uq.maths.inference.noise import AXES as AXIS_NOISE, GROWTH, PLACING, SLOW
 
 _LARGEST_FOREIGN_UM = 200.0
 _SHORTEST_PERIOD_MM = 6.0  # as the diagnosis tries them; beyond the range of the readings a wave is no wave
@@ -52,7 +51,7 @@ class Design:
     was recorded earlier, which is not drawn again.
     """
 
-    model: MeasurementModel
+    model: RecordingModel
     values: Floats
     noise: Noise
     cte_per_k: float = 0.0
@@ -238,7 +237,7 @@ class Design:
             acting_.append(self.effect_of(case.stranger))
             coefficients.append(np.array([case.stranger.size_um]))
         shapes = {effect.name: shape for effect, _, shape in given}
-        model = MeasurementModel(self.model.artefact, tuple(acting_), shapes={**self.model.shapes, **shapes})
+        model = RecordingModel(self.model.artefact, tuple(acting_), shapes={**self.model.shapes, **shapes})
         drawn = model.simulate(
             np.concatenate(coefficients), np.array(case.sizes), self._of_all_dates(case.noise), random
         )

@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
@@ -35,14 +35,14 @@ class Sensitivity:
     names takes of white columns.
     """
 
-    model: MeasurementModel
+    model: RecordingModel
     values: Floats
     white: Callable[[Floats], Floats]
     sigma: float
     taken: Floats
 
     @classmethod
-    def of(cls, model: MeasurementModel, values: Floats, noise: Noise) -> Sensitivity:
+    def of(cls, model: RecordingModel, values: Floats, noise: Noise) -> Sensitivity:
         components, linear = noise_of(model, values=values), model.linearised(values)
         sizes = _sizes(components, model, noise)
         white, sigma = components.white(sizes), float(sizes.coordinate[0])
@@ -87,7 +87,7 @@ def remaining_length(column: Floats, others: Floats) -> float:
     return float(np.linalg.norm(column - U @ (U.T @ column)))
 
 
-def possible_effects(model: MeasurementModel) -> Iterator[Effect]:
+def possible_effects(model: RecordingModel) -> Iterator[Effect]:
     """Effects of the catalogue that the job does not name and that its columns and its machine allow to act."""
     named = {effect.name for effect in model.effects}
     for effect in every().values():
@@ -102,7 +102,7 @@ def possible_effects(model: MeasurementModel) -> Iterator[Effect]:
         yield effect
 
 
-def unrecorded(model: MeasurementModel, effect: Effect) -> tuple[str, ...]:
+def unrecorded(model: RecordingModel, effect: Effect) -> tuple[str, ...]:
     return tuple(column for column in effect.columns if column not in model.artefact.points.columns)
 
 
@@ -112,7 +112,7 @@ def some_shapes(effect: Effect) -> list[tuple[float, ...]]:
     return trials[:: max(1, len(trials) // _SHAPES)]
 
 
-def _sizes(components: Components, model: MeasurementModel, noise: Noise) -> Sizes:
+def _sizes(components: Components, model: RecordingModel, noise: Noise) -> Sizes:
     """The sizes of a drawn noise as those of the components that observations could show."""
     reading = np.hypot(
         np.broadcast_to(np.asarray(noise.coordinate, dtype=np.float64), 3), noise.resolution / np.sqrt(12)

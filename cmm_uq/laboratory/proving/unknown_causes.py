@@ -15,7 +15,7 @@ import numpy as np
 from cmm_uq.base.messages import NOTHING, Text, say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.effect import Effect, Parameter
 
 FUNCTIONS = ("step", "cubic", "bump", "wave", "jump", "load")
@@ -98,7 +98,7 @@ class FormEffect(ForeignEffect):
         return self.form.displacement(points)
 
 
-class PointwiseEffect(ForeignEffect):
+class UnknownArtefactFault(ForeignEffect):
     """An error given point by point, (n, 3, 1) mm for a size of one micrometre."""
 
     def __init__(self, name: str, displacement: Floats) -> None:
@@ -124,7 +124,7 @@ def drawn_form(points: Points, what: str, random: np.random.Generator) -> Functi
     return FunctionForm(what, over, along, float(values.min()), float(values.max()), at, width, number)
 
 
-def possible_faults(model: MeasurementModel) -> Iterator[str]:
+def possible_faults(model: RecordingModel) -> Iterator[str]:
     if any(size.certified and size.role == "dimension" for size in model.artefact.sizes):
         yield "length"
     yield "nodes"
@@ -134,8 +134,8 @@ def possible_faults(model: MeasurementModel) -> Iterator[str]:
 
 
 def artefact_fault(
-    model: MeasurementModel, values: Floats, what: str, cte_per_k: float, errors: Sequence[Sequence[float]] = ()
-) -> PointwiseEffect:
+    model: RecordingModel, values: Floats, what: str, cte_per_k: float, errors: Sequence[Sequence[float]] = ()
+) -> UnknownArtefactFault:
     """A fault of the artefact as an error of its points.
 
     ``model``, ``values`` with the artefact, and its parameters (k,).
@@ -151,7 +151,7 @@ def artefact_fault(
         moved = MICROMETRE * np.einsum("nij,nj->ni", frames, np.asarray(errors, dtype=np.float64)[number])
     else:
         moved = _expansion(xyz, points, cte_per_k or _NO_RATE, growing=what == "warming")
-    return PointwiseEffect(f"artefact: {what}", -moved[:, :, None])
+    return UnknownArtefactFault(f"artefact: {what}", -moved[:, :, None])
 
 
 def _expansion(xyz: Floats, points: Points, rate: float, *, growing: bool) -> Floats:

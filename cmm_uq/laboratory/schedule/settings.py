@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import JOB_BYTES
-from cmm_uq.base.files.table import Table
+from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.laboratory.schedule.notices import EVENTS, Event
 
@@ -57,7 +57,7 @@ Events = Annotated[list[Event], Field(min_length=1, max_length=len(EVENTS))]
 Seconds = Annotated[float, Field(gt=0, le=600)]
 
 
-class RunTable(Table):
+class RunTable(JobTable):
     """``[run]``: where things go, and when a job folder is taken. Paths are relative to schedule.toml."""
 
     out: Annotated[str, Field(min_length=1)] = "reports"
@@ -78,7 +78,7 @@ class RunTable(Table):
     """How long before a due date a message goes out."""
 
 
-class LogTable(Table):
+class LogTable(JobTable):
     """``[log]``: what was done, a line each, for a person."""
 
     file: str = "schedule.log"
@@ -89,7 +89,7 @@ class LogTable(Table):
     """Former ones that are kept, as schedule.log.1 and so on."""
 
 
-class EmailTable(Table):
+class EmailTable(JobTable):
     """``[[email]]``: messages by e-mail."""
 
     to: Annotated[list[Address], Field(min_length=1, max_length=100)]
@@ -127,7 +127,7 @@ class EmailTable(Table):
         return self
 
 
-class WebhookTable(Table):
+class WebhookTable(JobTable):
     """``[[webhook]]``: messages as JSON by POST to a web address."""
 
     url: Annotated[str, Field(max_length=400), AfterValidator(web_address)] | None = None
@@ -150,7 +150,7 @@ class WebhookTable(Table):
         return self
 
 
-class ScheduleFile(Table):
+class ScheduleFile(JobTable):
     """The whole of ``schedule.toml``; every table may be left out."""
 
     run: RunTable = RunTable()

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from cmm_uq.machine.model.drawn_noise import Noise
-from cmm_uq.machine.model.measurement import Estimate, MeasurementModel
+from cmm_uq.machine.model.measurement import Estimate, RecordingModel
 
-__all__ = ["Estimate", "MeasurementModel", "Noise"]
+__all__ = ["Estimate", "Noise", "RecordingModel"]

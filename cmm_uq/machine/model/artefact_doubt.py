@@ -31,7 +31,7 @@ from cmm_uq.jobs.tables.circumstances import Circumstances
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.own_body import Body
-from cmm_uq.machine.physics.effects.own_errors import GEOMETRY, PATTERN, Owner, OwnFault, deformations
+from cmm_uq.machine.physics.effects.own_errors import GEOMETRY, PATTERN, FaultyArtefact, OwnFault, deformations
 from cmm_uq.machine.physics.effects.own_states import BENDING, FIXTURE, FORM, LOBES, SET_UP_TEMPERATURE, TEMPERATURE
 from cmm_uq.maths.inference.doubt import Cause
 
@@ -135,7 +135,7 @@ def faults(
     geometry: Iterable[OwnFault] = tuple(GEOMETRY.values()),
 ) -> Iterable[Effect]:
     """Faults of an artefact of several places."""
-    own = Owner(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
+    own = FaultyArtefact(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
     if axes * len(body.places) <= MOST_ERRORS and deformations(own).shape[1]:
         yield PATTERN.made(own)
     for fault in geometry:
@@ -147,7 +147,7 @@ def faults(
         yield FIXTURE.made(replace(own, size=_FIXTURE_UM, weight=_HELD, mostly=1.0))
 
 
-def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
+def temperatures(own: FaultyArtefact, weight: float) -> Iterable[Effect]:
     """That the artefact had another temperature than is known: in all set-ups, or in each its own."""
     kelvin = _MEASURED_KELVIN if "temp_artefact_c" in own.points.columns else _ASSUMED_KELVIN
     far = replace(own, size=_FAR_KELVIN, weight=weight, mostly=kelvin / _FAR_KELVIN)
@@ -158,7 +158,7 @@ def temperatures(own: Owner, weight: float) -> Iterable[Effect]:
 
 def temperature_of(facts: ArtefactFacts, points: Points) -> Effect:
     """That an artefact of one length had another temperature than is known, or another length than is certified."""
-    own = Owner(Body.of(points, points.xyz), points, 0.0, _TEMPERATURE, 1, expansion_of(facts))
+    own = FaultyArtefact(Body.of(points, points.xyz), points, 0.0, _TEMPERATURE, 1, expansion_of(facts))
     return next(iter(temperatures(own, _TEMPERATURE)))
 
 
@@ -168,7 +168,7 @@ def form_faults(facts: ArtefactFacts, form_um: float | None, points: Points) -> 
     ``form_um``: form deviation by its certificate, µm, which is about four standard deviations of it.
     """
     um = _UNKNOWN_FORM_UM if form_um is None else max(form_um, _LEAST_FORM_UM) / _FORM
-    own = Owner(Body.of(points, points.xyz), points, um, _ROUND, 3, expansion_of(facts))
+    own = FaultyArtefact(Body.of(points, points.xyz), points, um, _ROUND, 3, expansion_of(facts))
     yield LOBES.made(own)
     yield FORM.made(replace(own, size=um / len(FORM.made(own).coefficients) ** 0.5))
 

@@ -57,7 +57,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class MeasurementModel:
+class RecordingModel:
     """Effects acting on the points of an artefact.
 
     Parameters
@@ -87,7 +87,7 @@ class MeasurementModel:
     shapes: Mapping[str, Sequence[float]] = field(default_factory=dict)
     # a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear model
     # is then taken about the estimate of that one
-    within: MeasurementModel | None = None
+    within: RecordingModel | None = None
     # mm, what is not known of a coordinate however little the residuals scatter, as of a prediction that the recording is
     # compared with
     least_noise: float = 0.0
@@ -336,7 +336,7 @@ class MeasurementModel:
         return values[:k], values[k:]
 
 
-def with_curvature(model: MeasurementModel, components: Components, posterior: NoisyPosterior) -> NoisyPosterior:
+def with_curvature(model: RecordingModel, components: Components, posterior: NoisyPosterior) -> NoisyPosterior:
     """The posterior of the model itself; that of the linear model about its estimate where it bends too little."""
     estimate = model.estimate()
     if not model.leans_beyond(estimate.about, posterior.draws.std(axis=0), SMALL_LEAN):

@@ -7,7 +7,7 @@ from scipy import sparse
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.machine.model.drawn_noise import distances_in_placing
-from cmm_uq.machine.model.measurement import MeasurementModel
+from cmm_uq.machine.model.measurement import RecordingModel
 from cmm_uq.machine.model.recorded import Display, display_step
 from cmm_uq.maths.inference.noise import AXES, FREQUENCIES, GROWTH, PLACING, SLOW, Components
 
@@ -22,7 +22,7 @@ _LEAST_SPREAD = 1.45
 _NO_LENGTH = 1e-3  # part of the longest length that is none
 
 
-def noise_of(model: MeasurementModel, used: np.ndarray | None = None, values: Floats | None = None) -> Components:
+def noise_of(model: RecordingModel, used: np.ndarray | None = None, values: Floats | None = None) -> Components:
     """The noise of a model's observations.
 
     ``used``: (m,) which observations; by default those that the model uses. ``values``: (k,) of the model's parameters, of a
@@ -60,7 +60,7 @@ def noise_of(model: MeasurementModel, used: np.ndarray | None = None, values: Fl
     )  # fmt: skip
 
 
-def display_of(model: MeasurementModel) -> Display | None:
+def display_of(model: RecordingModel) -> Display | None:
     """The display's steps where the used observations lie, or ``None`` where they are too fine to matter."""
     artefact, estimate = model.artefact, model.estimate()
     step = display_step(artefact.points.xyz, estimate.least_squares.sigma_of_residuals)
@@ -71,7 +71,7 @@ def display_of(model: MeasurementModel) -> Display | None:
     return Display.of(step, artefact.points.xyz, rows, seen, estimate.least_squares.residuals)
 
 
-def sensitivities(model: MeasurementModel, xyz: Floats) -> Floats:
+def sensitivities(model: RecordingModel, xyz: Floats) -> Floats:
     """How far each observation moves when each of its points does, along each axis: (m, points of an observation, 3).
 
     Zero throughout where observations share points in different parts, so that noise by axis cannot be told.
@@ -118,7 +118,7 @@ def machine_axes(rows: Ints, sensitivity: Floats) -> tuple[sparse.csr_array, Flo
     return sparse.csr_array((np.concatenate(values), where), shape=(m, m)), along
 
 
-def repeated_quantity(model: MeasurementModel, chosen: np.ndarray) -> Ints:
+def repeated_quantity(model: RecordingModel, chosen: np.ndarray) -> Ints:
     """Numbers (m,) that observations share when they repeat one quantity: the same points of one placing, seen alike."""
     artefact = model.artefact
     points = np.sort(artefact.points.point[artefact.rows], axis=1)
@@ -196,7 +196,7 @@ def _lengths_differ(length: Floats) -> bool:
     return bool(len(longer)) and bool(longer.max() > _LEAST_SPREAD * np.median(longer))
 
 
-def growing_lengths(model: MeasurementModel, xyz: Floats) -> Floats:
+def growing_lengths(model: RecordingModel, xyz: Floats) -> Floats:
     """What noise may grow with, (m,) mm: the length observed, or the distance from the first point of the placing."""
     artefact, rows = model.artefact, model.artefact.rows
     if rows.shape[1] == 2:
@@ -205,7 +205,7 @@ def growing_lengths(model: MeasurementModel, xyz: Floats) -> Floats:
 
 
 def _slow(
-    model: MeasurementModel, chosen: np.ndarray, sensitivity: Floats, along: Floats, quantity: Ints
+    model: RecordingModel, chosen: np.ndarray, sensitivity: Floats, along: Floats, quantity: Ints
 ) -> tuple[Floats, Floats, float, Floats]:
     """Columns (m, c) of slow noise as cosines of the time, their frequencies, the typical part between readings, the time.
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.machine.physics.kinematics import Chain, exact, on_leaning_axes
+from cmm_uq.machine.physics.kinematics import KinematicChain as Chain, exact, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.maths.geometry import Plane, fit_plane
 
@@ -31,7 +31,7 @@ BLOCK = 8192  # points computed at a time: as many as a processor's cache holds 
 
 
 @dataclass(frozen=True, eq=False)
-class Circumstances:
+class PointConditions:
     """What the error of a point depends on beside its coordinates.
 
     Parameters
@@ -45,15 +45,15 @@ class Circumstances:
     temperatures: Floats | float | None = None
     lines: Ints | None = None
 
-    def of(self, rows: slice) -> Circumstances:
+    def of(self, rows: slice) -> PointConditions:
         """The circumstances of some of the points."""
         tip = self.tip[rows] if self.tip is not None and self.tip.ndim == 2 else self.tip
         each = isinstance(self.temperatures, np.ndarray) and self.temperatures.ndim == 2
         temperatures = np.asarray(self.temperatures)[rows] if each else self.temperatures
-        return Circumstances(tip, temperatures, self.lines[rows] if self.lines is not None else None)
+        return PointConditions(tip, temperatures, self.lines[rows] if self.lines is not None else None)
 
 
-NOMINAL = Circumstances()
+NOMINAL = PointConditions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Compensation:
     Parameters
     ----------
     maps : its error maps.
-    chain : its carriages; see :meth:`cmm_uq.machine.physics.kinematics.Chain.of`.
+    chain : its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
     origin : (3,) scale reading = coordinate + origin, mm.
     rigid : True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004
         eq. 10–13), on axes that lean exactly.
@@ -71,14 +71,14 @@ class Compensation:
     """
 
     maps: ErrorMaps  # its error maps
-    chain: str | Chain = "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.Chain.of`.
+    chain: str | Chain = "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
     origin: Floats | tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) scale reading = coordinate + origin, mm
     # True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004 eq. 10–13), on
     # axes that lean exactly.
     rigid: bool = False
     beyond: Beyond = "refuse"  # what to do beyond the mapped positions and temperatures
 
-    def error(self, indicated: Floats, when: Circumstances = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
+    def error(self, indicated: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """Error e (n, 3) in mm of indicated coordinates, and which points (n,) were extrapolated.
 
         Parameters
@@ -101,12 +101,12 @@ class Compensation:
             extrapolated[rows] = found.extrapolated
         return e, extrapolated
 
-    def compensate(self, indicated: Floats, when: Circumstances = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
+    def compensate(self, indicated: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """True coordinates (n, 3) in mm, and which points (n,) were extrapolated; parameters as :meth:`error`."""
         e, extrapolated = self.error(indicated, when)
         return indicated + e, extrapolated
 
-    def indicated_from_true(self, true: Floats, when: Circumstances = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
+    def indicated_from_true(self, true: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
         """Coordinates (n, 3) in mm that the machine indicates at true coordinates; the inverse of :meth:`compensate`.
 
         Raises
@@ -172,9 +172,9 @@ def machine_compensation(
     return Compensation(maps, points.machine.chain, points.machine.origin_mm, rigid, beyond)
 
 
-def circumstances(points: Points) -> Circumstances:
+def circumstances(points: Points) -> PointConditions:
     """Tip offsets and temperatures of the scales, where the recording has their columns."""
-    return Circumstances(_three(points.columns, "tip_{}_mm"), _three(points.columns, "temp_{}_c"), points.lines)
+    return PointConditions(_three(points.columns, "tip_{}_mm"), _three(points.columns, "temp_{}_c"), points.lines)
 
 
 def _three(columns: Mapping[str, Floats], pattern: str) -> Floats | None:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.physics.compensation import BLOCK, Circumstances, Compensation
+from cmm_uq.machine.physics.compensation import BLOCK, Compensation, PointConditions
 from cmm_uq.machine.physics.kinematics import on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import LookedUp
 from cmm_uq.maths.geometry import fit_plane, fit_sphere
@@ -186,7 +186,7 @@ class Digitizer:
         -------
         (n, 3) in mm, and (n,) whether a point was extrapolated beyond the error maps.
         """
-        n, when = len(readings), Circumstances(temperatures=temperatures)
+        n, when = len(readings), PointConditions(temperatures=temperatures)
         xyz, extrapolated = np.empty((n, 3)), np.empty(n, dtype=bool)
         for start in range(0, n, BLOCK):
             rows = slice(start, start + BLOCK)

@@ -100,16 +100,16 @@ def _squareness(a: str, b: str) -> ParametricError | None:
 
 
 @dataclass(frozen=True)
-class Chain:
+class KinematicChain:
     """Carriages from the workpiece to the probe."""
 
     order: tuple[int, int, int] = (0, 1, 2)  # indices of the axes, workpiece side first
     workpiece: int = 0  # how many of them, from the first, move the workpiece; the others move the probe
 
     @staticmethod
-    def of(text: str | Chain) -> Chain:
+    def of(text: str | KinematicChain) -> KinematicChain:
         """Chain from its letters: ``XYZ``, all carriages move the probe; ``XFYZ``, X moves the workpiece (F = frame)."""
-        return text if isinstance(text, Chain) else _chain(text)
+        return text if isinstance(text, KinematicChain) else _chain(text)
 
     @property
     def letters(self) -> str:
@@ -124,7 +124,7 @@ class Chain:
 
 
 @lru_cache(maxsize=64)
-def _chain(text: str) -> Chain:
+def _chain(text: str) -> KinematicChain:
     letters = text.strip().upper()
     axes = letters.replace("F", "", 1).lower()
     if sorted(axes) != list(AXES):
@@ -136,14 +136,14 @@ def _chain(text: str) -> Chain:
             "workpiece, such as XFYZ",
         )
     i, j, k = (AXES.index(a) for a in axes)
-    return Chain((i, j, k), max(letters.find("F"), 0))
+    return KinematicChain((i, j, k), max(letters.find("F"), 0))
 
 
 def carried_offset(
     axis: str,
     readings: Floats,
     tip: Floats | None = None,
-    chain: str | Chain = "XYZ",
+    chain: str | KinematicChain = "XYZ",
     directions: Floats | None = None,
 ) -> Floats:
     """Vector on which a rotation of carriage ``axis`` acts: the probe moves by ε × offset.
@@ -155,14 +155,14 @@ def carried_offset(
     axis : moving carriage, x, y or z.
     readings : (n, 3) scale readings, mm.
     tip : (n, 3) or (3,) stylus tip or digitizer offset from the end of the ram, mm.
-    chain : see :meth:`Chain.of`.
+    chain : see :meth:`KinematicChain.of`.
     directions : of the motions where they lean, see :func:`axis_directions`.
 
     Returns
     -------
     (n, 3) in mm.
     """
-    carried = _carried(AXES.index(axis), Chain.of(chain))
+    carried = _carried(AXES.index(axis), KinematicChain.of(chain))
     offset = np.zeros(np.shape(readings))
     offset[:, carried] = readings[:, carried]
     if directions is not None:
@@ -170,7 +170,7 @@ def carried_offset(
     return offset if tip is None else offset + tip
 
 
-def _carried(carriage: int, chain: Chain) -> list[int]:
+def _carried(carriage: int, chain: KinematicChain) -> list[int]:
     """Axes whose readings stand between a carriage and the end of the ram."""
     place = chain.order.index(carriage)
     return list(chain.order[place if place < chain.workpiece else place + 1 :])
@@ -182,7 +182,7 @@ def first_order(
     squareness: Floats | None = None,
     *,
     tip: Floats | None = None,
-    chain: str | Chain = "XYZ",
+    chain: str | KinematicChain = "XYZ",
 ) -> Floats:
     """Error e of every point to first order in the parametric errors (Harris 2004 eq. 11–13 for the chain XYZ).
 
@@ -197,7 +197,7 @@ def first_order(
     -------
     (n, 3) e in mm, true = indicated + e.
     """
-    chain = Chain.of(chain)
+    chain = KinematicChain.of(chain)
     tips = None if tip is None else np.broadcast_to(tip, readings.shape).T
     # written by components: clouds of points spend their time here
     e = errors[:, :, :3].sum(axis=1).T
@@ -221,7 +221,7 @@ def first_order(
     return np.asarray(e.T)
 
 
-def jacobian(readings: Floats, *, tip: Floats | None = None, chain: str | Chain = "XYZ") -> Floats:
+def jacobian(readings: Floats, *, tip: Floats | None = None, chain: str | KinematicChain = "XYZ") -> Floats:
     """Derivative of e with respect to each parametric error, all errors being small.
 
     Returns
@@ -246,14 +246,14 @@ def exact(
     squareness: Floats | None = None,
     *,
     tip: Floats | None = None,
-    chain: str | Chain = "XYZ",
+    chain: str | KinematicChain = "XYZ",
 ) -> Floats:
     """Error e of every point by rigid transformations, without neglecting products of errors.
 
     Parameters and result as :func:`first_order`. Rotations are taken as rotation vectors; axes x and y span the plane
     z = 0, with x along the motion of carriage x. The position error of a carriage (δx of x) goes along its motion.
     """
-    chain = Chain.of(chain)
+    chain = KinematicChain.of(chain)
     axes = axis_directions(squareness)
     own = readings + position_errors(errors)
     point = np.zeros(np.shape(readings)) if tip is None else np.broadcast_to(tip, np.shape(readings)).copy()
@@ -275,7 +275,7 @@ def on_leaning_axes(
     squareness: Floats | None = None,
     *,
     tip: Floats | None = None,
-    chain: str | Chain = "XYZ",
+    chain: str | KinematicChain = "XYZ",
 ) -> Floats:
     """Error e of every point: exact in the squarenesses, to first order in displacements and rotations.
 
@@ -285,7 +285,7 @@ def on_leaning_axes(
     e = first_order(readings, errors, tip=tip, chain=chain)
     if squareness is None:
         return e
-    chain = Chain.of(chain)
+    chain = KinematicChain.of(chain)
     lean = axis_directions(squareness) - np.eye(3)
     # written by components: clouds of points spend their time here
     for j in (1, 2):  # x does not lean

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.geometry.minimax import Shape
+from cmm_uq.maths.geometry.minimax import FeatureShape
 
 # steps, mm, below which a zone is where its contact points hold it; Newton's steps before it were their square root
 SETTLED = 1e-11
@@ -38,7 +38,7 @@ class _Basis:
         return _Basis(self.index[rows], self.sign[rows])
 
 
-def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
+def least_zones(shape: FeatureShape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
     """States (N, k) and widths (N,) of the minimum zones of points (d, N, n), and the draws that did not settle.
 
     A draw does not settle where fewer contact points than k + 1 hold the zone by its curvature.
@@ -70,7 +70,7 @@ def least_zones(shape: Shape, start: Floats, local: Floats, units: Floats) -> tu
     return state, width, np.flatnonzero(stuck)
 
 
-def _screened(shape: Shape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
+def _screened(shape: FeatureShape, start: Floats, local: Floats, units: Floats) -> tuple[Floats, Floats, Ints]:
     """The same of many points: exchanges among those that stand out, which all others then join that lie outside.
 
     The highest and the lowest of all are among those that stand out. Where these no longer move the zone, no point lies

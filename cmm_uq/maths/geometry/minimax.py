@@ -203,7 +203,7 @@ Distances = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
-class Shape:
+class FeatureShape:
     """A kind of feature in its own frame."""
 
     name: str  # as messages call it
@@ -220,7 +220,7 @@ class Shape:
         return np.asarray(J @ J.T)
 
 
-class _LineInSpace(Shape):
+class _LineInSpace(FeatureShape):
     def normal_matrix(self, state: Floats, local: Floats) -> Floats:
         """Of both components across the line: on the line itself the distance has no derivative, its square has."""
         one = np.array([np.ones(local.shape[1]), local[2]])
@@ -307,10 +307,10 @@ def _cone(state: Floats, local: Floats) -> tuple[Floats, Floats]:
     return f * cos - g * sin - _column(state, 4), J
 
 
-LINE_IN_PLANE = Shape("line", 2, (1,), None, _flat(1))
+LINE_IN_PLANE = FeatureShape("line", 2, (1,), None, _flat(1))
 LINE = _LineInSpace("line", 2, (2, 3), None, _axis)
-PLANE = Shape("plane", 3, (1, 2), None, _flat(2))
-CIRCLE = Shape("circle", 3, (), 2, _ball)
-SPHERE = Shape("sphere", 4, (), 3, _ball)
-CYLINDER = Shape("cylinder", 5, (2, 3), 4, _cylinder)
-CONE = Shape("cone", 6, (2, 3, 5), 4, _cone)
+PLANE = FeatureShape("plane", 3, (1, 2), None, _flat(2))
+CIRCLE = FeatureShape("circle", 3, (), 2, _ball)
+SPHERE = FeatureShape("sphere", 4, (), 3, _ball)
+CYLINDER = FeatureShape("cylinder", 5, (2, 3), 4, _cylinder)
+CONE = FeatureShape("cone", 6, (2, 3, 5), 4, _cone)

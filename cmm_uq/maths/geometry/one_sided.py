@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.geometry.exchange import MOST_EXCHANGES, ROUNDING
-from cmm_uq.maths.geometry.minimax import Shape
+from cmm_uq.maths.geometry.minimax import FeatureShape
 
 # mm: what may be left to be gained in a step; and after the most of them, where they wind along a curved valley
 SETTLED, ENOUGH = 1e-10, 1e-7
@@ -24,7 +24,7 @@ _WIDE = 10.0  # times the form: the half width of the first box
 _POOR, _GOOD, _WIDER, _NARROWER = 0.25, 0.75, 2.0, 0.25
 
 
-def held(shape: Shape, start: Floats, local: Floats, units: Floats, side: float) -> tuple[Floats, Ints]:
+def held(shape: FeatureShape, start: Floats, local: Floats, units: Floats, side: float) -> tuple[Floats, Ints]:
     """States (N, k) of the circumscribed (side 1) or inscribed (−1) features of points (d, N, n), and which did not settle.
 
     Of several features that points hold it is the one that is reached from the start, as it is of one measurement alone.

@@ -12,7 +12,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.axial import fit_cone, fit_cylinder
 from cmm_uq.maths.geometry.feature import centred, frame_about
-from cmm_uq.maths.geometry.minimax import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, Shape
+from cmm_uq.maths.geometry.minimax import CIRCLE, CONE, CYLINDER, LINE, LINE_IN_PLANE, PLANE, SPHERE, FeatureShape
 from cmm_uq.maths.geometry.round import fit_circle, fit_sphere
 from cmm_uq.maths.geometry.straight import fit_line, fit_plane
 
@@ -24,7 +24,7 @@ KINDS: tuple[FeatureKind, ...] = get_args(FeatureKind)
 class Placed:
     """A shape in a frame near which the points lie."""
 
-    shape: Shape  # the kind of feature
+    shape: FeatureShape  # the kind of feature
     origin: Floats  # (d,) of the frame, mm
     # (m, d) orthonormal rows; the last is the axis or normal, of a line in a plane the direction across it. Of a circle in
     # space there are two, so that its points are projected along the normal.
@@ -119,12 +119,14 @@ def _cone(points: Floats) -> Placed:
 _PLACING = {"line": _line, "plane": _plane, "circle": _circle, "sphere": _sphere, "cylinder": _cylinder, "cone": _cone}
 
 
-def _scatter(points: Floats, shape: Shape) -> float | None:
+def _scatter(points: Floats, shape: FeatureShape) -> float | None:
     """Uncertainty of a point to be told to the fit: a millionth where no more points than needed leave it to be told."""
     if points.ndim != 2 or len(points) != shape.least or not np.isfinite(points).all():
         return None
     return 1e-6 * (centred(points)[2] or 1.0)
 
 
-def _about(shape: Shape, points: Floats, origin: Floats, frame: Floats, state: Floats, condition: float) -> Placed:
+def _about(
+    shape: FeatureShape, points: Floats, origin: Floats, frame: Floats, state: Floats, condition: float
+) -> Placed:
     return Placed(shape, np.asarray(origin), frame, state, centred(points)[2], condition)

@@ -17,9 +17,11 @@ from numpy.typing import ArrayLike
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.exchange import SCREENED, least_zones
-from cmm_uq.maths.geometry.extremes import circumscribed as alone_circumscribed
-from cmm_uq.maths.geometry.extremes import inscribed as alone_inscribed
-from cmm_uq.maths.geometry.extremes import least_zone
+from cmm_uq.maths.geometry.extremes import (
+    circumscribed as alone_circumscribed,
+    inscribed as alone_inscribed,
+    least_zone,
+)
 from cmm_uq.maths.geometry.minimax import CIRCLE, CYLINDER, LINE, SPHERE
 from cmm_uq.maths.geometry.one_sided import held
 from cmm_uq.maths.geometry.placed import FeatureKind, Placed, placed

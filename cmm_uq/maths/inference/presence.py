@@ -23,8 +23,16 @@ from scipy import special
 
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.maths.inference.noise import ABSENT, AXES, GROWTH, PLACING, SLOW, WALK
-from cmm_uq.maths.inference.proposals import LogDensity, Proposal, chosen, cumulative, highest_power, moments, weights
-from cmm_uq.maths.inference.proposals import Numbers as RandomNumbers
+from cmm_uq.maths.inference.proposals import (
+    LogDensity,
+    Numbers as RandomNumbers,
+    Proposal,
+    chosen,
+    cumulative,
+    highest_power,
+    moments,
+    weights,
+)
 
 # numbers that say whether something is present, and the probability that it is not
 _SWITCHES = {"spread": ABSENT[AXES], PLACING: ABSENT[PLACING], GROWTH: ABSENT[GROWTH], SLOW: ABSENT[SLOW], "rate": WALK}

@@ -14,7 +14,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
-from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, Line
+from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class OneWay:
         """Degrees of freedom of :attr:`u_mean`: those of the larger mean square."""
         return self.groups - 1.0 if self.between >= self.within else float(self.groups * (self.repeats - 1))
 
-    def line(self, name: Text, group: Text, repeat: Text, unit: Text, sensitivity: float = 1.0) -> Line:
+    def line(self, name: Text, group: Text, repeat: Text, unit: Text, sensitivity: float = 1.0) -> BudgetLine:
         """The uncertainty of the mean as a line of a budget, made up of that by groups and that by readings within them.
 
         Both come from the same mean square, so that its degrees of freedom are those of the sum, not of the parts.
@@ -77,8 +77,8 @@ class OneWay:
         parts = Budget(
             name,
             [
-                Line(group, self.s_group / sqrt(self.groups), REPEATS, unit=unit, dof=self.groups - 1.0),
-                Line(repeat, self.s_repeat / sqrt(self.groups * self.repeats), REPEATS, unit=unit, dof=within),
+                BudgetLine(group, self.s_group / sqrt(self.groups), REPEATS, unit=unit, dof=self.groups - 1.0),
+                BudgetLine(repeat, self.s_repeat / sqrt(self.groups * self.repeats), REPEATS, unit=unit, dof=within),
             ],
             unit=unit,
             effective_dof=self.dof_mean,

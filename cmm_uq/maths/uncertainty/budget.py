@@ -34,7 +34,7 @@ _ROUNDING = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class BudgetLine:
     """One source of uncertainty."""
 
     name: Text  # the quantity
@@ -76,11 +76,11 @@ class Labels:
     origins: Mapping[str, str] = field(default_factory=dict)
 
 
-def line_of(name: str, given: Distribution, labels: Labels | None = None, sensitivity: float = 1.0) -> Line:
+def line_of(name: str, given: Distribution, labels: Labels | None = None, sensitivity: float = 1.0) -> BudgetLine:
     """Line of an input by its distribution."""
     told = labels or Labels()
     origin, unit = told.origins.get(name, say("not stated")), unit_as_written(told.units.get(name, ""))
-    return Line(
+    return BudgetLine(
         Verbatim(name),
         float(given.u),
         foreign(origin),
@@ -97,7 +97,7 @@ class Budget:
     """What is known of a measurand, line by line."""
 
     measurand: Text  # what is measured
-    lines: Sequence[Line]  # its sources of uncertainty
+    lines: Sequence[BudgetLine]  # its sources of uncertainty
     value: float | None = None  # estimate; None where the budget is of an uncertainty alone
     unit: Text = NOTHING  # of the measurand, as text
     coverage: float = 0.95  # probability of the expanded uncertainty
@@ -146,16 +146,18 @@ class Budget:
         """The same with an estimate of the measurand."""
         return replace(self, value=value)
 
-    def as_line(self, name: Text, sensitivity: float = 1.0) -> Line:
+    def as_line(self, name: Text, sensitivity: float = 1.0) -> BudgetLine:
         """Its result as one line of another budget."""
-        return Line(name, self.u, say("budget"), self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
+        return BudgetLine(
+            name, self.u, say("budget"), self.value, self.unit, "normal", self.dof, sensitivity, parts=self
+        )
 
     def mean_of(self, repetitions: int, measurand: Text) -> Budget:
         """Budget of the mean of repetitions: what they do not share is divided by √n."""
         lines = [line if line.shared else replace(line, variance=line.part / repetitions) for line in self.lines]
         return replace(self, measurand=measurand, lines=lines)
 
-    def flat(self, depth: int = 0, weight: float = 1.0) -> Iterator[tuple[int, Line, float]]:
+    def flat(self, depth: int = 0, weight: float = 1.0) -> Iterator[tuple[int, BudgetLine, float]]:
         """Every line with its depth and its share in this budget, nested lines after the line they make up."""
         for line, share in zip(self.lines, self.shares, strict=True):
             yield depth, line, weight * share
@@ -198,7 +200,7 @@ HEADINGS = (
 )  # fmt: skip
 
 
-def _text(depth: int, line: Line, share: float) -> tuple[Text, ...]:
+def _text(depth: int, line: BudgetLine, share: float) -> tuple[Text, ...]:
     value, u = NOTHING, (NOTHING if line.u is None else significant(line.u))
     if line.value is not None and line.u is not None:
         value, u = rounded(line.value, line.u)
@@ -265,9 +267,9 @@ def budget_of(
     )
 
 
-def joint_line(name: Text, variance: float) -> Line:
+def joint_line(name: Text, variance: float) -> BudgetLine:
     """Line that is no quantity but what several of them add to, or take from, the variance together."""
-    return Line(name, None, say("model"), distribution="", sensitivity=None, variance=variance)
+    return BudgetLine(name, None, say("model"), distribution="", sensitivity=None, variance=variance)
 
 
 def _of_squares(one: Text, other: Text) -> Text:
@@ -282,7 +284,7 @@ def _of_pairs(one: Text, other: Text) -> Text:
     return say("correlation of {one}, {other}", one=one, other=other)
 
 
-def _joint_lines(words: Callable[[Text, Text], Text], names: Sequence[str], variance: Floats) -> list[Line]:
+def _joint_lines(words: Callable[[Text, Text], Text], names: Sequence[str], variance: Floats) -> list[BudgetLine]:
     return [
         joint_line(words(Verbatim(names[i]), Verbatim(names[j])), float(variance[i, j]))
         for i, j in zip(*np.nonzero(variance), strict=True)

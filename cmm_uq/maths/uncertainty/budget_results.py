@@ -14,7 +14,7 @@ from cmm_uq.maths.uncertainty.budget import Budget
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 if TYPE_CHECKING:
-    from cmm_uq.maths.uncertainty.evaluation import Evaluation, Stated
+    from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult as Stated
     from cmm_uq.maths.uncertainty.monte_carlo import Simulated
     from cmm_uq.maths.uncertainty.propagation import Propagated
 

@@ -18,7 +18,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty import shapes
-from cmm_uq.maths.uncertainty.shapes import Shape
+from cmm_uq.maths.uncertainty.shapes import DistributionShape
 
 Number = float | Floats
 """A float, or an array (n,) with one entry a point, where only the law of propagation is asked for."""
@@ -46,7 +46,7 @@ class Distribution:
     u: Number
     location: Number
     scale: Number
-    shape: Shape | None
+    shape: DistributionShape | None
     dof: Number = np.inf
     stated: Mapping[str, Number] = field(default_factory=dict)
     together: str = ""
@@ -58,7 +58,7 @@ class Distribution:
         return self.scale * float(np.sqrt(self._shape.variance))
 
     @property
-    def _shape(self) -> Shape:
+    def _shape(self) -> DistributionShape:
         if self.shape is None:
             raise CmmUqError(
                 "degrees of freedom that differ from point to point cannot be drawn",
@@ -168,14 +168,20 @@ def _normal_or_t(kind: str, value: Number, u: Number, dof: Number) -> Distributi
     _finite(value=value, u=u)
     _positive(u=u)
     _known(dof)
-    shape: Shape | None = shapes.NORMAL
+    shape: DistributionShape | None = shapes.NORMAL
     if not np.all(np.isinf(dof)):
         shape = shapes.student_t(float(dof)) if np.ndim(dof) == 0 else None
     return Distribution(kind, value, u, value, u, shape, dof)
 
 
 def _bounded(
-    kind: str, low: Number, high: Number, dof: Number, shape: Shape | None, variance: float, **stated: Number
+    kind: str,
+    low: Number,
+    high: Number,
+    dof: Number,
+    shape: DistributionShape | None,
+    variance: float,
+    **stated: Number,
 ) -> Distribution:
     _limits(low, high, dof)
     mean, half_width = (np.asarray(low) + high) / 2, (np.asarray(high) - low) / 2

@@ -70,7 +70,7 @@ class Request:
 
 
 @dataclass(frozen=True, eq=False)
-class Stated:
+class OutputResult:
     """One output: its result by the method chosen."""
 
     # method, reason: how the result was obtained, and why so
@@ -90,7 +90,7 @@ class Evaluation:
     """All outputs of a model."""
 
     request: Request
-    stated: Mapping[str, Stated]  # result of each output by name
+    stated: Mapping[str, OutputResult]  # result of each output by name
     correlation: Floats  # (p, p) of the outputs; ``nan`` where one has no uncertainty
     ways: Ways  # results of every method that was asked for and possible
 
@@ -139,7 +139,7 @@ def _evaluated(model: MeasurementModel, asked: Request, told: Labels) -> Evaluat
     chosen = [_chosen(model, ways, row, asked) for row in range(len(model.outputs))]
     methods = {method for method, _ in chosen}
     alone = one_at_a_time(model, asked.seed) if "monte_carlo" in methods else np.zeros(0)
-    stated: dict[str, Stated] = {}
+    stated: dict[str, OutputResult] = {}
     for row, (name, (method, reason)) in enumerate(zip(model.outputs, chosen, strict=True)):
         found = ways.propagated(method)
         if method == "monte_carlo" and ways.simulated is not None:
@@ -203,16 +203,16 @@ def _propagated(
     reason: Text,
     coverage: float,
     labels: Labels,
-) -> Stated:
+) -> OutputResult:
     dof, u, value = float(found.dof[row]), float(found.u[row]), float(found.value[row])
     factor = float(coverage_factor(dof, coverage))
     budget = budget_of(model, found, row, labels=labels, coverage=coverage)
-    return Stated(method, reason, value, u, dof, (value - factor * u, value + factor * u), factor, budget)
+    return OutputResult(method, reason, value, u, dof, (value - factor * u, value + factor * u), factor, budget)
 
 
 def _simulated(
     model: MeasurementModel, simulated: Simulated, row: int, reason: Text, alone: Floats, labels: Labels
-) -> Stated:
+) -> OutputResult:
     name, value, u = simulated.outputs[row], float(simulated.value[row]), float(simulated.u[row])
     lines = []
     for (quantity, given), variance in zip(model.inputs.items(), alone.tolist(), strict=True):
@@ -227,7 +227,7 @@ def _simulated(
     unit = unit_as_written(labels.units.get(name, ""))
     budget = Budget(Verbatim(name), lines, value, unit, simulated.coverage, effective_dof=inf, statement=statement)
     low, high = map(float, simulated.interval[row])
-    return Stated("monte_carlo", reason, value, u, inf, (low, high), (high - low) / (2 * u) if u else 0.0, budget)
+    return OutputResult("monte_carlo", reason, value, u, inf, (low, high), (high - low) / (2 * u) if u else 0.0, budget)
 
 
 def one_at_a_time(model: MeasurementModel, seed: int = 0) -> Floats:

@@ -22,7 +22,7 @@ from pydantic import Field
 from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.files.content import content_of, text_of
 from cmm_uq.base.files.limits import DRAWS, INPUTS, MODEL_BYTES, TEXT
-from cmm_uq.base.files.table import Table
+from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import toml_of
 from cmm_uq.base.messages import Text, say
 from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
@@ -45,7 +45,7 @@ from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
 Figure = float | str  # A number, or a text of a number and its unit, such as ``"25 nm"``
 
 
-class ModelTable(Table):
+class ModelTable(JobTable):
     """``[model]``."""
 
     outputs: dict[str, str] = {}
@@ -67,7 +67,7 @@ class ModelTable(Table):
     """Unit of each output; derived where the expression determines it."""
 
 
-class InputTable(Table):
+class InputTable(JobTable):
     """``[inputs.NAME]``: which of the figures belong together says the distribution."""
 
     distribution: Literal[tuple(KINDS)] | None = None  # type: ignore[valid-type]
@@ -104,7 +104,7 @@ class InputTable(Table):
     """The same word for inputs that were read together: their correlation comes from the samples."""
 
 
-class ModelFileTable(Table):
+class ModelFileTable(JobTable):
     """A measurement model of one's own."""
 
     model: ModelTable

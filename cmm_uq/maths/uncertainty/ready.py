@@ -19,19 +19,23 @@ from typing import Any
 from pydantic import create_model
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.files.table import Table
+from cmm_uq.base.files.table import JobTable
 from cmm_uq.base.files.toml_file import checked
 from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.maths.uncertainty.air.interferometer import Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.air.state import Air
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
-from cmm_uq.maths.uncertainty.budgets.measurements import labels as temperature_labels
-from cmm_uq.maths.uncertainty.budgets.measurements import length_at_20, scale_error, triangle_angles
+from cmm_uq.maths.uncertainty.budgets.measurements import (
+    labels as temperature_labels,
+    length_at_20,
+    scale_error,
+    triangle_angles,
+)
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable
 from cmm_uq.maths.uncertainty.choice import Ways
 from cmm_uq.maths.uncertainty.correlation import Correlations
 from cmm_uq.maths.uncertainty.distributions import Distribution
-from cmm_uq.maths.uncertainty.evaluation import Evaluation, Request, Stated
+from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult, Request
 from cmm_uq.maths.uncertainty.expression import Expression
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 
@@ -130,7 +134,7 @@ def ready_model(
 KEY = "budget"
 
 
-class _BudgetFile(Table):
+class _BudgetFile(JobTable):
     budget: BudgetTable
 
 
@@ -179,14 +183,14 @@ class ReadyBudget:
         return {"ready": getattr(self.table, "method", ""), **self.table.remarks()}
 
 
-def _stated(budget: Budget) -> Stated:
+def _stated(budget: Budget) -> OutputResult:
     value, U = budget.value or 0.0, budget.expanded
     reason = (
         say("U = k u with k = 2, which the standard prescribes")
         if budget.factor is not None
         else say("U = k u with k from the effective degrees of freedom")
     )
-    return Stated("first", reason, value, budget.u, budget.dof, (value - U, value + U), budget.k, budget)
+    return OutputResult("first", reason, value, budget.u, budget.dof, (value - U, value + U), budget.k, budget)
 
 
 def read_ready_budget(content: bytes, path: Path) -> ReadyBudget:

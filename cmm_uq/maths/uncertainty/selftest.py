@@ -21,7 +21,7 @@ _ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SelfTestResult:
     """One figure of a reference case."""
 
     case: str  # title and figure
@@ -33,26 +33,26 @@ class Outcome:
     passed: bool  # whether it is near enough
 
 
-def run(cases: Iterable[ReferenceCase] = REFERENCE_CASES) -> list[Outcome]:
+def run(cases: Iterable[ReferenceCase] = REFERENCE_CASES) -> list[SelfTestResult]:
     """Compute every figure of the reference cases and compare it."""
     return [outcome for case in cases for outcome in _outcomes(case)]
 
 
-def _outcomes(case: ReferenceCase) -> list[Outcome]:
+def _outcomes(case: ReferenceCase) -> list[SelfTestResult]:
     figures = case.compute()
     found = []
     for name, (expected, tolerance) in case.expected.items():
         got = figures[name]
         allowed = tolerance + _ROUNDING * abs(expected)
         passed = abs(got - expected) <= allowed  # false for a figure that is not a number
-        found.append(Outcome(f"{case.title}: {name}", expected, tolerance, got, case.source, passed))
+        found.append(SelfTestResult(f"{case.title}: {name}", expected, tolerance, got, case.source, passed))
     return found
 
 
 HEADINGS = ("Case", "Expected", "Tolerance", "Got", "Source", "Result")
 
 
-def as_text(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+def as_text(outcomes: Sequence[SelfTestResult]) -> list[tuple[str, ...]]:
     """Rows of text under :data:`HEADINGS`; what came out has two digits more than the tolerance."""
     return [
         (

@@ -17,7 +17,7 @@ _BISECTIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class DistributionShape:
     """How to draw and to invert a distribution, and its variance."""
 
     variance: float
@@ -31,26 +31,26 @@ def _normal_inverse(p: Floats) -> Floats:
     return np.asarray(special.ndtri(p))
 
 
-POINT = Shape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
-NORMAL = Shape(1.0, lambda rng, n: rng.standard_normal(n), _normal_inverse)
-RECTANGULAR = Shape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
+POINT = DistributionShape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
+NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), _normal_inverse)
+RECTANGULAR = DistributionShape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
 
-TRIANGULAR = Shape(
+TRIANGULAR = DistributionShape(
     1 / 6,
     lambda rng, n: rng.random(n) + rng.random(n) - 1,
     lambda p: np.where(p < 0.5, np.sqrt(2 * p) - 1, 1 - np.sqrt(2 * (1 - p))),
 )
 
-ARCSINE = Shape(
+ARCSINE = DistributionShape(
     1 / 2,
     lambda rng, n: np.sin(2 * np.pi * rng.random(n)),
     lambda p: np.sin(np.pi * (p - 0.5)),
 )
 
-EXPONENTIAL = Shape(1.0, lambda rng, n: rng.standard_exponential(n), lambda p: -np.log1p(-p))
+EXPONENTIAL = DistributionShape(1.0, lambda rng, n: rng.standard_exponential(n), lambda p: -np.log1p(-p))
 
 
-def student_t(dof: float) -> Shape:
+def student_t(dof: float) -> DistributionShape:
     """T distribution; of infinite variance with two degrees of freedom or fewer."""
 
     def inverse(p: Floats) -> Floats:
@@ -59,10 +59,10 @@ def student_t(dof: float) -> Shape:
         return np.asarray(special.stdtrit(dof, p))
 
     variance = dof / (dof - 2) if dof > 2 else np.inf
-    return Shape(variance, lambda rng, n: rng.standard_t(dof, n), inverse)
+    return DistributionShape(variance, lambda rng, n: rng.standard_t(dof, n), inverse)
 
 
-def gamma(order: float) -> Shape:
+def gamma(order: float) -> DistributionShape:
     """Gamma distribution of unit scale."""
 
     def inverse(p: Floats) -> Floats:
@@ -70,10 +70,10 @@ def gamma(order: float) -> Shape:
 
         return np.asarray(special.gammaincinv(order, p))
 
-    return Shape(order, lambda rng, n: rng.standard_gamma(order, n), inverse)
+    return DistributionShape(order, lambda rng, n: rng.standard_gamma(order, n), inverse)
 
 
-def trapezoidal(beta: float) -> Shape:
+def trapezoidal(beta: float) -> DistributionShape:
     """Trapezoid whose top is ``beta`` times its base."""
 
     def inverse(p: Floats) -> Floats:
@@ -85,10 +85,10 @@ def trapezoidal(beta: float) -> Shape:
     def draw(rng: np.random.Generator, n: int) -> Floats:
         return (1 + beta) * rng.random(n) + (1 - beta) * rng.random(n) - 1
 
-    return Shape((1 + beta**2) / 6, draw, inverse)
+    return DistributionShape((1 + beta**2) / 6, draw, inverse)
 
 
-def rectangular_uncertain(doubt: float) -> Shape:
+def rectangular_uncertain(doubt: float) -> DistributionShape:
     """Rectangle whose half-width is itself rectangular between 1 − doubt and 1 + doubt (curvilinear trapezoid)."""
 
     def beyond(x: Floats) -> Floats:
@@ -108,12 +108,12 @@ def rectangular_uncertain(doubt: float) -> Shape:
     def draw(rng: np.random.Generator, n: int) -> Floats:
         return (1 + doubt * (2 * rng.random(n) - 1)) * (2 * rng.random(n) - 1)
 
-    return Shape((1 + doubt**2 / 3) / 3, draw, inverse)
+    return DistributionShape((1 + doubt**2 / 3) / 3, draw, inverse)
 
 
-def empirical(draws: Floats) -> Shape:
+def empirical(draws: Floats) -> DistributionShape:
     """Earlier draws, drawn again with replacement."""
-    return Shape(
+    return DistributionShape(
         float(np.var(draws, ddof=1)),
         lambda rng, n: draws[rng.integers(len(draws), size=n)],
         lambda p: np.quantile(draws, p, method="inverted_cdf"),

@@ -69,7 +69,7 @@ def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) 
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class StraightLine:
     """Straight line y = intercept + slope (x − reference) by least squares (JCGM 100 annex H.3)."""
 
     reference: float
@@ -97,7 +97,7 @@ class Line:
         )
 
 
-def straight_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats, reference: float = 0.0) -> Line:
+def straight_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats, reference: float = 0.0) -> StraightLine:
     """Fit a line to readings y of equal, unknown uncertainty at positions x that are known (JCGM 100 annex H.3)."""
     table = _table({"x": x, "y": y})
     n = table.shape[1]
@@ -109,7 +109,7 @@ def straight_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats, refe
     intercept, slope = np.linalg.solve(r, q.T @ readings)
     variance = float(np.sum((readings - design @ [intercept, slope]) ** 2) / (n - 2))
     inverse = np.linalg.inv(r)
-    return Line(reference, float(intercept), float(slope), variance * inverse @ inverse.T, variance**0.5, n - 2)
+    return StraightLine(reference, float(intercept), float(slope), variance * inverse @ inverse.T, variance**0.5, n - 2)
 
 
 def _table(readings: Mapping[str, Sequence[float] | Floats]) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
-from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.artefacts.sphere.observe import SphereArtefact
 from cmm_uq.base.points import Floats, Ints, Machine, Points
 from cmm_uq.jobs.tables.circumstances import Circumstances, Declared, NegligibleLines, RatedConditions, TestUncertainty
 from tests.recordings import TRAVEL, bar_facts
@@ -121,7 +121,7 @@ def again(bar: Ballbar, numbers: Mapping[int, int], moved_mm: float = 0.0, *, tu
 def sphere(
     *, points: int = 25, copied: int = 0, cap_deg: float = 90.0, form_um: float | None = 0.2, height_um: float = 3.0,
     spheres: int = 1,
-) -> Sphere:  # fmt: skip
+) -> SphereArtefact:  # fmt: skip
     """Points on a spiral over a cap of a sphere, every other one too high; the last ``copied`` of them are the first again."""
     count = points - copied
     height = 1 - (np.arange(count) + 0.5) / count * (1 - np.cos(np.radians(cap_deg)))
@@ -133,6 +133,6 @@ def sphere(
     number = np.repeat(np.arange(1, spheres + 1), points)
     facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=form_um)
     columns = {"temp_artefact_c": np.full(len(number), 20.0)}
-    return Sphere(
+    return SphereArtefact(
         facts, Points(every, number, np.tile(np.arange(1, points + 1), spheres), np.ones_like(number), MACHINE, columns)
     )

@@ -6,8 +6,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.analysis.conformity.plan_conditions import conditions, most_apart
 from cmm_uq.analysis.conformity.plans import BarPlan

@@ -15,7 +15,7 @@ from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.tables.conformity import ConformityFacts
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.noise import Sizes
 from tests.analysis.conformity.recorded import STATED, bars, gauge
@@ -31,10 +31,10 @@ def told(
     ideal = gauge() if lines else with_bars()
     facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um="L/2000") if lines else bar_facts(300.0, 0.01)
     kind = StepGauge if lines else Ballbar
-    acting = MeasurementModel(ideal, effects(("squareness_xy",)))
+    acting = RecordingModel(ideal, effects(("squareness_xy",)))
     nominal = np.array([size.nominal for size in ideal.sizes])
     xyz = acting.simulate(np.array([size]), nominal, Noise(1e-9), np.random.default_rng(0))
-    after = MeasurementModel(kind(facts, ideal.points.at(xyz)), effects((*SCALES, "squareness_xy")), 1e-3)
+    after = RecordingModel(kind(facts, ideal.points.at(xyz)), effects((*SCALES, "squareness_xy")), 1e-3)
     estimate = after.estimate().least_squares
     draws = np.tile(estimate.value, (1000, 1))
     reading, nothing = np.full((1000, 3), 1e-3), np.zeros(1000)

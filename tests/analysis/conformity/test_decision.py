@@ -6,8 +6,7 @@ from statistics import NormalDist
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.analysis.conformity.decision import decide, rule_name
 from cmm_uq.jobs.tables.conformity import FalseAccept, GuardBand, Rule

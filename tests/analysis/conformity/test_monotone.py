@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hypothesis import HealthCheck, Phase, assume, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, Phase, assume, example, given, settings, strategies as st
 
 from cmm_uq.analysis.conformity.decision import Outcome, decide
 from cmm_uq.base.errors import CmmUqError

@@ -13,7 +13,7 @@ from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.artefacts import artefact_facts, kind_named
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
-from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.artefacts.sphere.observe import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.jobs.tables.circumstances import Circumstances
@@ -356,7 +356,9 @@ def test_a_copied_sphere_is_no_second_one() -> None:
     two = Points(
         np.vstack([one.xyz, one.xyz]), np.repeat([1, 2], 24), np.tile(one.point, 2), np.ones(48, dtype=np.int64)
     )
-    found = judged(Sphere(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2), two), ISO_5, limit_um=20.0)
+    found = judged(
+        SphereArtefact(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2), two), ISO_5, limit_um=20.0
+    )
     assert found.missing == ("25 points on the sphere of measurement 1 (24 recorded, 24 different)",)
     assert any("measurement 2, repeat 1 of measurement 1, repeat 1" in text for text in found.remarks)
 
@@ -457,7 +459,7 @@ def test_a_statement_on_spheres_remarks_the_ball_and_of_several_the_largest() ->
     two = sphere(form_um=0.2345, spheres=2)
     xyz = two.points.xyz.copy()
     xyz[26] += 1e-3 * (xyz[26] - [30.0, 0.0, 0.0]) / 12.5
-    found = judged(Sphere(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2345), two.points.at(xyz)), ISO_5,
+    found = judged(SphereArtefact(artefact_facts(kind="sphere", length_mm=25.0, form_um=0.2345), two.points.at(xyz)), ISO_5,
                    limit_um=20.0)  # fmt: skip
     assert found.remarks[:-1] == (
         ball,

@@ -6,8 +6,7 @@ import json
 
 import pytest
 
-from cmm_uq.analysis.conformity.statement import GRAVEST as FINDINGS
-from cmm_uq.analysis.conformity.statement import by_tolerance
+from cmm_uq.analysis.conformity.statement import GRAVEST as FINDINGS, by_tolerance
 from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.verdicts import GRAVEST, NO_VERDICTS, Verdict, Verdicts
 from cmm_uq.maths.uncertainty.quantity import Quantity

@@ -11,7 +11,7 @@ import numpy as np
 from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
-from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.artefacts.sphere.observe import SphereArtefact
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.tables.circumstances import Circumstances, ProbeFacts, TestUncertainty
 from cmm_uq.machine.model.artefact import Artefact
@@ -147,7 +147,7 @@ def fixed_ball(how: str) -> Hand:
     points = Points(xyz, np.ones_like(repeat), np.tile(one.point, count), repeat, MACHINE)
     facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1, form_um=0.2)
     stated = changing(0.0 if how == "no u" else 0.2)
-    return Hand(Sphere(facts, points), stated, {}, ERROR, 0.2, False)
+    return Hand(SphereArtefact(facts, points), stated, {}, ERROR, 0.2, False)
 
 
 def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
@@ -158,7 +158,7 @@ def probed(*, size: bool, sensing: str | None = None) -> Callable[..., Hand]:
                           form_um=None if how == "no u" and not size else 0.2)  # fmt: skip
         facts = artefact_facts(kind="sphere", length_mm=24.99, u_um=None if how == "no u" else 0.1,
                                form_um=None if how == "no u" else 0.2)  # fmt: skip
-        artefact = Sphere(facts, artefact.points)
+        artefact = SphereArtefact(facts, artefact.points)
         found = artefact.probed()
         value = float((found.size if size else found.form)[0]) * 1e3
         under = replace(STATED, probe=ProbeFacts(sensing=sensing))

@@ -14,7 +14,7 @@ from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.jobs.recording.references import against_earlier
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import MIDDLE, plate
 from tests.recordings import suggested
@@ -63,7 +63,7 @@ def like_a_yaw(yaw: float) -> Floats:
 
 
 def diagnosed(points: Points, named: Sequence[str] = IN_PLANE, facts: ArtefactFacts = DRILLED) -> Diagnosis:
-    model = MeasurementModel(artefact_of(facts, points), effects(named))
+    model = RecordingModel(artefact_of(facts, points), effects(named))
     return diagnose(model, stated_um=1.0, alpha=0.01, seed=0, observe=lambda some: artefact_of(facts, some))
 
 
@@ -168,7 +168,7 @@ def test_a_plate_half_a_kelvin_cooler_on_the_later_date_is_not_a_scale_of_the_ma
     now = now.at(middle + (now.xyz - middle) * (1 - 0.5 * 11.5e-6) + again)
     plain = [Points(p.xyz, p.measurement, p.point, p.repeat, p.machine, {}, p.lines) for p in (now, then)]
     points = against_earlier(*plain, 11.5e-6, "now.csv")
-    model = MeasurementModel(artefact_of(facts, points), ())
+    model = RecordingModel(artefact_of(facts, points), ())
     found = diagnose(model, stated_um=None, alpha=0.01, seed=0, observe=lambda some: artefact_of(facts, some))
     assert found.effects[0].effect == "artefact_temperature"
     kelvin = found.effects[0].parameters["k"]

@@ -27,7 +27,7 @@ from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.plate.observe import Plate
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.jobs.recording.references import against_earlier
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.artefacts.constructions import indicated, plate
 from tests.conftest import ROOT
@@ -54,7 +54,7 @@ def repeated(points: Points, times: int) -> Points:
 def recording(hidden: dict[str, float], noise: Noise, seed: int = 1, error: Floats | None = None) -> Points:
     """Forty bars, three times each, with hidden effects (one parameter each) and, if given, an error e of each point."""
     points = repeated(bars(np.random.default_rng(3), 40, 400.0, Machine("m", "XYZ", TRAVEL)), 3)
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(tuple(hidden)))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(tuple(hidden)))
     drawn = points.at(
         model.simulate(np.array(list(hidden.values())), np.array([400.0]), noise, np.random.default_rng(seed))
     )
@@ -62,14 +62,14 @@ def recording(hidden: dict[str, float], noise: Noise, seed: int = 1, error: Floa
 
 
 def diagnosed(points: Points, stated_um: float | None = SIGMA_UM, named: tuple[str, ...] = SIX) -> Diagnosis:
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(named))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(named))
     return diagnose(model, stated_um=stated_um, alpha=0.01, seed=0)
 
 
 def test_told_only_of_scale_the_real_recording_shows_its_squareness() -> None:
     """Against the machine's own calibration, which it never saw: −173″ (Harris 2004, table 7)."""
     job = read_job(ROOT / "examples" / "iota-1102-20C")
-    model = MeasurementModel(Ballbar(job.facts.artefact, job.points), effects(["scale_x", "scale_y", "scale_z"]))
+    model = RecordingModel(Ballbar(job.facts.artefact, job.points), effects(["scale_x", "scale_y", "scale_z"]))
     found = diagnose(model, stated_um=None, alpha=0.01, seed=0)
     assert found.verdict == "explained"
     (item,) = found.effects
@@ -130,12 +130,12 @@ def test_false_alarms_are_as_frequent_as_the_p_value_says() -> None:
     values = []
     for seed in range(16):
         points = repeated(bars(np.random.default_rng(seed), 20, 400.0, Machine("m", "XYZ", TRAVEL)), 2)
-        empty = MeasurementModel(Ballbar(bar_facts(), points), effects(()))
+        empty = RecordingModel(Ballbar(bar_facts(), points), effects(()))
         drawn = points.at(
             empty.simulate(np.zeros(0), np.array([400.0]), Noise(1e-3), np.random.default_rng(1000 + seed))
         )
         stated = 1e-3 if seed % 2 else None
-        values.append(model_comparison(MeasurementModel(Ballbar(bar_facts(), drawn), effects(SIX)), stated, 0).p_value)
+        values.append(model_comparison(RecordingModel(Ballbar(bar_facts(), drawn), effects(SIX)), stated, 0).p_value)
     assert stats.kstest(values, "uniform").pvalue > 1e-3
     assert sum(value < 0.01 for value in values) <= 2
 
@@ -164,7 +164,7 @@ def test_effects_with_one_signature_are_named_together_with_a_measurement_that_p
     xyz = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
     number = np.repeat(np.arange(30), 2)
     points = Points(xyz, number, np.tile([1, 2], 30), np.ones_like(number), machine)
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(["rotation_x_z"]))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(["rotation_x_z"]))
     drawn = points.at(model.simulate(np.array([60.0]), np.array([400.0]), Noise(1e-3), random))
     found = diagnosed(drawn, named=("scale_y", "scale_z", "squareness_zx"))
     assert found.verdict == "explained"
@@ -176,9 +176,9 @@ def test_effects_with_one_signature_are_named_together_with_a_measurement_that_p
 def test_the_held_out_error_of_least_squares_is_the_press_residual() -> None:
     """Without a prior that matters, leaving one bar out gives r/(1 − h) (Cook & Weisberg 1982, 2.2.3)."""
     points = bars(np.random.default_rng(3), 30, 400.0, Machine("m", "XYZ", TRAVEL))
-    empty = MeasurementModel(Ballbar(bar_facts(), points), effects(SIX))
+    empty = RecordingModel(Ballbar(bar_facts(), points), effects(SIX))
     drawn = points.at(empty.simulate(np.zeros(6), np.array([400.0]), Noise(1e-3), np.random.default_rng(2)))
-    model = MeasurementModel(Ballbar(bar_facts(400.0, 1e-6), drawn), effects(SIX))
+    model = RecordingModel(Ballbar(bar_facts(400.0, 1e-6), drawn), effects(SIX))
     linear = model.estimate().linear
     A, y = linear.design[:, :6], linear.observed - linear.design[:, 6] * 400.0
     Q = np.linalg.qr(A)[0]
@@ -189,7 +189,7 @@ def test_the_held_out_error_of_least_squares_is_the_press_residual() -> None:
 
 def test_the_false_alarm_rate_is_asked_for() -> None:
     points = recording({"straightness_y_x": 1.0}, Noise(1e-3))
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(SIX))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(SIX))
     weak = diagnose(model, stated_um=1.0, alpha=1e-6, seed=0)
     assert weak.verdict == "consistent"
     near = diagnose(replace(model), stated_um=1.0, alpha=0.5, seed=0).p_value  # of more draws, and with heavy tails
@@ -229,7 +229,7 @@ SCALES = ("scale_x", "scale_y", "scale_z")
 def test_nothing_but_the_squarenesses_is_found(truth: list[float], named: tuple[str, ...]) -> None:
     """To first order Z would be 8.5 ppm short at 600″, and bars and guideways would be blamed for products of angles."""
     points = recorded(np.array(truth, dtype=np.float64), sigma=1e-3, seed=1, count=40)
-    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(named), None)
+    model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(named), None)
     found = diagnose(model, stated_um=1.0, alpha=0.01, seed=0)
     assert found.verdict == "explained"
     assert {e.effect for e in found.effects} == {"squareness_xy", "squareness_yz", "squareness_zx"}
@@ -258,7 +258,7 @@ def noisy() -> Points:
 
 @pytest.mark.parametrize("points", [exact(), against_earlier(noisy(), noisy(), 0.0, "now.csv")], ids=["exact", "copy"])
 def test_they_are_consistent_without_an_outlier(points: Points) -> None:
-    model, outliers = without_outliers(MeasurementModel(Plate(FACTS, points), effects(("scale_x", "scale_y"))))
+    model, outliers = without_outliers(RecordingModel(Plate(FACTS, points), effects(("scale_x", "scale_y"))))
     assert not outliers
     found = diagnose(model, stated_um=None, alpha=0.01, seed=0)
     assert found.verdict == "consistent"

@@ -14,7 +14,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.artefacts.gauge_lines.observe import StepGauge
 from cmm_uq.base.points import Floats, Ints, Machine, Points
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.posterior import Density
 from tests.analysis.conformity.recorded import gauge
@@ -27,11 +27,11 @@ SCALES = ("scale_x", "scale_y", "scale_z")
 def recording() -> Points:
     """Forty bars on a machine with a squareness error of 12″."""
     points = bars(np.random.default_rng(3), 40, 400.0, Machine("m", "XYZ", TRAVEL))
-    truth = MeasurementModel(Ballbar(bar_facts(), points), effects(("squareness_xy",)))
+    truth = RecordingModel(Ballbar(bar_facts(), points), effects(("squareness_xy",)))
     return points.at(truth.simulate(np.array([12.0]), np.array([400.0]), Noise(5e-3), np.random.default_rng(4)))
 
 
-def leave_one_out(model: MeasurementModel) -> tuple[float, Floats]:
+def leave_one_out(model: RecordingModel) -> tuple[float, Floats]:
     """Expected log predictive density and Pareto k of each bar, from draws of the posterior given all of them."""
     linear = model.estimate().linear
     sigma = model.estimate().least_squares.sigma_of_residuals
@@ -48,7 +48,7 @@ def leave_one_out(model: MeasurementModel) -> tuple[float, Floats]:
 def test_the_gain_of_exact_refits_is_that_of_importance_sampling() -> None:
     points = recording()
     before, after = (
-        MeasurementModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
+        RecordingModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
     )
     (first, k_first), (second, k_second) = leave_one_out(before), leave_one_out(after)
     assert max(k_first.max(), k_second.max()) < 0.7
@@ -57,7 +57,7 @@ def test_the_gain_of_exact_refits_is_that_of_importance_sampling() -> None:
     assert gain.elpd_gain == pytest.approx(second - first, abs=0.3)
 
 
-def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Floats, float]:
+def predicted(model: RecordingModel, groups: Ints, *, whole: bool) -> tuple[Floats, float]:
     """Log predictive density of each fold and rms of its errors, µm.
 
     All observations, in units of their noise, are normal with covariance A·P·Aᵀ + σ², a placing being known to 100 mm before;
@@ -87,7 +87,7 @@ def predicted(model: MeasurementModel, groups: Ints, *, whole: bool) -> tuple[Fl
     return np.array(densities), float(1e3 * np.sqrt(np.mean(np.concatenate(errors) ** 2)))
 
 
-def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, unseen: str) -> None:
+def compared(before: RecordingModel, after: RecordingModel, groups: Ints, unseen: str) -> None:
     """All figures of an improvement against the joint distribution; its standard error is over what was left out."""
     whole = unseen == "set-ups"
     xyz, rows = before.artefact.points.xyz, before.artefact.rows
@@ -112,10 +112,10 @@ def compared(before: MeasurementModel, after: MeasurementModel, groups: Ints, un
 def test_predictions_of_bars_are_those_of_the_joint_normal_distribution(made: int) -> None:
     """Up to forty bars one by one, of more a tenth at a time."""
     points = bars(np.random.default_rng(6), made, 400.0, Machine("m", "XYZ", TRAVEL))
-    truth = MeasurementModel(Ballbar(bar_facts(), points), effects(("squareness_xy",)))
+    truth = RecordingModel(Ballbar(bar_facts(), points), effects(("squareness_xy",)))
     points = points.at(truth.simulate(np.array([12.0]), np.array([400.0]), Noise(5e-3), np.random.default_rng(7)))
     before, after = (
-        MeasurementModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
+        RecordingModel(Ballbar(bar_facts(), points), effects(names)) for names in (SCALES, (*SCALES, "squareness_xy"))
     )
     compared(before, after, after.artefact.measurement, "set-ups")
 
@@ -125,11 +125,11 @@ def test_predictions_along_lines_are_those_of_the_joint_normal_distribution(line
     """Whole lines of a gauge, whose place is then open, or faces on few lines, whose place the other faces give."""
     directions = np.random.default_rng(8).standard_normal((lines, 3))
     ideal = gauge(list(directions), [[20.0, 100.0, 200.0, 300.0]] * lines, repeats=2)
-    truth = MeasurementModel(ideal, effects(("squareness_xy",)))
+    truth = RecordingModel(ideal, effects(("squareness_xy",)))
     xyz = truth.simulate(np.array([12.0]), np.array([800.0]), Noise(2e-3), np.random.default_rng(9))
     facts = artefact_facts(kind="step_gauge", length_mm=800.0, u_um=0.4)
     artefact = StepGauge(facts, ideal.points.at(xyz))
-    before, after = (MeasurementModel(artefact, effects(names)) for names in (SCALES, (*SCALES, "squareness_xy")))
+    before, after = (RecordingModel(artefact, effects(names)) for names in (SCALES, (*SCALES, "squareness_xy")))
     key = np.column_stack([artefact.measurement, artefact.points.point])
     groups = artefact.measurement if unseen == "set-ups" else np.unique(key, axis=0, return_inverse=True)[1].ravel()
     compared(before, after, groups, unseen)
@@ -139,7 +139,7 @@ def test_points_of_a_few_lines_are_predicted_as_the_press_residuals_of_all_colum
     """Without rows O, e = (1 − H_OO)⁻¹ r (Cook & Weisberg 1982, 2.2.3), the gauge's place on each line being a column too."""
     job = read_job(ROOT / "examples" / "step-gauge-simulated")
     facts = job.facts.artefact.model_copy(update={"u_um": 1e-6})
-    model = MeasurementModel(StepGauge(facts, job.points), effects(("scale_x", "scale_y", "scale_z", "squareness_xy")))
+    model = RecordingModel(StepGauge(facts, job.points), effects(("scale_x", "scale_y", "scale_z", "squareness_xy")))
     linear = model.estimate().linear
     y = linear.observed - linear.design[:, 4:] @ linear.prior_mean[4:]
     columns = np.hstack([linear.design[:, :4], linear.freedoms.dense()])

@@ -7,14 +7,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
+from hypothesis import Phase, given, settings, strategies as st
 
 from cmm_uq.analysis.diagnosis.comparison.functions import covariates
 from cmm_uq.analysis.diagnosis.diagnosis import Diagnosis, diagnose
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.recordings import TRAVEL, bar_facts, bars, with_columns
 
@@ -32,12 +31,12 @@ def recording(gap_um: float = 12.0) -> Points:
         np.repeat([1, 2], len(once)), once.machine,
     )  # fmt: skip
     points = with_columns(points, time_s=60.0 * np.arange(n), approach_x=random.choice([-1.0, 1.0], n))
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(("hysteresis_x",)))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(("hysteresis_x",)))
     return points.at(model.simulate(np.array([gap_um]), np.array([400.0]), Noise(1.5e-3), random))
 
 
 def diagnosed(points: Points) -> Diagnosis:
-    return diagnose(MeasurementModel(Ballbar(bar_facts(), points), effects(NAMED)), stated_um=1.5, alpha=0.01, seed=0)
+    return diagnose(RecordingModel(Ballbar(bar_facts(), points), effects(NAMED)), stated_um=1.5, alpha=0.01, seed=0)
 
 
 @cache
@@ -111,7 +110,7 @@ def test_without_a_time_the_order_of_rows_is_no_covariate() -> None:
     uneven = with_columns(points, time_s=points.columns["time_s"] ** 2)
     last_first = in_order(uneven, np.arange(len(points))[::-1])
     untimed = replace(points, columns={"approach_x": points.columns["approach_x"]})
-    models = [MeasurementModel(Ballbar(bar_facts(), each), effects(NAMED)) for each in (uneven, last_first, untimed)]
+    models = [RecordingModel(Ballbar(bar_facts(), each), effects(NAMED)) for each in (uneven, last_first, untimed)]
     plain, turned, without = (covariates(model) for model in models)
     assert "order" not in without
     np.testing.assert_array_equal(np.sort(plain["order"]), np.arange(len(points) // 2))

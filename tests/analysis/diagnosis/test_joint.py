@@ -20,7 +20,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import unit
 from cmm_uq.certificate.diagnosis.overview import sentence
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.recordings import TRAVEL
@@ -41,7 +41,7 @@ def plate(places: Floats) -> Diagnosis:
     points = Points(
         xyz, np.ones_like(number), number, np.ones_like(number), Machine("m", "XYZ", TRAVEL), columns, number
     )
-    model = MeasurementModel(Plate(artefact_facts(kind="plate"), points), effects(("scale_x", "scale_y")))
+    model = RecordingModel(Plate(artefact_facts(kind="plate"), points), effects(("scale_x", "scale_y")))
     return diagnose(model, stated_um=None, alpha=0.01, seed=0)
 
 

@@ -18,7 +18,7 @@ from cmm_uq.analysis.diagnosis.location import ResidualField, locate, region_of,
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.effect import Nonparametric
 from cmm_uq.maths.uncertainty.quantity import Quantity
 from tests.artefacts.constructions import plate, spheres, step_gauge
@@ -236,7 +236,7 @@ BARS = bars(np.random.default_rng(4), 12, 400.0, Machine("m", "XYZ", TRAVEL, ori
 
 def field(facts: object, points: Points) -> ResidualField:
     """Of a model without effects, exactly certified."""
-    model = MeasurementModel(artefact_of(facts, points), ())  # type: ignore[arg-type]
+    model = RecordingModel(artefact_of(facts, points), ())  # type: ignore[arg-type]
     found = residual_field(model, model)
     assert found is not None
     return found
@@ -304,7 +304,7 @@ def test_a_vector_is_longer_than_its_u_in_one_case_of_twenty() -> None:
 def test_only_what_is_used_is_drawn_and_the_model_after_is_its_own() -> None:
     used = np.ones(12, dtype=bool)
     used[3] = False
-    model = MeasurementModel(artefact_of(bar_facts(u_um=0.0), BARS), (), used=used)
+    model = RecordingModel(artefact_of(bar_facts(u_um=0.0), BARS), (), used=used)
     found = residual_field(model, replace(model, sigma=1.0))
     assert found is not None
     assert len(found.place) == 22

@@ -13,8 +13,7 @@ import pytest
 from cmm_uq.analysis.conformity.accuracy import figures
 from cmm_uq.analysis.diagnosis.model_average import REMAINS, SETTLED
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.app.commands.report import evaluate as analyse_observations
-from cmm_uq.app.commands.report import outcome_of
+from cmm_uq.app.commands.report import evaluate as analyse_observations, outcome_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Machine
 from cmm_uq.base.units import MICROMETRE
@@ -23,7 +22,7 @@ from cmm_uq.certificate.document import Table
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.result import JobDiagnosis, Result
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import EVERY, effects
 from tests.artefacts.reading import tables
 from tests.artefacts.test_certificate_figures import disagreeing, two_uncertainties
@@ -66,7 +65,7 @@ def certified(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """Twenty bars of a machine whose three scales are wrong, and that is taken for one with wrong squarenesses."""
     random = np.random.default_rng(1)
     points = bars(random, 20, 400.0, Machine("m", "XYZ", TRAVEL))
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(tuple(TRUTH)))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(tuple(TRUTH)))
     xyz = model.simulate(np.array(list(TRUTH.values())), np.array([400.0]), Noise(1.5e-3), random)
     rows = "".join(
         f"{m},{p},1,{x:.5f},{y:.5f},{z:.5f}\n"

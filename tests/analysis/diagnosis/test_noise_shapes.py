@@ -26,7 +26,7 @@ from cmm_uq.analysis.diagnosis.noise_shapes import (
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel, Unknown
 from cmm_uq.maths.inference.marginal import Marginal
@@ -59,7 +59,7 @@ def test_shapes_that_differ_in_all_sizes_alike_are_equally_probable(rivals: int)
 
 
 @pytest.fixture(scope="module")
-def jumped(tmp_path_factory: pytest.TempPathFactory) -> MeasurementModel:
+def jumped(tmp_path_factory: pytest.TempPathFactory) -> RecordingModel:
     """A plate in three ways whose scale of X jumps midway, with an offset of each ball of each set-up and no slow noise."""
     made, folder = case(20261124, "outside", 35), tmp_path_factory.mktemp("jumped")
     assert made.noise.kind == "set-up"
@@ -69,7 +69,7 @@ def jumped(tmp_path_factory: pytest.TempPathFactory) -> MeasurementModel:
 
 
 def test_few_shapes_say_of_a_jump_with_time_what_many_say(
-    jumped: MeasurementModel, monkeypatch: pytest.MonkeyPatch
+    jumped: RecordingModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Against the integral by a hundred shapes, within what is hardly worth a mention; 100 : 1 is decisive (Jeffreys)."""
     functions = [f for f in unknown_functions(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
@@ -82,14 +82,14 @@ def test_few_shapes_say_of_a_jump_with_time_what_many_say(
     assert odds[0].max() > np.log(100)
 
 
-def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: MeasurementModel) -> None:
+def test_noise_that_is_slow_for_want_of_a_jump_is_not_all_that_is_kept(jumped: RecordingModel) -> None:
     functions = [f for f in unknown_functions(jumped, jumped.estimate().about) if f.covariate_name == "time_s"]
     normal = [kind for kind in noise_kinds(jumped, functions) if kind.name != "tails"]
     assert sum(not kind.slow.size for kind in normal) >= 2
     assert sum(bool(kind.slow.size) for kind in normal) >= 2
 
 
-def test_without_a_time_there_is_no_jump_to_reckon_with(jumped: MeasurementModel) -> None:
+def test_without_a_time_there_is_no_jump_to_reckon_with(jumped: RecordingModel) -> None:
     """The same kinds of noise, whatever functions of other covariates are candidates."""
     functions = [replace(f, covariate_name=None) for f in unknown_functions(jumped, jumped.estimate().about)]
     assert [k.log_whitening for k in noise_kinds(jumped, functions)] == [
@@ -97,7 +97,7 @@ def test_without_a_time_there_is_no_jump_to_reckon_with(jumped: MeasurementModel
     ]
 
 
-def test_what_a_model_leaves_of_columns_is_at_right_angles_to_it_and_its_placing(jumped: MeasurementModel) -> None:
+def test_what_a_model_leaves_of_columns_is_at_right_angles_to_it_and_its_placing(jumped: RecordingModel) -> None:
     """By least squares on its design and the freedoms of its set-ups, written out."""
     linear = jumped.estimate().linear
     columns = np.random.default_rng(3).standard_normal((len(linear.observed), 2))

@@ -14,10 +14,10 @@ from cmm_uq.analysis.diagnosis.observations import LEAST_OF_SET_UP, MOST, thin_o
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, kind_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
-from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.artefacts.sphere.observe import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.recordings import TRAVEL, bar_facts, bars
@@ -29,18 +29,18 @@ def observed(points: Points) -> Ballbar:
     return Ballbar(bar_facts(), points)
 
 
-def many_bars(count: int, repeats: int = 1) -> MeasurementModel:
+def many_bars(count: int, repeats: int = 1) -> RecordingModel:
     points = bars(np.random.default_rng(3), count, 400.0, MACHINE)
     again = Points(
         np.tile(points.xyz, (repeats, 1)), np.tile(points.measurement, repeats), np.tile(points.point, repeats),
         np.repeat(np.arange(1, repeats + 1), len(points)), MACHINE,
     )  # fmt: skip
-    model = MeasurementModel(observed(again), effects(("scale_x", "squareness_xy")))
+    model = RecordingModel(observed(again), effects(("scale_x", "squareness_xy")))
     xyz = model.simulate(np.array([8.0, 12.0]), np.array([400.0]), Noise(1e-3), np.random.default_rng(4))
     return replace(model, artefact=observed(again.at(xyz)))
 
 
-def spheres(placings: int, count: int) -> tuple[MeasurementModel, Sphere]:
+def spheres(placings: int, count: int) -> tuple[RecordingModel, SphereArtefact]:
     z = 1 - np.arange(count) / count
     turn, flat = np.pi * (3 - np.sqrt(5)) * np.arange(count), np.sqrt(1 - z**2)
     normals = np.tile(np.column_stack([flat * np.cos(turn), flat * np.sin(turn), z]), (placings, 1))
@@ -48,8 +48,8 @@ def spheres(placings: int, count: int) -> tuple[MeasurementModel, Sphere]:
     numbers = np.repeat(np.arange(1, placings + 1), count)
     points = Points(np.repeat(centres, count, axis=0) + 12.5 * normals, numbers,
                     np.tile(np.arange(1, count + 1), placings), np.ones_like(numbers), MACHINE)  # fmt: skip
-    sphere = Sphere(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1), points)
-    return MeasurementModel(sphere, effects(("probe_radius",))), sphere
+    sphere = SphereArtefact(artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1), points)
+    return RecordingModel(sphere, effects(("probe_radius",))), sphere
 
 
 def test_a_recording_of_a_thousand_observations_is_compared_as_it_is() -> None:
@@ -82,7 +82,7 @@ def test_where_some_points_cannot_be_observed_alone_the_others_are_not_used() ->
 def test_a_point_ahead_of_a_surface_stays_with_its_placing() -> None:
     job = read_job(ROOT / "examples" / "plane-simulated")
     observe = partial(kind_of(job).observing("diagnosed"), job.facts.artefact)
-    found = thin_out(MeasurementModel(observe(job.points), ()), observe, 0, most=40).artefact
+    found = thin_out(RecordingModel(observe(job.points), ()), observe, 0, most=40).artefact
     assert sorted(found.points.measurement[found.points.point == 0].tolist()) == [1, 2]
     assert len(found.measurement) == 2 * LEAST_OF_SET_UP
 
@@ -101,7 +101,7 @@ def test_points_are_drawn_evenly_from_every_placing_and_where_these_are_many_fro
 ) -> None:
     model, _ = spheres(placings, count)
     facts = artefact_facts(kind="sphere", length_mm=25.0, u_um=0.1)
-    found = thin_out(model, lambda points: Sphere(facts, points), 0)
+    found = thin_out(model, lambda points: SphereArtefact(facts, points), 0)
     counts = np.unique(found.artefact.measurement, return_counts=True)[1]
     assert counts.max() == each
     assert len(found.artefact.measurement) < MOST + each

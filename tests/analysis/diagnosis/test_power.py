@@ -17,7 +17,7 @@ from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.noise import PlannedNoise
 from cmm_uq.analysis.planning.set_up import join
 from cmm_uq.artefacts import artefact_of
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, GAUGE, setting
 
@@ -64,7 +64,7 @@ def test_the_gate_opens_as_often_as_predicted() -> None:
     """Six simulated recordings: the count lies within the central 99.9 % of the predicted binomial."""
     power = predicted()["rotation_y_y"]
     assert power.detectable is not None
-    acting = MeasurementModel(artefact_of(GAUGE, POINTS), effects(("rotation_y_y",)))
+    acting = RecordingModel(artefact_of(GAUGE, POINTS), effects(("rotation_y_y",)))
     random = np.random.default_rng(12)
     alarms = 0
     for _ in range(6):

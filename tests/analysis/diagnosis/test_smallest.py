@@ -14,7 +14,7 @@ from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.set_up import attitude_along, join
 from cmm_uq.artefacts.ballbar.observe import ballbar
 from cmm_uq.certificate.document import Table
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, GAUGE, setting
 from tests.artefacts.simulated import diagnosed
@@ -22,7 +22,7 @@ from tests.artefacts.simulated import diagnosed
 ALPHA = 0.01
 
 
-def searched(model: MeasurementModel) -> SearchResult:
+def searched(model: RecordingModel) -> SearchResult:
     """A search that finds nothing, noise not stated."""
     first = model_comparison(model, None, 0)
     assert first.p_value > ALPHA
@@ -82,14 +82,14 @@ def test_what_the_named_effects_take_up_is_said_with_their_names() -> None:
         chosen.volume.set_up(bar, attitude_along(np.array(way)), (x, y, 0.5), "level")
         for way in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)) for x in (0.1, 0.5, 0.9) for y in (0.1, 0.9)
     )  # fmt: skip
-    model = MeasurementModel(chosen.observed(join(level)), effects(("scale_x", "scale_y")), 1e-3)
+    model = RecordingModel(chosen.observed(join(level)), effects(("scale_x", "scale_y")), 1e-3)
     row = rows(searched(without_fault(chosen.observed, model, Noise(1e-3), 2)))["artefact_sag"]
     assert not row.shown
     assert row.share < 1e-3
     assert set(row.taken_up) == {"scale_x", "scale_y"}
 
 
-def bars_in_the_middle() -> MeasurementModel:
+def bars_in_the_middle() -> RecordingModel:
     """Bars along X at one place: a bow of X shows in none of them beyond what their own middle does."""
     chosen = setting(BALLBAR, repeats=2)
     bar = ballbar(BALLBAR, chosen.plan)
@@ -98,7 +98,7 @@ def bars_in_the_middle() -> MeasurementModel:
         for way in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 0.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0),
                     (1.0, -1.0, 0.0), (1.0, 0.0, -1.0), (0.0, 1.0, -1.0))
     )  # fmt: skip
-    model = MeasurementModel(chosen.observed(join(placings)), effects(("scale_x", "scale_y", "scale_z")), 1e-3)
+    model = RecordingModel(chosen.observed(join(placings)), effects(("scale_x", "scale_y", "scale_z")), 1e-3)
     return without_fault(chosen.observed, model, Noise(1e-3), 2)
 
 

@@ -8,28 +8,28 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.parts.association import ProbedFeature
-from cmm_uq.analysis.parts.plan import Feature, Nominal
+from cmm_uq.analysis.parts.plan import Nominal, PartFeature
 from cmm_uq.maths.geometry.repeated import MANY
 from tests.parts_drawn import UP, ball, bore, circle, plane
 
 COUNT = MANY + 4
 
 
-def _cone() -> Feature:
+def _cone() -> PartFeature:
     angles, heights = np.linspace(0, 40 * np.pi, COUNT), np.linspace(-15, 15, COUNT)
     out = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(COUNT)])
     points = (20 + heights[:, None] * np.tan(0.3)) * out + heights[:, None] * UP
     normals = np.cos(0.3) * out - np.sin(0.3) * UP
-    return Feature("cone", "cone", points, normals, "stylus", Nominal(np.zeros(3), UP, 40.0, 0.3))
+    return PartFeature("cone", "cone", points, normals, "stylus", Nominal(np.zeros(3), UP, 40.0, 0.3))
 
 
-def _line() -> Feature:
+def _line() -> PartFeature:
     along = np.array([0.6, 0.8, 0.0])
     points = np.linspace(0, 90, COUNT)[:, None] * along
-    return Feature("line", "line", points, np.tile(UP, (COUNT, 1)), "stylus", Nominal(points.mean(axis=0), along))
+    return PartFeature("line", "line", points, np.tile(UP, (COUNT, 1)), "stylus", Nominal(points.mean(axis=0), along))
 
 
-def _ball() -> Feature:
+def _ball() -> PartFeature:
     toward = np.random.default_rng(5).standard_normal((COUNT, 3))
     return ball("ball", [1.0, 2.0, 3.0], 12.0, toward / np.linalg.norm(toward, axis=1, keepdims=True))
 
@@ -45,7 +45,9 @@ def _ball() -> Feature:
         _ball,
     ],
 )
-def test_features_of_many_points_follow_each_coordinate_as_when_it_alone_is_moved(made: Callable[[], Feature]) -> None:
+def test_features_of_many_points_follow_each_coordinate_as_when_it_alone_is_moved(
+    made: Callable[[], PartFeature],
+) -> None:
     """Second method: each coordinate of some of the points moved by itself, the association settled each time."""
     feature, step = made(), 1e-3
     off = 0.02 * np.random.default_rng(3).standard_normal(feature.points.shape)

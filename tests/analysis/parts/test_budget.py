@@ -12,14 +12,14 @@ from cmm_uq.analysis.parts.budget import PLACE, point_errors, variance_shares
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings, of_points, reproducibility
 from cmm_uq.analysis.parts.machine.state import unmodelled_errors
 from cmm_uq.analysis.parts.placing import PartPose, around
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances, Virtual
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions, Virtual
 from cmm_uq.analysis.parts.ways import mean_of_places, ways
 from cmm_uq.base.errors import CmmUqError
 from tests.parts_drawn import POSE, block, circle, machine, plane, spot
 
 PAIR = Plan(
-    (spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), (Characteristic("apart", "distance", ("one", "other")),)
+    (spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), (PartCharacteristic("apart", "distance", ("one", "other")),)
 )
 
 
@@ -27,7 +27,7 @@ def test_shares_of_a_sum_are_those_of_its_variances() -> None:
     """Scale 10 ppm and temperature 0.5 K of steel over 300 mm, noise of 1 µm at both ends: 9, 2.976 and 2 µm²."""
     draws = 10.0 * np.random.default_rng(1).standard_normal((20_000, 1))
     part = Surroundings(Expansion(11.5e-6, u_temperature_k=0.5))
-    found = variance_shares(Virtual(PAIR, Circumstances(machine(["scale_x"], draws, 1.0), (POSE,), part)))
+    found = variance_shares(Virtual(PAIR, MeasurementConditions(machine(["scale_x"], draws, 1.0), (POSE,), part)))
     parts = np.array([9.0, 2.0, (300 * 11.5e-6 * 0.5 * 1e3) ** 2])
     assert found.causes == ("machine: scale_x", "noise: reading", "temperature: part")
     assert found.u[0] * 1e3 == pytest.approx(np.sqrt(parts.sum()), rel=0.02)
@@ -40,9 +40,11 @@ def test_what_the_calibration_did_not_see_is_told_with_its_share() -> None:
     """A bow that was not modelled beside a scale that was left free and noise of which nothing need be told."""
     free = 50.0 * np.random.default_rng(6).standard_normal((4000, 1))
     bow = tuple(u for u in unmodelled_errors([], {}) if u.effect.name == "straightness_x_y")
-    diagonal = Plan((spot("o", [0, 0, 0]), spot("xy", [100, 100, 0])), (Characteristic("d", "distance", ("o", "xy")),))
+    diagonal = Plan(
+        (spot("o", [0, 0, 0]), spot("xy", [100, 100, 0])), (PartCharacteristic("d", "distance", ("o", "xy")),)
+    )
     state = machine(["scale_x"], free, 5.0, prior_share={"scale_x": 0.99}, unmodelled=bow)
-    virtual = Virtual(diagonal, Circumstances(state, (POSE,)))
+    virtual = Virtual(diagonal, MeasurementConditions(state, (POSE,)))
     told = variance_shares(virtual).told("d", virtual.named)
     why = {line: words for line, _, words in told}
     assert why.keys() == {"machine: scale_x", "machine: straightness_x_y"}
@@ -54,11 +56,15 @@ def test_what_the_calibration_did_not_see_is_told_with_its_share() -> None:
 @pytest.mark.parametrize("correlation", [0.8, -0.6, 0.999])
 def test_shares_of_tied_errors_are_what_knowing_one_alone_would_take_away(correlation: float) -> None:
     """A diagonal of 45°, −s + ½S in units of L/2: the square of each one's correlation with the sum, never more than all."""
-    diagonal = Plan((spot("o", [0, 0, 0]), spot("xy", [200, 200, 0])), (Characteristic("d", "distance", ("o", "xy")),))
+    diagonal = Plan(
+        (spot("o", [0, 0, 0]), spot("xy", [200, 200, 0])), (PartCharacteristic("d", "distance", ("o", "xy")),)
+    )
     arcsec = 1 / 4.84813681
     V = 25.0 * np.array([[1.0, correlation], [correlation, 1.0]])  # in ppm, and in seconds of as many microradians
     draws = np.random.default_rng(2).multivariate_normal([0, 0], V, 20_000) * [1.0, 0.5 * arcsec]
-    found = variance_shares(Virtual(diagonal, Circumstances(machine(["scale_x", "squareness_xy"], draws), (POSE,))))
+    found = variance_shares(
+        Virtual(diagonal, MeasurementConditions(machine(["scale_x", "squareness_xy"], draws), (POSE,)))
+    )
     c = np.array([-1.0, 0.5])  # −s·x² and S·x·y over the diagonal, S drawn half as large
     shares = (V @ c) ** 2 / np.diagonal(V) / (c @ V @ c)
     assert found.factors == ("machine: scale_x", "machine: squareness_xy")
@@ -70,9 +76,9 @@ def test_shares_of_tied_errors_are_what_knowing_one_alone_would_take_away(correl
 def test_a_position_has_more_in_total_than_alone() -> None:
     """Twice a radius of two independent normal parts: shares by quadrature over one part, of the mean and of the variance."""
     features, _ = block()
-    plan = Plan(features, (Characteristic("position", "position", ("h1",), ("A", "B", "C")),))
+    plan = Plan(features, (PartCharacteristic("position", "position", ("h1",), ("A", "B", "C")),))
     state = machine(unmodelled=tuple(u for u in unmodelled_errors([], {}) if u.effect.name.startswith("hysteresis")))
-    found = variance_shares(Virtual(plan, Circumstances(state, (POSE,))), 2**15)
+    found = variance_shares(Virtual(plan, MeasurementConditions(state, (POSE,))), 2**15)
     x, weights = np.polynomial.hermite_e.hermegauss(200)
     weights /= weights.sum()
     r = np.hypot(x[:, None], x)
@@ -92,9 +98,9 @@ def test_the_place_on_the_table_is_a_cause() -> None:
         plane("A", [0, 0, 1], [0, 0, 0], [[100, 0, 0], [0, 50, 0]]),
         plane("B", [-1, 0, 0], [0, 0, 0], [[0, 50, 0], [0, 0, -20]]),
     )
-    plan = Plan(features, (Characteristic("corner", "angle", ("A", "B")),))
+    plan = Plan(features, (PartCharacteristic("corner", "angle", ("A", "B")),))
     poses = around(PartPose(np.eye(3), np.array([400.0, 200, -300])), np.array([150.0, 0, 0]), np.zeros(3), 12)
-    found = variance_shares(Virtual(plan, Circumstances(machine(["straightness_x_z"], bow), poses)), 4096)
+    found = variance_shares(Virtual(plan, MeasurementConditions(machine(["straightness_x_z"], bow), poses)), 4096)
     assert dict(zip(found.causes, found.total[:, 0], strict=True))[PLACE] > 0.2
     assert dict(zip(found.causes, found.first[:, 0], strict=True))[PLACE] == pytest.approx(0, abs=0.05)
 
@@ -105,19 +111,20 @@ def test_a_part_turned_round_loses_what_the_turn_reverses() -> None:
         plane("B", [0, -1, 0], [0, 0, -5], [[100, 0, 0], [0, 0, -20]]),
         plane("C", [-1, 0, 0], [0, 0, -5], [[0, 100, 0], [0, 0, -20]]),
     )
-    plan = Plan(features, (Characteristic("corner", "angle", ("B", "C")),))
+    plan = Plan(features, (PartCharacteristic("corner", "angle", ("B", "C")),))
     state = machine(["squareness_xy"], 5.0 * np.random.default_rng(4).standard_normal((1000, 1)))
     quarter = PartPose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), POSE.translation_mm)
-    places = [AtPose(plan, Circumstances(state), pose) for pose in (POSE, quarter)]
+    places = [AtPose(plan, MeasurementConditions(state), pose) for pose in (POSE, quarter)]
     errors = mean_of_places(places, np.random.default_rng(5), 2000)
     assert (
-        errors.std() < 1e-3 * Virtual(plan, Circumstances(state, (POSE,))).errors(np.random.default_rng(5), 2000).std()
+        errors.std()
+        < 1e-3 * Virtual(plan, MeasurementConditions(state, (POSE,))).errors(np.random.default_rng(5), 2000).std()
     )
 
 
 def test_ways_say_what_they_change() -> None:
     """Noise alone: four readings halve u, and so nearly does nothing else but the mean of two measurements."""
-    found = {str(way.name): way.u[0] for way in ways(PAIR, Circumstances(machine(noise_um=2.0), (POSE,)))}
+    found = {str(way.name): way.u[0] for way in ways(PAIR, MeasurementConditions(machine(noise_um=2.0), (POSE,)))}
     planned = found["as planned"]
     anew = "mean of four measurements, the part set up anew in its place each time"
     assert found[anew] == pytest.approx(planned / 2, rel=0.02)
@@ -141,8 +148,10 @@ def test_a_part_goes_where_the_guideway_is_straightest() -> None:
         plane("A", [0, 0, 1], [0, 0, 0], [[100, 0, 0], [0, 50, 0]]),
         plane("B", [-1, 0, 0], [0, 0, 0], [[0, 50, 0], [0, 0, -20]]),
     )
-    plan = Plan(features, (Characteristic("corner", "angle", ("A", "B")),))
-    given = Circumstances(machine(["straightness_x_z"], bow), (PartPose(np.eye(3), np.array([100.0, 200, -300])),))
+    plan = Plan(features, (PartCharacteristic("corner", "angle", ("A", "B")),))
+    given = MeasurementConditions(
+        machine(["straightness_x_z"], bow), (PartPose(np.eye(3), np.array([100.0, 200, -300])),)
+    )
     found = {str(way.name): way.u[0] for way in ways(plan, given, 2000)}
     (moved,) = [name for name in found if name.startswith("part moved by +300 mm along X")]
     assert found[moved] < 0.01 * found["as planned"]
@@ -151,9 +160,9 @@ def test_a_part_goes_where_the_guideway_is_straightest() -> None:
 def test_twice_the_points_halve_the_variance_of_noise() -> None:
     """Of a diameter by eight points, and by sixteen."""
 
-    def of(count: int) -> tuple[Plan, Circumstances]:
-        plan = Plan((circle("c", [0, 0, 0], 10.0, count),), (Characteristic("d", "size", ("c",)),))
-        return plan, Circumstances(machine(noise_um=2.0), (POSE,))
+    def of(count: int) -> tuple[Plan, MeasurementConditions]:
+        plan = Plan((circle("c", [0, 0, 0], 10.0, count),), (PartCharacteristic("d", "size", ("c",)),))
+        return plan, MeasurementConditions(machine(noise_um=2.0), (POSE,))
 
     found = {str(way.name): way.u[0] for way in ways(*of(8), doubled=lambda: of(16))}
     assert found["as planned"] == pytest.approx(2 * 2e-3 / np.sqrt(8), rel=0.02)
@@ -163,13 +172,13 @@ def test_twice_the_points_halve_the_variance_of_noise() -> None:
 def test_operators_scatter_by_what_is_stated_and_anew_in_each_set_up() -> None:
     """3 µm of the distance, and 1 µm of each point: √(3² + 2·1²), however often each point is read; half of it in the mean of
     four set-ups. Of the other characteristic the points alone."""
-    other = Characteristic("other", "distance", ("two", "three"))
+    other = PartCharacteristic("other", "distance", ("two", "three"))
     plan = Plan(
         (*PAIR.features, spot("two", [0, 100, 0]), spot("three", [200, 100, 0])), (*PAIR.characteristics, other)
     )
     (name,) = (one.name for one in PAIR.characteristics)
     causes = (reproducibility(plan, {name: 3e-3}), of_points(plan, 1.0))
-    given = Circumstances(machine(), (POSE,), repeats=16, further=causes)
+    given = MeasurementConditions(machine(), (POSE,), repeats=16, further=causes)
     found = {str(way.name): way.u for way in ways(plan, given)}
     assert found["as planned"] == pytest.approx([np.sqrt(11) * 1e-3, np.sqrt(2) * 1e-3], rel=0.02)
     anew = found["mean of four measurements, the part set up anew in its place each time"]
@@ -182,7 +191,7 @@ def test_operators_scatter_by_what_is_stated_and_anew_in_each_set_up() -> None:
 
 
 ENDS = Plan(
-    (spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), (Characteristic("apart", "distance", ("one", "other")),)
+    (spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), (PartCharacteristic("apart", "distance", ("one", "other")),)
 )
 TURNED = PartPose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([400.0, 100.0, -300.0]))
 
@@ -191,7 +200,7 @@ TURNED = PartPose(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([400.
 def test_a_scale_stretches_the_part_about_its_middle(scale: str, pose: PartPose) -> None:
     """10 ppm of 300 mm are 3 µm, half at either end and against each other; in the frame of the part along its x."""
     draws = 10.0 * np.random.default_rng(1).standard_normal((4000, 1))
-    found = point_errors(Virtual(ENDS, Circumstances(machine([scale], draws), (pose,))))
+    found = point_errors(Virtual(ENDS, MeasurementConditions(machine([scale], draws), (pose,))))
     u = 1e3 * np.sqrt(np.einsum("nii->ni", found.covariance))
     np.testing.assert_allclose(u, [[1.5, 0, 0], [1.5, 0, 0]], atol=0.06)
     np.testing.assert_allclose(found.mean, 0, atol=2e-4)
@@ -199,7 +208,7 @@ def test_a_scale_stretches_the_part_about_its_middle(scale: str, pose: PartPose)
 
 def test_readings_keep_what_is_not_common() -> None:
     """Noise of 2 µm in x of both ends: √2 µm is left of each about their mean; in y and z a shift and a turn take all."""
-    found = point_errors(Virtual(ENDS, Circumstances(machine(noise_um=2.0), (POSE,))))
+    found = point_errors(Virtual(ENDS, MeasurementConditions(machine(noise_um=2.0), (POSE,))))
     u = 1e3 * np.sqrt(np.einsum("nii->ni", found.covariance.clip(0)))
     np.testing.assert_allclose(u, [[np.sqrt(2), 0, 0]] * 2, atol=0.07)
 
@@ -207,12 +216,12 @@ def test_readings_keep_what_is_not_common() -> None:
 def test_a_warm_part_that_is_not_corrected_is_found_larger() -> None:
     """Steel at 25 °C over 300 mm: 11.5e-6 · 5 · 300 mm = 17.25 µm, outwards at either end."""
     warm = Surroundings(Expansion(11.5e-6, temperature_c=25.0, corrected=False))
-    found = point_errors(Virtual(ENDS, Circumstances(machine(), (POSE,), warm)), 10)
+    found = point_errors(Virtual(ENDS, MeasurementConditions(machine(), (POSE,), warm)), 10)
     np.testing.assert_allclose(1e3 * found.mean, [[-8.625, 0, 0], [8.625, 0, 0]], atol=1e-9)
     np.testing.assert_allclose(found.covariance, 0, atol=1e-15)
 
 
 def test_where_the_part_was_measured_is_no_error_of_it() -> None:
     measured = ENDS.points + np.array([[0.0, 0, 0], [0.05, 0.02, 0]])
-    found = point_errors(Virtual(ENDS, Circumstances(machine(), (POSE,), measured=measured)), 10)
+    found = point_errors(Virtual(ENDS, MeasurementConditions(machine(), (POSE,), measured=measured)), 10)
     np.testing.assert_allclose(found.mean, 0, atol=1e-12)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cmm_uq.analysis.parts.association import ProbedFeature
 from cmm_uq.analysis.parts.evaluation import Evaluator
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, PartAlignment, Plan
+from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.association import Association
@@ -20,7 +20,7 @@ NANOMETRE = 1e-6
 Move = Callable[[Floats, Floats], Floats]
 
 
-def measured(features: tuple[Feature, ...], one: Characteristic, moves: dict[str, Move]) -> float:
+def measured(features: tuple[PartFeature, ...], one: PartCharacteristic, moves: dict[str, Move]) -> float:
     """Value of a characteristic where points p with normals n of some features stand at ``move(p, n)``."""
     plan = Plan(features, (one,))
     base = np.zeros_like(plan.points)
@@ -48,30 +48,30 @@ ABC = ("A", "B", "C")
 
 @pytest.mark.parametrize(("one", "moves", "value"), [
     # a shaft whose points are all 5 µm farther out
-    (Characteristic("", "size", ("h1",)), {"h1": lambda p, n: p - 0.005 * n}, 20.01),
-    (Characteristic("", "distance", ("h1", "h2")), {"h2": shifted(0.0, 0.02, 0.0)}, np.hypot(140, 20.02)),
-    (Characteristic("", "distance", ("C", "D")), {"D": shifted(0.01, 0.7, 0.3)}, 200.01),
-    (Characteristic("", "distance", ("h1", "B")), {"h1": shifted(0.3, 0.01, 0.0)}, 40.01),
-    (Characteristic("", "x", ("h1",), ABC), {"h1": shifted(0.01, 0.02, 0.0)}, 30.01),
-    (Characteristic("", "y", ("h1",), ABC), {"h1": shifted(0.01, 0.02, 0.0)}, 40.02),
+    (PartCharacteristic("", "size", ("h1",)), {"h1": lambda p, n: p - 0.005 * n}, 20.01),
+    (PartCharacteristic("", "distance", ("h1", "h2")), {"h2": shifted(0.0, 0.02, 0.0)}, np.hypot(140, 20.02)),
+    (PartCharacteristic("", "distance", ("C", "D")), {"D": shifted(0.01, 0.7, 0.3)}, 200.01),
+    (PartCharacteristic("", "distance", ("h1", "B")), {"h1": shifted(0.3, 0.01, 0.0)}, 40.01),
+    (PartCharacteristic("", "x", ("h1",), ABC), {"h1": shifted(0.01, 0.02, 0.0)}, 30.01),
+    (PartCharacteristic("", "y", ("h1",), ABC), {"h1": shifted(0.01, 0.02, 0.0)}, 40.02),
     # the datum face that moves away takes the coordinate with it
-    (Characteristic("", "x", ("h1",), ABC), {"C": shifted(0.01, 0.0, 0.0)}, 29.99),
-    (Characteristic("", "position", ("h1",), ABC), {"h1": shifted(0.003, 0.004, 0.0)}, 0.01),
-    (Characteristic("", "position", ("D",), ABC), {"D": shifted(0.004, 0.0, 0.0)}, 0.008),
+    (PartCharacteristic("", "x", ("h1",), ABC), {"C": shifted(0.01, 0.0, 0.0)}, 29.99),
+    (PartCharacteristic("", "position", ("h1",), ABC), {"h1": shifted(0.003, 0.004, 0.0)}, 0.01),
+    (PartCharacteristic("", "position", ("D",), ABC), {"D": shifted(0.004, 0.0, 0.0)}, 0.008),
     # a face of 200 mm that rises by 10 µm from end to end; parallel to the base, and as a tilt of its opposite
-    (Characteristic("", "parallelism", ("D",), ("C",)), {"D": tilted(1e-4, (0.0, 0.0, 1.0))}, 100 * np.sin(1e-4)),
-    (Characteristic("", "perpendicularity", ("D",), ("A",)), {"D": tilted(1e-4, (0.0, 1.0, 0.0))}, 20 * np.sin(1e-4)),
+    (PartCharacteristic("", "parallelism", ("D",), ("C",)), {"D": tilted(1e-4, (0.0, 0.0, 1.0))}, 100 * np.sin(1e-4)),
+    (PartCharacteristic("", "perpendicularity", ("D",), ("A",)), {"D": tilted(1e-4, (0.0, 1.0, 0.0))}, 20 * np.sin(1e-4)),
     # turned about the datum's normal a face stays at right angles to it
-    (Characteristic("", "perpendicularity", ("D",), ("A",)), {"D": tilted(1e-4, (0.0, 0.0, 1.0))}, 0.0),
+    (PartCharacteristic("", "perpendicularity", ("D",), ("A",)), {"D": tilted(1e-4, (0.0, 0.0, 1.0))}, 0.0),
     # an axis over 17 mm of measured depth
-    (Characteristic("", "perpendicularity", ("h1",), ("A",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
-    (Characteristic("", "parallelism", ("h1",), ("h2",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
-    (Characteristic("", "parallelism", ("h1",), ("B",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
-    (Characteristic("", "parallelism", ("h1",), ("B",)), {"h1": tilted(1e-3, (0.0, 1.0, 0.0))}, 0.0),
+    (PartCharacteristic("", "perpendicularity", ("h1",), ("A",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
+    (PartCharacteristic("", "parallelism", ("h1",), ("h2",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
+    (PartCharacteristic("", "parallelism", ("h1",), ("B",)), {"h1": tilted(1e-3, (1.0, 0.0, 0.0))}, 17 * np.sin(1e-3)),
+    (PartCharacteristic("", "parallelism", ("h1",), ("B",)), {"h1": tilted(1e-3, (0.0, 1.0, 0.0))}, 0.0),
     # normals −y and −x: a face whose normal turns from −x towards −y
-    (Characteristic("", "angle", ("B", "C")), {"C": tilted(1e-3, (0.0, 0.0, 1.0))}, np.pi / 2 - 1e-3),
+    (PartCharacteristic("", "angle", ("B", "C")), {"C": tilted(1e-3, (0.0, 0.0, 1.0))}, np.pi / 2 - 1e-3),
 ])  # fmt: skip
-def test_moved_features_of_a_block(one: Characteristic, moves: dict[str, Move], value: float) -> None:
+def test_moved_features_of_a_block(one: PartCharacteristic, moves: dict[str, Move], value: float) -> None:
     assert measured(BLOCK, one, moves) == pytest.approx(value, abs=NANOMETRE)
 
 
@@ -81,16 +81,16 @@ def test_an_axis_that_leans_is_off_by_most_at_its_farther_end() -> None:
     def lean(p: Floats, n: Floats) -> Floats:
         return p + 1e-3 * np.outer(p[:, 2] + 3, [1.0, 0, 0])
 
-    value = measured(BLOCK, Characteristic("", "position", ("h1",), ABC), {"h1": lean})
+    value = measured(BLOCK, PartCharacteristic("", "position", ("h1",), ABC), {"h1": lean})
     assert value == pytest.approx(2 * 17e-3, rel=1e-5)
 
 
-def stepped() -> tuple[Feature, ...]:
+def stepped() -> tuple[PartFeature, ...]:
     """A journal, a collar above it, a shoulder."""
     at = [0.0, 0.0, 0.0]
     points, _ = ring(at, 30.0, 10.0, 12)
     shoulder = plane("shoulder", UP, [0, 0, 10], [[1, 0, 0], [0, 1, 0]], (2, 2))
-    shoulder = Feature("shoulder", "plane", points, np.tile(UP, (12, 1)), "stylus", shoulder.nominal)
+    shoulder = PartFeature("shoulder", "plane", points, np.tile(UP, (12, 1)), "stylus", shoulder.nominal)
     return (
         bore("journal", at, 10.0, (-40.0, -20.0, 0.0), hole=False),
         circle("collar", at, 20.0, 12, hole=False),
@@ -99,14 +99,14 @@ def stepped() -> tuple[Feature, ...]:
 
 
 @pytest.mark.parametrize(("one", "moves", "value"), [
-    (Characteristic("", "coaxiality", ("collar",), ("journal",)), {"collar": shifted(0.003, 0.004, 0.0)}, 0.01),
+    (PartCharacteristic("", "coaxiality", ("collar",), ("journal",)), {"collar": shifted(0.003, 0.004, 0.0)}, 0.01),
     # points at a whole number of steps from the direction of the offset: the range is twice the offset
-    (Characteristic("", "circular_runout", ("collar",), ("journal",)), {"collar": shifted(0.005, 0.0, 0.0)}, 0.01),
-    (Characteristic("", "circular_runout", ("shoulder",), ("journal",)), {"shoulder": tilted(1e-4, (0.0, 1.0, 0.0))},
+    (PartCharacteristic("", "circular_runout", ("collar",), ("journal",)), {"collar": shifted(0.005, 0.0, 0.0)}, 0.01),
+    (PartCharacteristic("", "circular_runout", ("shoulder",), ("journal",)), {"shoulder": tilted(1e-4, (0.0, 1.0, 0.0))},
      60 * np.sin(1e-4)),
-    (Characteristic("", "total_runout", ("journal",), ("journal",)), {"journal": lambda p, n: p * [1, 1, 1]}, 0.0),
+    (PartCharacteristic("", "total_runout", ("journal",), ("journal",)), {"journal": lambda p, n: p * [1, 1, 1]}, 0.0),
 ])  # fmt: skip
-def test_a_shaft_that_turns(one: Characteristic, moves: dict[str, Move], value: float) -> None:
+def test_a_shaft_that_turns(one: PartCharacteristic, moves: dict[str, Move], value: float) -> None:
     assert measured(stepped(), one, moves) == pytest.approx(value, abs=2e-6)
 
 
@@ -124,7 +124,7 @@ def of_section(height: float, offset: float, wider: float) -> Move:
 def test_circular_runout_is_that_of_the_worst_section(what: str, value: float) -> None:
     """A section 5 µm off its axis runs out by 10 µm; another that is 20 µm wider all round runs out by nothing itself."""
     features = (*stepped()[:1], bore("pin", [0, 0, 0], 5.0, (60.0, 50.0), hole=False))
-    one = Characteristic("", what, ("pin",), ("journal",))
+    one = PartCharacteristic("", what, ("pin",), ("journal",))
     assert measured(features, one, {"pin": of_section(60.0, 0.005, 0.020)}) == pytest.approx(value, abs=5e-6)
 
 
@@ -132,19 +132,19 @@ def test_a_face_runs_out_on_each_of_its_circles() -> None:
     """The outer circle of a shoulder lies 20 µm higher than the inner one, which is tilted by 0.1 mrad."""
     (inner, _), (outer, _) = ring([0, 0, 0], 20.0, 10.0, 8), ring([0, 0, 0], 30.0, 10.0, 8)
     points, up = np.vstack([inner, outer]), np.tile(UP, (16, 1))
-    face = Feature("face", "plane", points, up, "stylus", Nominal(np.array([0.0, 0, 10]), UP))
+    face = PartFeature("face", "plane", points, up, "stylus", Nominal(np.array([0.0, 0, 10]), UP))
 
     def lifted(p: Floats, n: Floats) -> Floats:
         return p + np.where(np.hypot(p[:, 0], p[:, 1]) > 25, 0.02, 1e-4 * p[:, 0])[:, None] * n
 
     for what, value in (("circular_runout", 1e-4 * 40), ("total_runout", 0.02 + 1e-4 * 20)):
-        one = Characteristic("", what, ("face",), ("journal",))
+        one = PartCharacteristic("", what, ("face",), ("journal",))
         assert measured((*stepped()[:1], face), one, {"face": lifted}) == pytest.approx(value, abs=NANOMETRE)
 
 
 def test_coaxiality_of_an_axis_counts_its_lean() -> None:
     features = (bore("journal", [0, 0, 0], 10.0, (-40.0, 0.0)), bore("other", [0, 0, 0], 5.0, (100.0, 150.0)))
-    one = Characteristic("", "coaxiality", ("other",), ("journal",))
+    one = PartCharacteristic("", "coaxiality", ("other",), ("journal",))
     assert measured(features, one, {"other": tilted(1e-4, (1.0, 0.0, 0.0))}) == pytest.approx(
         2 * 150 * np.sin(1e-4), rel=1e-6
     )
@@ -163,8 +163,8 @@ def test_three_lobes_by_every_association(how: Association, size: float, form: f
     """±4 µm in three lobes at 12 points: the rims touch three points each, 120° apart."""
     ringed = (circle("c", [0, 0, 0], 10.0, 12, hole=False),)
     moves: dict[str, Move] = {"c": wave(3, 0.004)}
-    of_size = measured(ringed, Characteristic("", "size", ("c",), association=how), moves)
-    of_form = measured(ringed, Characteristic("", "roundness", ("c",), association=how), moves)
+    of_size = measured(ringed, PartCharacteristic("", "size", ("c",), association=how), moves)
+    of_form = measured(ringed, PartCharacteristic("", "roundness", ("c",), association=how), moves)
     assert [of_size, of_form] == pytest.approx([size, form], abs=NANOMETRE)
 
 
@@ -172,21 +172,21 @@ def test_a_datum_face_may_touch_from_outside() -> None:
     """One point of a face stands out by 8 µm in its middle: a tangent datum lies on it, least squares below."""
     face = plane("face", UP, [0, 0, 0], [[100, 0, 0], [0, 100, 0]], (3, 3), association="tangent")
     features = (face, spot("top", [50.0, 50.0, 30.0]))
-    one = Characteristic("", "distance", ("face", "top"))
+    one = PartCharacteristic("", "distance", ("face", "top"))
 
     def bumped(p: Floats, n: Floats) -> Floats:
         return p + np.where(np.all(p[:, :2] == 50, axis=1), 0.008, 0.0)[:, None] * n
 
     assert measured(features, one, {"face": bumped}) == pytest.approx(30 - 0.008, abs=NANOMETRE)
-    squares = Characteristic("", "distance", ("face", "top"), association="least_squares")
+    squares = PartCharacteristic("", "distance", ("face", "top"), association="least_squares")
     assert measured(features, squares, {"face": bumped}) == pytest.approx(30 - 0.008 / 9, abs=NANOMETRE)
 
 
-def edge(name: str, start: Floats, end: Floats, out: Floats) -> Feature:
+def edge(name: str, start: Floats, end: Floats, out: Floats) -> PartFeature:
     """A line of five points on a side face."""
     points = start + np.linspace(0, 1, 5)[:, None] * (end - start)
     along = (end - start) / np.linalg.norm(end - start)
-    return Feature(name, "line", points, np.tile(out, (5, 1)), "stylus", Nominal(start, along))
+    return PartFeature(name, "line", points, np.tile(out, (5, 1)), "stylus", Nominal(start, along))
 
 
 @pytest.mark.parametrize(("datums", "moves", "x", "y"), [
@@ -208,7 +208,7 @@ def test_frames_of_datums_in_order(datums: tuple[str, ...], moves: dict[str, Mov
         spot("left", [0, 0, -5], [-1, 0, 0]),
     )  # fmt: skip
     off = [
-        measured(features, Characteristic("", axis, ("point",), datums), moves) - at
+        measured(features, PartCharacteristic("", axis, ("point",), datums), moves) - at
         for axis, at in (("x", 100), ("y", 0))
     ]
     assert off == pytest.approx([x, y], abs=1.5e-4 if "h2" in moves and y else 1e-6)
@@ -216,12 +216,12 @@ def test_frames_of_datums_in_order(datums: tuple[str, ...], moves: dict[str, Mov
 
 def test_a_best_fit_takes_back_the_motion_of_all_points_and_shares_out_the_rest() -> None:
     """The block moved as a whole has no error; one of its two end faces, alike, 8 µm out moves it by half of it."""
-    one = Characteristic("", "x", ("h1",))
+    one = PartCharacteristic("", "x", ("h1",))
     plan = Plan(BLOCK, (one,), alignment=PartAlignment(best_fit=True))
     turn = Rotation.from_rotvec([1e-3, -2e-3, 1e-3]).as_matrix()
     whole = plan.points @ turn.T + [0.3, -0.2, 0.1] - plan.points
     assert Evaluator(plan, whole, [])([], exact=True)[0, 0] == pytest.approx(30.0, abs=NANOMETRE)
-    ends = Plan(BLOCK[:4], (Characteristic("", "position", ("C",)),), alignment=PartAlignment(best_fit=True))
+    ends = Plan(BLOCK[:4], (PartCharacteristic("", "position", ("C",)),), alignment=PartAlignment(best_fit=True))
     base = np.zeros_like(ends.points)
     base[ends.rows["D"], 0] = 0.008
     assert Evaluator(ends, base, [])([], exact=True)[0, 0] == pytest.approx(2 * 0.004, abs=NANOMETRE)
@@ -230,28 +230,28 @@ def test_a_best_fit_takes_back_the_motion_of_all_points_and_shares_out_the_rest(
 def test_a_best_fit_of_one_face_is_refused() -> None:
     with pytest.raises(CmmUqError, match="leave the part free to move by their best fit"):
         Evaluator(
-            Plan(BLOCK[:1], (Characteristic("", "x", ("A",)),), alignment=PartAlignment(best_fit=True)),
+            Plan(BLOCK[:1], (PartCharacteristic("", "x", ("A",)),), alignment=PartAlignment(best_fit=True)),
             np.zeros((16, 3)),
             [],
         )
 
 
 @pytest.mark.parametrize(("one", "words"), [
-    (Characteristic("c", "flatness", ("h1",)), "a cylinder has no flatness"),
-    (Characteristic("c", "size", ("A",)), "a plane has no size"),
-    (Characteristic("c", "distance", ("A",)), "distance is of 2 features, not 1"),
-    (Characteristic("c", "parallelism", ("A",)), "needs a datum"),
-    (Characteristic("c", "coaxiality", ("h1",), ("A",)), "the datum of coaxiality is a plane"),
-    (Characteristic("c", "position", ("h1",)), "position needs datums"),
-    (Characteristic("c", "circular_runout", ("A",), ("h2",)), "no section of 'A' has 3 points"),
-    (Characteristic("c", "total_runout", ("round",), ("h2",)), "a circle has no total_runout"),
+    (PartCharacteristic("c", "flatness", ("h1",)), "a cylinder has no flatness"),
+    (PartCharacteristic("c", "size", ("A",)), "a plane has no size"),
+    (PartCharacteristic("c", "distance", ("A",)), "distance is of 2 features, not 1"),
+    (PartCharacteristic("c", "parallelism", ("A",)), "needs a datum"),
+    (PartCharacteristic("c", "coaxiality", ("h1",), ("A",)), "the datum of coaxiality is a plane"),
+    (PartCharacteristic("c", "position", ("h1",)), "position needs datums"),
+    (PartCharacteristic("c", "circular_runout", ("A",), ("h2",)), "no section of 'A' has 3 points"),
+    (PartCharacteristic("c", "total_runout", ("round",), ("h2",)), "a circle has no total_runout"),
 ])  # fmt: skip
-def test_what_a_feature_does_not_have_is_refused(one: Characteristic, words: str) -> None:
+def test_what_a_feature_does_not_have_is_refused(one: PartCharacteristic, words: str) -> None:
     with pytest.raises(CmmUqError, match=words):
         measured((*BLOCK, circle("round", [100, 50, 0], 5.0)), one, {})
 
 
-def cone(name: str, rings: tuple[float, ...] = (0.0, 8.0, 16.0)) -> Feature:
+def cone(name: str, rings: tuple[float, ...] = (0.0, 8.0, 16.0)) -> PartFeature:
     """A cone of a half angle of 10° that widens upwards, of a radius of 10 mm at its position."""
     tangent = np.tan(np.radians(10.0))
     points = np.vstack([ring([0, 0, 0], 10.0 + tangent * z, z, 8, 0.2 * i)[0] for i, z in enumerate(rings)])
@@ -259,7 +259,7 @@ def cone(name: str, rings: tuple[float, ...] = (0.0, 8.0, 16.0)) -> Feature:
         [points[:, :2] / np.hypot(points[:, 0], points[:, 1])[:, None], np.full(len(points), -tangent)]
     )
     nominal = Nominal(np.zeros(3), UP, 20.0, np.radians(10.0))
-    return Feature(name, "cone", points, out / np.linalg.norm(out, axis=1)[:, None], "stylus", nominal)
+    return PartFeature(name, "cone", points, out / np.linalg.norm(out, axis=1)[:, None], "stylus", nominal)
 
 
 PREPARED = {"cylinder": BLOCK[4], "cone": cone("cone")}
@@ -300,17 +300,17 @@ SEAT = cone("seat")  # half an angle of 10°, widening upwards, 20 mm wide at z 
 
 @pytest.mark.parametrize(("one", "moves", "value"), [
     # a circle lies as high as it is probed
-    (Characteristic("", "z", ("ring",), ABC), {"ring": shifted(0.0, 0.0, 0.02)}, -4.98),
-    (Characteristic("", "distance", ("ring", "A")), {"A": shifted(0.0, 0.0, 0.02)}, 5.02),
-    (Characteristic("", "distance", ("ring", "below")), {"below": shifted(0.3, 0.0, -0.02)}, np.hypot(0.3, 10.02)),
-    (Characteristic("", "z", ("h1",), ABC), {"h1": shifted(0.0, 0.0, 0.02)}, -35 / 3 + 0.02),
+    (PartCharacteristic("", "z", ("ring",), ABC), {"ring": shifted(0.0, 0.0, 0.02)}, -4.98),
+    (PartCharacteristic("", "distance", ("ring", "A")), {"A": shifted(0.0, 0.0, 0.02)}, 5.02),
+    (PartCharacteristic("", "distance", ("ring", "below")), {"below": shifted(0.3, 0.0, -0.02)}, np.hypot(0.3, 10.02)),
+    (PartCharacteristic("", "z", ("h1",), ABC), {"h1": shifted(0.0, 0.0, 0.02)}, -35 / 3 + 0.02),
     # a cone where it is 20 mm wide: points that stand in or out by h move that place along the axis by h / sin 10°
-    (Characteristic("", "z", ("seat",), ABC), {}, 0.0),
-    (Characteristic("", "z", ("seat",), ABC), {"seat": lambda p, n: p + 0.01 * n}, -0.01 / np.sin(np.radians(10))),
-    (Characteristic("", "z", ("seat",), ABC), {"seat": shifted(0.0, 0.0, 0.02)}, 0.02),
-    (Characteristic("", "distance", ("D", "seat")), {"seat": shifted(0.02, 0.0, 0.0)}, 199.98),
+    (PartCharacteristic("", "z", ("seat",), ABC), {}, 0.0),
+    (PartCharacteristic("", "z", ("seat",), ABC), {"seat": lambda p, n: p + 0.01 * n}, -0.01 / np.sin(np.radians(10))),
+    (PartCharacteristic("", "z", ("seat",), ABC), {"seat": shifted(0.0, 0.0, 0.02)}, 0.02),
+    (PartCharacteristic("", "distance", ("D", "seat")), {"seat": shifted(0.02, 0.0, 0.0)}, 199.98),
 ])  # fmt: skip
-def test_places_along_an_axis_are_measured_too(one: Characteristic, moves: dict[str, Move], value: float) -> None:
+def test_places_along_an_axis_are_measured_too(one: PartCharacteristic, moves: dict[str, Move], value: float) -> None:
     features = (*BLOCK, circle("ring", [100, 50, -5], 8.0), circle("below", [100, 50, -15], 8.0), SEAT)
     assert measured(features, one, moves) == pytest.approx(value, abs=2e-7)
 
@@ -319,7 +319,7 @@ def test_places_along_an_axis_are_measured_too(one: Characteristic, moves: dict[
 def test_what_carries_datums_and_feature_together_changes_no_coordinate(what: str) -> None:
     features = (*BLOCK, circle("ring", [100, 50, -5], 8.0), SEAT)
     for name in ("ring", "h2", "seat"):
-        one = Characteristic("", what, (name,), ABC)
+        one = PartCharacteristic("", what, (name,), ABC)
         still = measured(features, one, {})
         carried = measured(features, one, {each.name: shifted(0.2, -0.1, 0.3) for each in features})
         assert carried == pytest.approx(still, abs=1e-8)

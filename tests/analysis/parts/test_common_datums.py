@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from cmm_uq.analysis.parts.causes.cause import PointScatter
 from cmm_uq.analysis.parts.common_datums import ProbedCommon
 from cmm_uq.analysis.parts.evaluation import Evaluator
-from cmm_uq.analysis.parts.plan import Characteristic, CommonDatum, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.plan import CommonDatum, Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.geometry.straight import fit_plane
@@ -22,14 +22,16 @@ from tests.parts_drawn import UP, ball, block, bore, circle, plane, spot
 AXIS = CommonDatum("A-B", ("A", "B"), "line", Nominal(np.zeros(3), UP))
 
 
-def shaft(*more: Feature) -> tuple[Feature, ...]:
+def shaft(*more: PartFeature) -> tuple[PartFeature, ...]:
     """Two seats of 20 and 30 mm about the z axis, 100 mm apart, each of two sections of eight points."""
     low = bore("A", [0, 0, 0], 10.0, (-5.0, 5.0), hole=False)
     high = bore("B", [0, 0, 0], 15.0, (95.0, 105.0), hole=False)
     return (low, high, *more)
 
 
-def plan_of(features: tuple[Feature, ...], *wanted: Characteristic, common: tuple[CommonDatum, ...] = (AXIS,)) -> Plan:
+def plan_of(
+    features: tuple[PartFeature, ...], *wanted: PartCharacteristic, common: tuple[CommonDatum, ...] = (AXIS,)
+) -> Plan:
     return Plan(features, wanted, common=common)
 
 
@@ -57,28 +59,28 @@ COLLAR = circle("collar", [0, 0, 50], 25.0, 12, hole=False)
 ])  # fmt: skip
 def test_a_collar_between_two_seats_lies_off_the_axis_through_both(low: float, high: float, coaxiality: float) -> None:
     """Seats whose centres are off by a and b: the axis goes through both, being rigid, at (a + b)/2 half way."""
-    plan = plan_of(shaft(COLLAR), Characteristic("c", "coaxiality", ("collar",), ("A-B",)))
+    plan = plan_of(shaft(COLLAR), PartCharacteristic("c", "coaxiality", ("collar",), ("A-B",)))
     base = moved(plan, A=np.array([low, 0, 0]), B=np.array([high, 0, 0]))
     assert value(plan, base) == pytest.approx(coaxiality, abs=2e-6)
 
 
 def test_seats_turned_about_a_line_through_both_axes_leave_no_runout_of_the_collar_that_turns_with_them() -> None:
-    plan = plan_of(shaft(COLLAR), Characteristic("r", "circular_runout", ("collar",), ("A-B",)))
+    plan = plan_of(shaft(COLLAR), PartCharacteristic("r", "circular_runout", ("collar",), ("A-B",)))
     turn = Rotation.from_rotvec([3e-4, -2e-4, 0.1]).as_matrix()
     assert value(plan, plan.points @ turn.T + [0.3, 0.1, -0.2] - plan.points) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_seat_runs_out_about_the_axis_of_both() -> None:
     """Seat B eccentric by 8 µm to A: the axis tilts until it passes through both centres, and B runs out by a lean alone."""
-    plan = plan_of(shaft(), Characteristic("r", "circular_runout", ("B",), ("A-B",)))
+    plan = plan_of(shaft(), PartCharacteristic("r", "circular_runout", ("B",), ("A-B",)))
     base = moved(plan, B=np.array([0.008, 0, 0]))
     tilted = value(plan, base)
-    alone = Plan(plan.features, (Characteristic("r", "circular_runout", ("B",), ("A",)),))
+    alone = Plan(plan.features, (PartCharacteristic("r", "circular_runout", ("B",), ("A",)),))
     assert value(alone, base) == pytest.approx(0.016, abs=1e-5)
     assert tilted < 0.002
 
 
-def general(features: tuple[Feature, ...], points: Floats) -> tuple[Floats, Floats]:
+def general(features: tuple[PartFeature, ...], points: Floats) -> tuple[Floats, Floats]:
     """Axis of coaxial cylinders by a solver from elsewhere: (point at z = 0, slopes) and a radius each."""
     ends = np.cumsum([0, *(len(one.points) for one in features)])
 
@@ -134,7 +136,7 @@ def test_a_part_stands_on_three_points_together() -> None:
     stops = (spot("A1", [0, 0, 0]), spot("A2", [100, 0, 0]), spot("A3", [0, 50, 0]))
     datum = CommonDatum("A1-A2-A3", ("A1", "A2", "A3"), "plane", Nominal(np.zeros(3), UP))
     features = (*stops, *block()[0][1:3], spot("top", [50, 100, 30]))
-    plan = plan_of(features, Characteristic("z", "z", ("top",), ("A1-A2-A3", "B", "C")), common=(datum,))
+    plan = plan_of(features, PartCharacteristic("z", "z", ("top",), ("A1-A2-A3", "B", "C")), common=(datum,))
     assert value(plan, moved(plan, A3=np.array([0, 0, -0.01]))) == pytest.approx(30.02, abs=1e-5)
 
 
@@ -147,15 +149,15 @@ def test_three_balls_together_fix_the_frame_and_share_out_what_does_not_fit() ->
     balls = tuple(ball(n, at, 5.0, toward) for n, at in (("A", [0, 0, 0]), ("B", [90, 0, 0]), ("C", [0, 60, 0])))
     datum = CommonDatum("A-B-C", ("A", "B", "C"), "point", Nominal(np.zeros(3)))
     features = (*balls, spot("p", [0, 0, 40]))
-    plan = plan_of(features, Characteristic("x", "x", ("p",), ("A-B-C",)), common=(datum,))
+    plan = plan_of(features, PartCharacteristic("x", "x", ("p",), ("A-B-C",)), common=(datum,))
     assert value(plan, moved(plan, B=np.array([0.009, 0, 0]))) == pytest.approx(-0.009 / 2.6, abs=1e-6)
-    ordered = Plan(features, (Characteristic("x", "x", ("p",), ("A", "B", "C")),))
+    ordered = Plan(features, (PartCharacteristic("x", "x", ("p",), ("A", "B", "C")),))
     assert value(ordered, moved(plan, B=np.array([0.009, 0, 0]))) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_first_order_is_the_derivative_of_the_whole() -> None:
     """Noise a tenth as large leaves a hundredth of the difference from associating each draw."""
-    plan = plan_of(shaft(COLLAR), Characteristic("c", "coaxiality", ("collar",), ("A-B",)))
+    plan = plan_of(shaft(COLLAR), PartCharacteristic("c", "coaxiality", ("collar",), ("A-B",)))
     base, off = moved(plan, collar=np.array([0.05, 0, 0])), []
     for size in (0.02, 0.002):
         noise = PointScatter.of("noise", "noise", np.full((len(plan.points), 3), size))

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.analysis.conformity.limits import RARE, SCARCE, LimitDecision, Limits, judge
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, middle, stated
 from cmm_uq.app.commands.parts.part import _together
 from cmm_uq.base.points import Floats
@@ -63,7 +62,7 @@ def test_what_is_stated_does_not_contradict_itself(
     for i, (zone, _, _, lower, upper) in enumerate(kinds):
         low = None if zone or lower is None else min(lower, upper)
         high = max(upper, 0.05) if zone else max(upper, upper if lower is None else lower + 1e-3)
-        made.append(Characteristic(str(i), "roundness" if zone else "size", ("hole",), lower=low, upper=high))
+        made.append(PartCharacteristic(str(i), "roundness" if zone else "size", ("hole",), lower=low, upper=high))
     measured = np.array([max(value, 0.0) if zone else value for zone, _, value, *_ in kinds])
     plan = Plan((circle("hole", [0, 0, 0], 20.0, 8),), tuple(made))
     found, each, together, decided = all_of(errors, measured, plan)
@@ -93,7 +92,7 @@ def test_what_is_stated_does_not_contradict_itself(
 
 
 def _agrees_with_its_decision(
-    one: StatedCharacteristic, asked: Characteristic, judged: LimitDecision, draws: Floats
+    one: StatedCharacteristic, asked: PartCharacteristic, judged: LimitDecision, draws: Floats
 ) -> None:
     (low, high), upper, probability = one.interval, float(asked.upper or 0.0), float(judged.probability or 0.0)
     assert one.value is not None

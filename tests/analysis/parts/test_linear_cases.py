@@ -9,8 +9,8 @@ import numpy as np
 
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.machine.state import StatedNoise
-from cmm_uq.analysis.parts.plan import Characteristic, Plan, Stylus
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan, Stylus
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.units import ARCSECOND
 from cmm_uq.maths.uncertainty.distributions import normal
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
@@ -28,11 +28,11 @@ FEATURES = (
     plane("side", [0, -1, 0], [0, 0, 0], [[200, 0, 0], [0, 0, -20]], (4, 3)),
 )
 ASKED = (
-    Characteristic("ab", "distance", ("a", "b")),
-    Characteristic("ac", "distance", ("a", "c")),
-    Characteristic("k", "size", ("k",)),
-    Characteristic("height", "distance", ("top", "d")),
-    Characteristic("corner", "angle", ("top", "side")),
+    PartCharacteristic("ab", "distance", ("a", "b")),
+    PartCharacteristic("ac", "distance", ("a", "c")),
+    PartCharacteristic("k", "size", ("k",)),
+    PartCharacteristic("height", "distance", ("top", "d")),
+    PartCharacteristic("corner", "angle", ("top", "side")),
 )
 
 
@@ -74,7 +74,7 @@ def test_virtual_measurements_of_linear_cases_are_what_the_law_of_propagation_sa
     state = machine(["scale_x", "squareness_xy"], draws, noise=StatedNoise(np.full(3, SIGMA)))
     warm = Surroundings(Expansion(11.5e-6, 1e-6, 22.0, 0.3))
     plan = Plan(FEATURES, ASKED, (Stylus("stylus", u_diameter_um=0.8),))
-    found = Virtual(plan, Circumstances(state, (POSE,), warm)).simulated(TRIALS, seed=5)
+    found = Virtual(plan, MeasurementConditions(state, (POSE,), warm)).simulated(TRIALS, seed=5)
     u, wanted = found.u, np.sqrt(np.diagonal(expected.covariance))
     np.testing.assert_allclose(u, wanted, rtol=0.02)
     correlation = found.covariance / np.outer(u, u)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.analysis.parts.outlines import outline
-from cmm_uq.analysis.parts.plan import Feature, Nominal
+from cmm_uq.analysis.parts.plan import Nominal, PartFeature
 from cmm_uq.base.points import Floats
 from tests.parts_drawn import UP, bore, circle, plane, spot
 
@@ -52,7 +52,7 @@ def test_a_plane_is_the_border_of_its_points() -> None:
 def test_a_cone_widens_by_the_tangent_of_half_its_angle() -> None:
     at = np.array([[10.0, 0, 0], [0, 10.0, 0], [-10.0, 0, 0], [0, -10.0, 0], [14.0, 0, 4.0], [0, 14.0, 4.0]])
     normals = np.tile(UP, (6, 1))
-    feature = Feature("k", "cone", at, normals, "stylus", Nominal(np.zeros(3), UP, 20.0, np.pi / 4))
+    feature = PartFeature("k", "cone", at, normals, "stylus", Nominal(np.zeros(3), UP, 20.0, np.pi / 4))
     low, high, *_ = outline(feature, ALONG_Y)
     np.testing.assert_allclose(np.linalg.norm(low[:, :2], axis=1), 10.0)
     np.testing.assert_allclose(np.linalg.norm(high[:, :2], axis=1), 14.0)
@@ -62,14 +62,14 @@ def test_a_cone_widens_by_the_tangent_of_half_its_angle() -> None:
 @pytest.mark.parametrize("view", [UP, ALONG_X, np.array([0.6, 0.0, 0.8])])
 def test_a_sphere_is_the_circle_across_the_view(view: Floats) -> None:
     at = 12.0 * np.array([[1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0], [0, 0, 1.0]])
-    (line,) = outline(Feature("s", "sphere", at, at / 12, "stylus", Nominal(np.zeros(3), None, 24.0)), view)
+    (line,) = outline(PartFeature("s", "sphere", at, at / 12, "stylus", Nominal(np.zeros(3), None, 24.0)), view)
     np.testing.assert_allclose(np.linalg.norm(line, axis=1), 12.0)
     np.testing.assert_allclose(line @ view, 0.0, atol=1e-12)
 
 
 def test_a_line_goes_from_its_first_to_its_last_point_and_a_point_is_none() -> None:
     at = np.array([[30.0, 0, 0], [0.0, 0, 0], [90.0, 0, 0]])
-    feature = Feature("l", "line", at, np.tile(UP, (3, 1)), "stylus", Nominal(np.zeros(3), ALONG_X))
+    feature = PartFeature("l", "line", at, np.tile(UP, (3, 1)), "stylus", Nominal(np.zeros(3), ALONG_X))
     (line,) = outline(feature, UP)
     np.testing.assert_allclose(line, [[0, 0, 0], [90, 0, 0]])
     assert outline(spot("p", [0, 0, 0]), UP) == []
@@ -77,6 +77,6 @@ def test_a_line_goes_from_its_first_to_its_last_point_and_a_point_is_none() -> N
 
 def test_a_plane_of_points_in_a_row_is_that_row() -> None:
     at = np.array([[0.0, 0, 0], [10.0, 0, 0], [20.0, 0, 0], [30.0, 0, 0]])
-    feature = Feature("A", "plane", at, np.tile(UP, (4, 1)), "stylus", Nominal(np.zeros(3), UP))
+    feature = PartFeature("A", "plane", at, np.tile(UP, (4, 1)), "stylus", Nominal(np.zeros(3), UP))
     (line,) = outline(feature, UP)
     assert sorted(line[:, 0]) == [0.0, 30.0]

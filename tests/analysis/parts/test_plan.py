@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, PartAlignment, Plan
+from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def plane(name: str, count: int = 4, **changes: object) -> Feature:
+def plane(name: str, count: int = 4, **changes: object) -> PartFeature:
     points = np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0], [10, 10, 0], [5, 5, 0]])[:count]
     given = {"points": points, "normals": np.tile(UP, (count, 1)), "nominal": Nominal(np.zeros(3), UP)} | changes
-    return Feature(name, "plane", stylus="stylus", **given)  # type: ignore[arg-type]
+    return PartFeature(name, "plane", stylus="stylus", **given)  # type: ignore[arg-type]
 
 
-def bore(sign: float) -> Feature:
+def bore(sign: float) -> PartFeature:
     angles = np.linspace(0, 2 * np.pi, 8, endpoint=False)
     out = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(8)])
-    return Feature("bore", "circle", 5 * out, sign * out, "stylus", Nominal(np.zeros(3), UP, 10.0))
+    return PartFeature("bore", "circle", 5 * out, sign * out, "stylus", Nominal(np.zeros(3), UP, 10.0))
 
 
 def test_the_normals_of_a_hole_point_to_its_axis() -> None:
@@ -41,12 +41,12 @@ def test_a_feature_that_is_none_is_refused(changes: dict[str, object], words: st
 
 @pytest.mark.parametrize(("features", "characteristics", "alignment", "words"), [
     (("top", "top"), (), (), "feature 'top' stands twice"),
-    (("top",), (Characteristic("flat", "flatness", ("tops",)),), (), "Did you mean 'top'"),
-    (("top",), (Characteristic("flat", "flat", ("top",)),), (), "flatness"),
+    (("top",), (PartCharacteristic("flat", "flatness", ("tops",)),), (), "Did you mean 'top'"),
+    (("top",), (PartCharacteristic("flat", "flat", ("top",)),), (), "flatness"),
     (("top",), (), ("side",), "alignment: there is no feature 'side'"),
 ])  # fmt: skip
 def test_names_that_lead_nowhere_are_refused(
-    features: tuple[str, ...], characteristics: tuple[Characteristic, ...], alignment: tuple[str, ...], words: str
+    features: tuple[str, ...], characteristics: tuple[PartCharacteristic, ...], alignment: tuple[str, ...], words: str
 ) -> None:
     with pytest.raises(CmmUqError, match=words):
         Plan(tuple(plane(name) for name in features), characteristics, alignment=PartAlignment(alignment))

@@ -13,14 +13,17 @@ from scipy import stats
 
 from cmm_uq.analysis.conformity.limits import Limits
 from cmm_uq.analysis.parts.characteristics import never_negative
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, Plan
+from cmm_uq.analysis.parts.plan import Nominal, PartCharacteristic, PartFeature, Plan
 from cmm_uq.analysis.parts.result import StatedCharacteristic, conforming, deviations_of, stated, within_bounds
 from cmm_uq.maths.uncertainty.monte_carlo import Source, from_source
 from tests.parts_drawn import UP, block, circle, plane, spot
 
 PLAN = Plan(
     (circle("hole", [0, 0, 0], 20.0, 8), spot("o", [0, 0, 0])),
-    (Characteristic("zone", "roundness", ("hole",), upper=1.5), Characteristic("size", "size", ("hole",), upper=1.5)),
+    (
+        PartCharacteristic("zone", "roundness", ("hole",), upper=1.5),
+        PartCharacteristic("size", "size", ("hole",), upper=1.5),
+    ),
 )
 # errors of 0.25 on average, in standard deviations.
 DRAWS = np.random.default_rng(11).standard_normal((200_000, 1)) + 0.25
@@ -98,7 +101,9 @@ def test_widths_are_zones_and_what_has_a_sign_or_a_size_is_none() -> None:
 def test_all_limits_are_never_kept_more_often_than_one_of_them() -> None:
     """Two zones with the opposite errors: what is possible of both at once is near zero, of each alone it is not."""
     errors = np.hstack([DRAWS - 0.25, 0.25 - DRAWS])
-    plan = Plan(PLAN.features, tuple(Characteristic(name, "roundness", ("hole",), upper=0.5) for name in ("a", "b")))
+    plan = Plan(
+        PLAN.features, tuple(PartCharacteristic(name, "roundness", ("hole",), upper=0.5) for name in ("a", "b"))
+    )
     each, together = conforming(plan, errors, np.array([0.1, 0.1]))
     cut = stats.truncnorm(-0.1, np.inf, 0.1, 1.0).cdf(0.5)
     np.testing.assert_allclose(each, cut, atol=0.004)
@@ -137,7 +142,7 @@ def test_a_plane_in_either_sense(sense: float) -> None:
 def test_a_line_on_a_surface() -> None:
     at = np.linspace(-40, 40, 9)
     points, normals = np.outer(at, X), np.tile([0.0, 1.0, 0.0], (9, 1))
-    feature = Feature("l", "line", points, normals, "stylus", Nominal(np.zeros(3), X))
+    feature = PartFeature("l", "line", points, normals, "stylus", Nominal(np.zeros(3), X))
     bow = 3e-3 * ((at / 40) ** 2 - np.mean((at / 40) ** 2))
     moved = points + (bow + 2e-5 * at + 0.2)[:, None] * normals + np.outer(at, [0, 0, 1e-4])
     np.testing.assert_allclose(deviations_of(Plan((feature,), ()), moved), bow, atol=1e-8)

@@ -15,7 +15,7 @@ from benchmarks.parts.studied import CHARACTERISTICS, MACHINE, joined, parted, p
 from cmm_uq.analysis.parts.evaluation import characteristics_of
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
 from cmm_uq.analysis.parts.placing import PartPose, WithStyli
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.superposition import Superposition
@@ -77,7 +77,7 @@ def apart(hidden: truth.Truth, change: Floats, size: float) -> Floats:
     state = MachineState(
         MACHINE, EFFECTS, found[None], StatedNoise(), shapes(less), corrections=coefficients(corrected)
     )
-    at = AtPose(plan(), Circumstances(state), POSE)
+    at = AtPose(plan(), MeasurementConditions(state), POSE)
     errors = at.errors([np.zeros_like(drawn) for drawn in at.drawn(random, 1)], exact=True)[0]
     return np.array(
         [error - (measured[one.name] - still[one.name]) for one, error in zip(CHARACTERISTICS, errors, strict=True)]

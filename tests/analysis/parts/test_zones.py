@@ -15,7 +15,7 @@ from scipy import stats
 from scipy.special import ndtr, ndtri
 
 from cmm_uq.analysis.parts.evaluation import Movement
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
 from cmm_uq.analysis.parts.result import middle, possible_interval
 from cmm_uq.analysis.parts.zones import Inverse, alike, inverse, nodes_of, tails, trial_parts
 from cmm_uq.base.points import Floats
@@ -133,7 +133,7 @@ def test_far_from_zero_both_tails_are_half_of_what_is_missed() -> None:
     assert tails(0.0, 0.95) == pytest.approx((0.025, 0.025))
 
 
-PLAN = Plan((face(5, 6), bore(3, 8)), (Characteristic("squareness", "perpendicularity", ("bore",), ("A",)),))
+PLAN = Plan((face(5, 6), bore(3, 8)), (PartCharacteristic("squareness", "perpendicularity", ("bore",), ("A",)),))
 BORE = PLAN.feature("bore")
 
 

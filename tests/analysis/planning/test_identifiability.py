@@ -11,7 +11,7 @@ from cmm_uq.analysis.planning.set_up import SetUp, attitude_along, join
 from cmm_uq.analysis.planning.setting import Setting
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.artefacts.ballbar.observe import ballbar
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
 
@@ -174,7 +174,7 @@ def test_expected_uncertainties_are_those_of_drawn_recordings(kind: str) -> None
     chosen = setting(facts, named, repeats=1, **wishes)
     points = join(ready_plan(chosen)[1])
     expected = np.array([p.u for p in found(chosen, ready_plan(chosen)[1]).parameters if p.unknown.key[0] in named])
-    acting = MeasurementModel(artefact_of(facts, points), effects(named))
+    acting = RecordingModel(artefact_of(facts, points), effects(named))
     random = np.random.default_rng(4)
     squares = np.zeros(len(named))
     for _ in range(40):

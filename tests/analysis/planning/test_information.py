@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.analysis.planning.candidates import ready_plan
 from cmm_uq.analysis.planning.information import (

@@ -19,7 +19,7 @@ from cmm_uq.artefacts import artefact_facts
 from cmm_uq.artefacts.ballbar.observe import ballbar
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.least_squares import solve
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, SIX, setting
 
@@ -29,11 +29,11 @@ OFFSETS = PlannedNoise(READING, placing=OFFSET)
 UNCERTIFIED = artefact_facts(kind="ballbar", length_mm=400.0)
 
 
-def model_of(chosen: Setting) -> MeasurementModel:
+def model_of(chosen: Setting) -> RecordingModel:
     return chosen.model(join(ready_plan(chosen)[1]))
 
 
-def by_hand(model: MeasurementModel, covariance: Floats) -> Floats:
+def by_hand(model: RecordingModel, covariance: Floats) -> Floats:
     """Standard uncertainties of generalised least squares, certified sizes being further observations of theirs."""
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     exact = np.array([unknown.known and unknown.prior_sd == 0 for unknown in linear.unknowns], dtype=bool)

@@ -19,7 +19,7 @@ from cmm_uq.artefacts import artefact_of, kind_named
 from cmm_uq.artefacts.ballbar.observe import ballbar
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.analysis.planning.plans import BALLBAR, EVERY_KIND, GAUGE, SIX, setting
 
@@ -32,10 +32,10 @@ def diagnosed(
 ) -> Any:  # fmt: skip
     """What a plan reads of a diagnosis: a recording with one effect, the group that it could be, odds of the others to it."""
     points = join(placings)
-    acting = MeasurementModel(artefact_of(facts, points), effects((true,)))
+    acting = RecordingModel(artefact_of(facts, points), effects((true,)))
     sizes = np.array([s.nominal for s in acting.artefact.sizes])
     xyz = acting.simulate(np.array([size]), sizes, Noise(SIGMA), np.random.default_rng(3))
-    after = MeasurementModel(artefact_of(facts, points.at(xyz)), effects((*named, true)), SIGMA)
+    after = RecordingModel(artefact_of(facts, points.at(xyz)), effects((*named, true)), SIGMA)
     names = list(dict.fromkeys(group))
     explanations = [SimpleNamespace(name=name) for name in names]
     instead = {names.index(name): value for name, value in (odds or {}).items()}
@@ -70,10 +70,10 @@ def log_odds(found: Any, facts: ArtefactFacts, more: Points | None, pair: tuple[
     """Half the χ² by which the false one of a pair fits worse, recording and further set-ups together, without noise."""
     points = together(found.after.artefact.points, more)
     formed = {name: shape for name, shape in (shapes or {}).items() if name == true}
-    acting = MeasurementModel(artefact_of(facts, points), effects((true,)), shapes=formed)
+    acting = RecordingModel(artefact_of(facts, points), effects((true,)), shapes=formed)
     others = tuple(e for e in found.after.effects if e.name not in pair)
     fitted = (
-        MeasurementModel(found.after.artefact, (*others, *effects((true,))), SIGMA, shapes=formed)
+        RecordingModel(found.after.artefact, (*others, *effects((true,))), SIGMA, shapes=formed)
         .estimate()
         .least_squares
     )
@@ -81,7 +81,7 @@ def log_odds(found: Any, facts: ArtefactFacts, more: Points | None, pair: tuple[
     exact = points.at(acting.predicted(np.array([*size, facts.length_mm or 0.0])))
     other = pair[1] if pair[0] == true else pair[0]
     formed = {name: shape for name, shape in (shapes or {}).items() if name == other}
-    model = MeasurementModel(artefact_of(facts, exact), (*others, *effects((other,))), SIGMA, shapes=formed)
+    model = RecordingModel(artefact_of(facts, exact), (*others, *effects((other,))), SIGMA, shapes=formed)
     linear, rest = model.estimate().linear, model.estimate().least_squares.residuals
     return float(0.5 * np.sum((rest / linear.noise_scale / SIGMA) ** 2))
 
@@ -192,14 +192,14 @@ def test_what_is_to_be_shown_is_as_uncertain_as_a_fit_to_all_of_it_says() -> Non
     """Detected from a visible length on, so many times the standard uncertainty that least squares has of the effect."""
     found = in_one_plane(2.0)
     found.indistinguishable = ()
-    found.after = MeasurementModel(found.after.artefact, effects(("scale_z", "squareness_zx", "scale_x")), SIGMA)
+    found.after = RecordingModel(found.after.artefact, effects(("scale_z", "squareness_zx", "scale_x")), SIGMA)
     plan = planned(found, KNOWN, (DetectionGoal("rotation_x_z", 0.02, 5.0),))
     assert plan is not None
     (shown,) = plan.shown
     assert plan.reached
     assert shown.after <= 0.02 < shown.before
     points = together(found.after.artefact.points, plan.points)
-    model = MeasurementModel(artefact_of(KNOWN, points), (*found.after.effects, *effects(("rotation_x_z",))), SIGMA)
+    model = RecordingModel(artefact_of(KNOWN, points), (*found.after.effects, *effects(("rotation_x_z",))), SIGMA)
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     white, held = linear.reduced.design / SIGMA, [u.known for u in linear.unknowns]
     information = white.T @ white + np.diag(np.where(held, 1e12, 0.0))
@@ -219,7 +219,7 @@ def test_repeats_that_share_an_offset_tell_less() -> None:
     assert (len(offset.placings), offset.repeats) > (len(plan.placings), plan.repeats)
     found.noise.placing.value = 0.0
     once = found.after.artefact.points
-    found.after = MeasurementModel(artefact_of(KNOWN, once.select(once.repeat == 1)), found.after.effects, SIGMA)
+    found.after = RecordingModel(artefact_of(KNOWN, once.select(once.repeat == 1)), found.after.effects, SIGMA)
     unknown = planned(found, KNOWN)
     assert unknown is not None
     assert (len(unknown.placings), unknown.repeats) > (len(plan.placings), plan.repeats)

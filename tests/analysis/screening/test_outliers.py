@@ -15,7 +15,7 @@ from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import without_outliers
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from tests.artefacts.constructions import step_gauge
 from tests.conftest import ROOT
 
@@ -81,7 +81,7 @@ def test_a_face_that_is_off_on_every_line_is_told_once_and_stays_in_the_estimate
     off = np.where(gauge.point == FACE, 0.02, 0.0) + np.random.default_rng(4).normal(0, 5e-4, len(gauge.xyz))
     facts = artefact_facts(kind="step_gauge", length_mm=420.0, u_um=0.1)
     model, (told,) = without_outliers(
-        MeasurementModel(artefact_of(facts, gauge.at(gauge.xyz + off[:, None] * along)), ())
+        RecordingModel(artefact_of(facts, gauge.at(gauge.xyz + off[:, None] * along)), ())
     )
     assert told.why.startswith(f"point {FACE} is ")
     assert f"in {len(lines)} of its {len(lines)} readings" in told.why

@@ -27,7 +27,7 @@ from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.least_squares import LeastSquares
 from tests.recordings import bar_facts, with_columns
@@ -98,13 +98,13 @@ def test_an_impossible_value_that_the_model_needs_is_an_error(ballbar_points: Po
         screen(hot, needed={"temp_x_c"}, set_aside=[], where="bar.csv")
 
 
-def noisy(points: Points, seed: int, *, offset: float = 0.0) -> tuple[list[int], MeasurementModel]:
+def noisy(points: Points, seed: int, *, offset: float = 0.0) -> tuple[list[int], RecordingModel]:
     """Outliers among lengths with 1 µm noise a coordinate, one bar moved by an offset along itself."""
     xyz = points.xyz + 1e-3 * np.random.default_rng(seed).standard_normal(points.xyz.shape)
     bar = points.xyz[11] - points.xyz[10]
     xyz[11] += offset * bar / np.linalg.norm(bar)
     artefact = Ballbar(bar_facts(), points.at(xyz))
-    model = MeasurementModel(artefact, effects(["scale_x", "scale_y", "scale_z", "squareness_xy"]))
+    model = RecordingModel(artefact, effects(["scale_x", "scale_y", "scale_z", "squareness_xy"]))
     found = gross_outliers(model.estimate().linear, artefact.measurement)
     return [index for index, _ in found], model
 
@@ -119,7 +119,7 @@ def test_false_outliers_are_as_rare_as_their_probability(ballbar_points: Points)
 
 
 def test_a_recording_without_any_noise_has_no_outliers(ballbar_points: Points) -> None:
-    model = MeasurementModel(Ballbar(bar_facts(), ballbar_points), effects(["scale_x"]))
+    model = RecordingModel(Ballbar(bar_facts(), ballbar_points), effects(["scale_x"]))
     linear = model.estimate().linear
     quiet = replace(linear, observed=linear.design @ np.array([3.0, 400.0]))
     assert len(gross_outliers(quiet, model.artefact.measurement)) <= 4

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.cli.process import run as run_command
-from tests.app.cli.process import run_apart
+from tests.app.cli.process import run as run_command, run_apart
 from tests.conftest import ROOT
 
 run = partial(run_command, "diagnose")

@@ -6,8 +6,7 @@ import re
 from itertools import product
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from rich.cells import cell_len
 
 from cmm_uq.app.cli.summary import COLOURS, Layout

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.app.commands.reading import read_job
-from tests.app.cli.process import run as run_command
-from tests.app.cli.process import run_apart
+from tests.app.cli.process import run as run_command, run_apart
 from tests.app.commands.test_planning import JOB, SIX
 
 run = partial(run_command, "plan")

@@ -18,7 +18,7 @@ from cmm_uq.app.commands.diagnose import write_diagnosis
 from cmm_uq.app.commands.reading import compared_with_frame
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.app.cli.process import run
 from tests.app.commands.predictions import LENGTH, errors, job, placed_bars, predicted, recorded, shown, table
@@ -37,10 +37,10 @@ def compared(of: Job) -> Against:
     return against_simulation(of, simulation)
 
 
-def squareness(found: Against | MeasurementModel) -> tuple[float, float]:
+def squareness(found: Against | RecordingModel) -> tuple[float, float]:
     """Least-squares estimate of the squareness XY that is left, and its standard uncertainty, ″."""
     model = found.model if isinstance(found, Against) else found
-    named = MeasurementModel(model.artefact, effects(["squareness_xy"], where=""), model.sigma, model.used)
+    named = RecordingModel(model.artefact, effects(["squareness_xy"], where=""), model.sigma, model.used)
     estimate = named.estimate().least_squares
     return float(estimate.value[0]), float(np.sqrt(estimate.covariance[0, 0]))
 

@@ -14,9 +14,7 @@ from typing import Any
 
 import pytest
 
-from cmm_uq.app.commands.laboratory import batch as batch_run
-from cmm_uq.app.commands.laboratory import batch as module
-from cmm_uq.app.commands.laboratory import batch_jobs
+from cmm_uq.app.commands.laboratory import batch as batch_run, batch as module, batch_jobs
 from cmm_uq.app.commands.laboratory.batch import Batch, BatchOptions, write_batch
 from cmm_uq.app.commands.laboratory.batch_job import reported
 from cmm_uq.app.commands.laboratory.batch_jobs import conforming

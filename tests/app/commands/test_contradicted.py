@@ -7,8 +7,7 @@ import pandas as pd
 import pytest
 
 import cmm_uq
-from cmm_uq.app.commands.report import evaluate_job as analyse_job
-from cmm_uq.app.commands.report import outcome_of
+from cmm_uq.app.commands.report import evaluate_job as analyse_job, outcome_of
 from cmm_uq.certificate.result import Result
 
 WAYS = ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, 1),

@@ -12,13 +12,13 @@ import pytest
 from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from tests.conftest import ROOT
 
 EXAMPLES = ROOT / "examples"
 
 
-def moved(folder: Path, example: str, row: int, column: str, by_mm: float) -> tuple[MeasurementModel, Finding]:
+def moved(folder: Path, example: str, row: int, column: str, by_mm: float) -> tuple[RecordingModel, Finding]:
     """An example with one reading moved: its model, and the outlier that is found."""
     job = folder / example
     shutil.copytree(EXAMPLES / example, job)

@@ -12,8 +12,7 @@ import pytest
 
 from cmm_uq.app.commands.certificates.reissue import compared, refuse_denied
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced
-from cmm_uq.jobs.tables.identification import denies_a_change
+from cmm_uq.jobs.tables.identification import ReplacedCertificate as Replaced, denies_a_change
 from tests.app.cli.laboratory import PLACE, reported
 from tests.app.cli.process import run
 

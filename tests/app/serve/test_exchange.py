@@ -7,12 +7,10 @@ import io
 from hashlib import sha256
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.app.serve import exchange as uploaded
-from cmm_uq.app.serve.exchange import RefusedRequest, read_address, read_dropped
-from cmm_uq.app.serve.exchange import WebRequest as Request
+from cmm_uq.app.serve.exchange import RefusedRequest, WebRequest as Request, read_address, read_dropped
 from cmm_uq.app.serve.page import address
 
 VALUES = st.text(st.characters(exclude_characters="\0\r\n", exclude_categories=["Cs"]), min_size=1, max_size=60)

@@ -8,8 +8,7 @@ from decimal import Decimal
 from itertools import pairwise
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.app.serve.trends import BOTTOM, HEIGHT, RIGHT, TOP, WIDTH, Trend, drawn, new_years, ticks
 from cmm_uq.base.messages import say

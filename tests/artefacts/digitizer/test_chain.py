@@ -16,7 +16,7 @@ from cmm_uq.app.commands.report import write_report
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.compensation import Compensation
 from cmm_uq.machine.physics.digitizer import Digitizer, euler_313
 from cmm_uq.machine.physics.error_map import read_error_map
@@ -85,7 +85,7 @@ def job(folder: Path, machine: str = "") -> Path:
 def estimate(folder: Path) -> Floats:
     read = read_job(folder)
     artefact = artefact_of(read.facts.artefact, read.points)
-    return MeasurementModel(artefact, (), 1e-3).estimate().least_squares.value[:3]
+    return RecordingModel(artefact, (), 1e-3).estimate().least_squares.value[:3]
 
 
 def test_a_compensated_recording_gives_the_offset_that_the_exact_chain_was_made_with(tmp_path: Path) -> None:

@@ -6,16 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import least_squares
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.digitizer.observe import Digitizer
+from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.digitizer import Alignment, mount_offset
 from cmm_uq.maths.inference.linear_model import Freedoms
 from cmm_uq.maths.inference.posterior import sample
@@ -108,7 +107,7 @@ def test_the_source_s_lines_give_13_15_and_15_um_when_all_equations_are_weighted
         Alignment(*np.radians(angles), reading, np.diag(u**2) * 1e-6)
         for angles, reading in zip(THREE, points.xyz, strict=True)
     ])  # fmt: skip
-    posterior = sample(MeasurementModel(Digitizer(facts, points), (), 1e-5).estimate().linear, seed=0)
+    posterior = sample(RecordingModel(DigitizerArtefact(facts, points), (), 1e-5).estimate().linear, seed=0)
     found = posterior.draws[:, :3].std(axis=0)
     assert exact.u * 1e3 == pytest.approx([12.9, 15.05, 15.10], abs=0.05)
     np.testing.assert_allclose(found, exact.u, rtol=0.02)
@@ -121,8 +120,8 @@ def test_an_attitude_in_doubt_moves_the_offset_by_its_lever() -> None:
     xyz = points.xyz.copy()
     xyz[0] -= np.cross([10 * ARCSECOND, 0, 0], q)
     facts = artefact_facts(kind="digitizer", u_attitude_arcsec=2.0)
-    digitizer = Digitizer(facts, points.at(xyz))
-    model = MeasurementModel(digitizer, (), NOISE)
+    digitizer = DigitizerArtefact(facts, points.at(xyz))
+    model = RecordingModel(digitizer, (), NOISE)
     names = [size.name for size in digitizer.sizes]
     truth = np.array([*OFFSET, *np.zeros(9)])
     truth[names.index("turn_x_1_arcsec")] = 10.0
@@ -135,7 +134,7 @@ def test_the_jacobian_of_every_size_is_that_of_differences(form: str) -> None:
     points = scans(SIX) if form == "scans" else centres(SIX)
     size = {"length_mm": 2 * RADIUS, "u_um": 0.3} if form == "scans" else {}
     facts = artefact_facts(kind="digitizer", u_attitude_arcsec=3.0, u_centre_um=[1.0, 2.0, 3.0], **size)
-    digitizer = Digitizer(facts, points)
+    digitizer = DigitizerArtefact(facts, points)
     nominal = np.array([size.nominal for size in digitizer.sizes])
     at = digitizer.fit(digitizer.points.xyz, nominal)
     # what is left of a change after the sphere has moved along with it
@@ -166,7 +165,7 @@ def test_the_jacobian_of_every_size_is_that_of_differences(form: str) -> None:
 def test_attitudes_that_turn_about_one_axis_are_refused_with_what_they_leave_open(attitudes: object, told: str) -> None:
     for points in (centres(attitudes), scans(attitudes)):  # type: ignore[arg-type]
         with pytest.raises(CmmUqError, match=told):
-            Digitizer(CENTRES, points, where="recording.csv")
+            DigitizerArtefact(CENTRES, points, where="recording.csv")
 
 
 def test_a_scale_common_to_all_axes_is_one_with_the_digitizer_s_size() -> None:
@@ -198,20 +197,20 @@ def test_carriages_that_rotate_turn_the_digitizer_with_them() -> None:
 def test_the_readings_all_alike_are_refused() -> None:
     points = centres()
     with pytest.raises(CmmUqError, match="all the same"):
-        Digitizer(CENTRES, points.at(np.zeros_like(points.xyz)))
+        DigitizerArtefact(CENTRES, points.at(np.zeros_like(points.xyz)))
 
 
 def test_a_digitizer_far_from_its_drawing_is_refused() -> None:
     facts = artefact_facts(kind="digitizer", offset_mm=[264.5, 1.0, 129.6])
     with pytest.raises(CmmUqError, match=r"\[U1 V1 W1\] = \[1.001, 264.505, 129.575\] mm, far from offset_mm"):
-        Digitizer(facts, centres())
+        DigitizerArtefact(facts, centres())
 
 
 def test_several_attitudes_in_one_measurement_are_refused_with_the_line() -> None:
     points = centres()
     points = replace(points, measurement=np.array([1, 1, 2]), point=np.array([1, 2, 1]))
     with pytest.raises(CmmUqError, match=r"recording.csv line 2: measurement 1 has several attitudes"):
-        Digitizer(CENTRES, points, where="recording.csv")
+        DigitizerArtefact(CENTRES, points, where="recording.csv")
 
 
 def test_a_recording_without_angles_or_with_half_a_scan_is_refused() -> None:
@@ -219,27 +218,27 @@ def test_a_recording_without_angles_or_with_half_a_scan_is_refused() -> None:
     for name, told in (("beta_deg", "no column 'beta_deg'"), ("v_mm", "no column 'v_mm'")):
         columns = {key: values for key, values in points.columns.items() if key != name}
         with pytest.raises(CmmUqError, match=told):
-            Digitizer(SPHERES, replace(points, columns=columns))
+            DigitizerArtefact(SPHERES, replace(points, columns=columns))
 
 
 def test_a_scan_along_one_line_is_no_sphere() -> None:
     points = scans(count=12)
     with pytest.raises(CmmUqError, match="measurement 1"):
-        Digitizer(SPHERES, points.at(np.repeat(points.xyz[:1], len(points), axis=0)))
+        DigitizerArtefact(SPHERES, points.at(np.repeat(points.xyz[:1], len(points), axis=0)))
 
 
 def test_what_is_drawn_has_the_noise_that_was_asked_for() -> None:
     """1800 radial residuals: their standard deviation is known to 1.7 %."""
-    model = MeasurementModel(Digitizer(SPHERES, scans(SIX, 300)), ())
+    model = RecordingModel(DigitizerArtefact(SPHERES, scans(SIX, 300)), ())
     sizes = np.array([size.nominal for size in model.artefact.sizes])
     drawn = model.simulate(np.zeros(0), sizes, Noise(coordinate=NOISE), np.random.default_rng(3))
-    residuals = replace(model, artefact=Digitizer(SPHERES, scans(SIX, 300).at(drawn))).residuals(sizes)
+    residuals = replace(model, artefact=DigitizerArtefact(SPHERES, scans(SIX, 300).at(drawn))).residuals(sizes)
     assert np.std(residuals) == pytest.approx(NOISE, rel=0.1)
 
 
 def test_the_sphere_is_where_it_was() -> None:
     for facts, points in ((SPHERES, scans()), (CENTRES, centres())):
-        digitizer = Digitizer(facts, points)
+        digitizer = DigitizerArtefact(facts, points)
         sizes = np.array([size.nominal for size in digitizer.sizes])
         sizes[:3] = OFFSET
         np.testing.assert_allclose(digitizer.centre(points.xyz, sizes), SPHERE, atol=1e-9)

@@ -10,10 +10,9 @@ import pytest
 
 from cmm_uq.app.commands.plans.plan import write_plan
 from cmm_uq.app.commands.reading import read_job
-from cmm_uq.artefacts.digitizer.observe import Digitizer
+from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact
 from cmm_uq.artefacts.digitizer.page import DigitizerFigures, results
-from cmm_uq.artefacts.digitizer.plan import THREE as PLANNED
-from cmm_uq.artefacts.digitizer.plan import scan, words
+from cmm_uq.artefacts.digitizer.plan import THREE as PLANNED, scan, words
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.certificate.sections.first_page import summary
@@ -137,7 +136,9 @@ def test_the_source_s_three_attitudes_are_planned_with_what_they_will_tell(tmp_p
     (job / "recording.csv").write_text("".join(line for line in lines if not line.startswith("#")), encoding="utf-8")
     read = read_job(job)
     assert len(read.points) == 3 * 2 * 37
-    np.testing.assert_allclose(Digitizer(read.facts.artefact, read.points).start.offset, [1.0, 264.5, 129.6], atol=1e-5)  # type: ignore[arg-type]
+    np.testing.assert_allclose(
+        DigitizerArtefact(read.facts.artefact, read.points).start.offset, [1.0, 264.5, 129.6], atol=1e-5
+    )  # type: ignore[arg-type]
 
 
 def test_centres_are_planned_where_no_sphere_is_described(tmp_path: Path) -> None:

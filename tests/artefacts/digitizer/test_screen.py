@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.digitizer.observe import Digitizer, offset_misfit
+from cmm_uq.artefacts.digitizer.observe import DigitizerArtefact, offset_misfit
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Points
 from tests.artefacts.constructions import estimated
@@ -67,7 +67,7 @@ def test_readings_in_inches_are_refused() -> None:
 def test_a_wrong_sphere_is_refused() -> None:
     facts = artefact_facts(kind="digitizer", length_mm=25.9)
     with pytest.raises(CmmUqError, match=r"diameters of the scanned spheres are 25\.4 mm"):
-        Digitizer(facts, scans())
+        DigitizerArtefact(facts, scans())
 
 
 def test_attitudes_that_tell_nothing_make_no_misfit() -> None:

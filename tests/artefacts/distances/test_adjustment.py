@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.spatial.transform import Rotation
 
 from cmm_uq.artefacts.distances.lengths import turns
-from cmm_uq.machine.physics.kinematics import Chain
+from cmm_uq.machine.physics.kinematics import KinematicChain
 
 ARCSEC = np.pi / 180 / 3600
 angles = st.floats(-2000.0, 2000.0)
@@ -45,4 +44,4 @@ def test_a_product_of_angles_matters_where_z_stands_on_its_own() -> None:
     [("XYZ", True), ("YXZ", True), ("ZXY", False), ("YFXZ", False), ("ZYFX", True), ("YZFX", False), ("XFYZ", True)],
 )
 def test_the_ram_rides_on_the_carriage_that_carries_it(chain: str, rides: bool) -> None:
-    assert Chain.of(chain).rides("z", on="y") is rides
+    assert KinematicChain.of(chain).rides("z", on="y") is rides

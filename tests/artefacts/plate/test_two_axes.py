@@ -13,7 +13,7 @@ from cmm_uq.analysis.screening.finding import Finding
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 
 GRID = np.array([[i, j, 0.0] for j in range(5) for i in range(5)]) * 90.0
 MACHINE = {"name": "M", "travel_mm": {"x": [0, 900], "y": [0, 600], "z": [-500, 10]}}
@@ -39,7 +39,7 @@ def referenced(points: pd.DataFrame) -> pd.DataFrame:
     return points.assign(**{f"reference_{a}_mm": np.tile(GRID[:, i], 2) for i, a in enumerate("xyz")})
 
 
-def model_of(job: Job) -> tuple[MeasurementModel, tuple[Finding, ...]]:
+def model_of(job: Job) -> tuple[RecordingModel, tuple[Finding, ...]]:
     return screened_model(job)
 
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.artefacts.shift_plate.placed_plate import placed_plate, rigid_motion, rotations
 from cmm_uq.base.errors import CmmUqError

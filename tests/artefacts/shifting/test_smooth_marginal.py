@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cmm_uq.artefacts.shifting.smooth_function import ByCoefficients, ByObservations, Marginal, marginal
+from cmm_uq.artefacts.shifting.smooth_function import ByCoefficients, ByObservations, SmoothMarginal, marginal
 
 RANDOM = np.random.default_rng(4)
 EVEN, ENDS, COLUMNS = (RANDOM.standard_normal((9, k)) for k in (4, 4, 2))
@@ -17,7 +17,7 @@ WAYS = [way(OBSERVED, EVEN, ENDS, COLUMNS, COLUMN_SD, 0.8, 5) for way in (ByObse
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_the_density_is_that_of_scipys_normal_distribution(way: Marginal) -> None:
+def test_the_density_is_that_of_scipys_normal_distribution(way: SmoothMarginal) -> None:
     expected = []
     for sd, r, sigma in zip(SD, GROWTH, SIGMA, strict=True):
         design = np.hstack([(EVEN + (r - 1) * ENDS) * sd, COLUMNS * COLUMN_SD])
@@ -27,7 +27,7 @@ def test_the_density_is_that_of_scipys_normal_distribution(way: Marginal) -> Non
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_draws_have_the_mean_and_covariance_of_the_conditional(way: Marginal) -> None:
+def test_draws_have_the_mean_and_covariance_of_the_conditional(way: SmoothMarginal) -> None:
     """By the formula for partitioned normal vectors (Rasmussen & Williams 2006, A.6); 200 000 draws, five of their errors."""
     count = 200_000
     sd, r, sigma = np.tile(SD[1], (count, 1)), np.full(count, 2.5), np.full(count, 0.7)

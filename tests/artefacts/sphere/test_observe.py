@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.artefacts import artefact_facts
-from cmm_uq.artefacts.sphere.observe import Sphere
+from cmm_uq.artefacts.sphere.observe import SphereArtefact
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.maths.geometry import fit_sphere
@@ -23,7 +23,7 @@ def test_a_ball_larger_by_the_probe_error_is_an_error_of_the_radius() -> None:
     n = np.tile(hemisphere(), (4, 1))
     found = estimated(BALL, points.at(points.xyz - 3e-3 * n), ["probe_radius"])
     assert found.value[0] == pytest.approx(3.0, abs=1e-8)
-    probed = Sphere(BALL, points.at(points.xyz - 3e-3 * n)).probed()
+    probed = SphereArtefact(BALL, points.at(points.xyz - 3e-3 * n)).probed()
     np.testing.assert_allclose(probed.size, -6e-3, atol=1e-11)
     assert probed.form.max() < 1e-11
     assert probed.count.tolist() == [25] * 4
@@ -115,4 +115,4 @@ def flat(points: Points) -> Floats:
 def test_a_recording_that_is_none_of_a_ball_is_refused(spoil: object, message: str) -> None:
     assert callable(spoil)
     with pytest.raises(CmmUqError, match=message):
-        Sphere(BALL, spoil(spheres()))
+        SphereArtefact(BALL, spoil(spheres()))

@@ -9,8 +9,7 @@ import re
 from decimal import Decimal
 
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.numbers import LARGEST, SMALLEST, conversion, number_problem, numbers

@@ -6,8 +6,7 @@ import time
 import tomllib
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import DEPTH, NUMERAL, TEXT, TOML_KEY, WORD

@@ -16,8 +16,7 @@ import pytest
 from babel import Locale
 from babel.dates import format_date
 from babel.numbers import parse_decimal
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.languages import translation as catalogues
 from cmm_uq.base.languages.translation import LANGUAGES, Catalogue, Code, Translation, catalogue, code_of, translated

@@ -14,12 +14,19 @@ from hashlib import sha256
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.base.output import MANIFEST, Owner, finish_interrupted, is_pending, read_manifest, staged, staging
-from cmm_uq.base.output import staging as staging_module
+from cmm_uq.base.output import (
+    MANIFEST,
+    Owner,
+    finish_interrupted,
+    is_pending,
+    read_manifest,
+    staged,
+    staging,
+    staging as staging_module,
+)
 from cmm_uq.base.output.staging import locked
 
 MINE = Owner("report", "job-1")

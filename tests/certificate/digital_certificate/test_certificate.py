@@ -21,8 +21,7 @@ from cmm_uq.certificate.digital_certificate.conformity import IN_THE_SCHEMA
 from cmm_uq.certificate.results.plain import as_json
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.dcc import Certificate, read, written
-from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity
-from cmm_uq.jobs.dcc.certificate import StatementMetadata as Statement
+from cmm_uq.jobs.dcc.certificate import DccQuantity as Quantity, StatementMetadata as Statement
 from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Interval, Real, RealList
 from cmm_uq.jobs.job import Job
 from tests.artefacts.simulated import results

@@ -5,8 +5,7 @@ from __future__ import annotations
 from math import isclose
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.units import UNITS, unit
 from cmm_uq.certificate.digital_certificate.quantities import dsi_of, product, ratio, unit_of

@@ -22,7 +22,7 @@ from cmm_uq.base.units import ARCSECOND, unit
 from cmm_uq.certificate.document import Paragraph, Section, Table
 from cmm_uq.certificate.part.other_methods import methods_data, methods_section
 from cmm_uq.certificate.part.page import part_document
-from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, Line
+from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 from tests.certificate.parts_found import found_of, measured_points
 from tests.certificate.saying import leaves, said
 from tests.jobs.part.other_methods import SIZE, with_methods
@@ -100,7 +100,7 @@ def test_it_stands_on_the_part_s_page(comparison: MethodComparison) -> None:
 
 def test_angles_are_in_degrees_and_seconds() -> None:
     budget = Budget(
-        say("b"), [Line(say("all"), 2 * ARCSECOND, REPEATS, unit=unit("rad"))], 0.0, unit("rad"), factor=2.0
+        say("b"), [BudgetLine(say("all"), 2 * ARCSECOND, REPEATS, unit=unit("rad"))], 0.0, unit("rad"), factor=2.0
     )
     figure = MethodFigure("a", budget, float(np.radians(30.0)))
     stating = MethodStatement("orientations", figure.value, figure.u, figure.U)

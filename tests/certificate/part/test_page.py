@@ -35,8 +35,7 @@ from cmm_uq.certificate.part.results_section import results_section
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf
 from cmm_uq.jobs.part.job import TABLES
-from tests.certificate.parts_found import ERRORS, found_of, measured_points
-from tests.certificate.parts_found import STANDING as CERTIFICATE
+from tests.certificate.parts_found import ERRORS, STANDING as CERTIFICATE, found_of, measured_points
 from tests.certificate.saying import leaves, strangers
 from tests.certificate.test_customers_words import mentioned
 from tests.certificate.test_html_layout import LABELS_COLLIDING, OVERLAPS

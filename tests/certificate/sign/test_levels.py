@@ -15,7 +15,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import AuthorityInformationAccessOID, ExtendedKeyUsageOID
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign import Level, Signature, Stamping, Trust, sign_pdf, signatures_of_pdf
+from cmm_uq.certificate.sign import FileSignature, Level, Stamping, Trust, sign_pdf, signatures_of_pdf
 from tests.certificate.sign.authority import LAST, SIGNED, Held, curve_key, issued, root, usage
 from tests.certificate.sign.responders import REPLY, revocations, serving, stamps, status
 
@@ -117,7 +117,7 @@ def test_who_does_not_trust_the_time_stamp_has_only_the_signers_word(
     assert found.trusted
 
 
-def revoked(pdf: bytes, world: World, level: Level, since: dt.datetime) -> Signature:
+def revoked(pdf: bytes, world: World, level: Level, since: dt.datetime) -> FileSignature:
     given = Trust(world.trust.anchors, (revocations(world.anchor, (world.signer.certificate.serial_number, since)),))
     signed = world.signed(pdf, level) if level != "B-B" else sign_pdf(pdf, world.signer.signer, seal=None, at=SIGNED)
     (found,) = signatures_of_pdf(signed, given)

@@ -12,17 +12,16 @@ from pathlib import Path
 import pikepdf
 import pytest
 from cryptography.hazmat.primitives.serialization import Encoding
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign import Signature, Trust, sign_pdf, signatures_of_pdf
+from cmm_uq.certificate.sign import FileSignature, Trust, sign_pdf, signatures_of_pdf
 from tests.certificate.sign.authority import LAST, SIGNED, Held, curve_key, issued, usage
 
 DER = Encoding.DER
 
 
-def only(found: tuple[Signature, ...]) -> Signature:
+def only(found: tuple[FileSignature, ...]) -> FileSignature:
     assert len(found) == 1
     return found[0]
 
@@ -48,7 +47,7 @@ def test_every_byte_of_the_document_stays_as_it_was(pdf: bytes, signed: bytes) -
 def test_it_is_made_and_found_where_a_loop_runs_already(pdf: bytes, signed: bytes, held: Held, trust: Trust) -> None:
     """As in a notebook."""
 
-    async def inside() -> tuple[bytes, Signature]:
+    async def inside() -> tuple[bytes, FileSignature]:
         return sign_pdf(pdf, held.signer, seal=None, at=SIGNED, reason="approval"), only(
             signatures_of_pdf(signed, trust)
         )

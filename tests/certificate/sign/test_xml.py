@@ -11,12 +11,11 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric import rsa
 from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from lxml import etree
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign import Signature, Trust, sign_xml, signatures_of_xml
+from cmm_uq.certificate.sign import FileSignature, Trust, sign_xml, signatures_of_xml
 from tests.certificate.sign.authority import FIRST, LAST, SIGNED, Held, curve_key, issued, root, usage
 from tests.conftest import ROOT
 
@@ -24,7 +23,7 @@ DS = "{http://www.w3.org/2000/09/xmldsig#}"
 XADES = "{http://uri.etsi.org/01903/v1.3.2#}"
 
 
-def only(found: tuple[Signature, ...]) -> Signature:
+def only(found: tuple[FileSignature, ...]) -> FileSignature:
     assert len(found) == 1
     return found[0]
 
@@ -47,7 +46,7 @@ def test_what_was_verified_is_the_root_without_its_signature(xml: bytes, signed:
 
 def test_properties_that_are_of_another_signature_by_their_target_do_not_count(signed: bytes, trust: Trust) -> None:
     """No signature covers its own name; what is signed says whose properties it is (XAdES, EN 319 132-1, 5.1)."""
-    (name,) = {one.get("Id") for one in etree.fromstring(signed).iter(f"{DS}Signature")}
+    (name,) = {one.get("Id") for one in etree.fromstring(signed).iter(f"{DS}FileSignature")}
     other = signed.replace(f'Id="{name}"'.encode(), f'Id="{name}9"'.encode(), 1)
     assert only(signatures_of_xml(other, trust)).problems == ("the signed properties are not those of this signature",)
 
@@ -104,7 +103,7 @@ def test_the_signature_stands_where_the_schema_of_the_dcc_has_it() -> None:
     sequence = etree.parse(schema).find(f"{own}/{xs}complexType/{xs}sequence")
     if sequence is None:
         sequence = etree.parse(schema).find(f"{xs}complexType[@name='digitalCalibrationCertificateType']/{xs}sequence")
-    assert [one.get("ref") for one in sequence.iterchildren(f"{xs}element")][-1] == "ds:Signature"
+    assert [one.get("ref") for one in sequence.iterchildren(f"{xs}element")][-1] == "ds:FileSignature"
 
 
 @settings(max_examples=40)

@@ -6,8 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.importing.imported import ImportedTable, imported

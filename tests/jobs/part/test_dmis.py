@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.jobs.part.dmis import drawing_of_dmis

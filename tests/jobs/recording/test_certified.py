@@ -23,8 +23,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import Artefact
 from tests.conftest import ROOT
 from tests.jobs.dcc.artefacts import BALL_BAR, PLATE, SPHERE, STEP_GAUGE, TRIANGLE, issued, listed, value
-from tests.jobs.recording.test_references import GAUGE
-from tests.jobs.recording.test_references import PLATE as PLATE_RECORDING
+from tests.jobs.recording.test_references import GAUGE, PLATE as PLATE_RECORDING
 
 EXAMPLE = {
     "ballbar": "iota-1102-20C", "bryan": "bryan-simulated", "sphere": "sphere-simulated", "triangle": "triangle-simulated",

@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.jobs.tables.conformity import ConformityFacts
 from cmm_uq.jobs.tables.length_formula import Growing, factor_of, growing_of, mpe_of

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.points import Floats
 from cmm_uq.laboratory.due.drift import YEAR, DriftHistory, DriftPrior, default_prior, side_by_side

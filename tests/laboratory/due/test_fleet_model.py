@@ -7,8 +7,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from cmm_uq.base.points import Floats
-from cmm_uq.laboratory.due import drift as drift_prior
-from cmm_uq.laboratory.due import drift_filter, fleet_model
+from cmm_uq.laboratory.due import drift as drift_prior, drift_filter, fleet_model
 from cmm_uq.laboratory.due.drift import MEDIANS, NAMES, USUAL_RATE_SD, YEAR, learnt_prior, side_by_side
 from cmm_uq.laboratory.due.fleet_model import messages, others, shared_by, together
 from tests.laboratory.due.histories import machine

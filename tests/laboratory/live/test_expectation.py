@@ -11,13 +11,13 @@ from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.laboratory.live.expectation import RARE, predicted, scatter
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.conftest import ROOT
 from tests.recordings import bar_facts
 
 
-def left_out(model: MeasurementModel, row: int, sigma: float) -> tuple[float, float]:
+def left_out(model: RecordingModel, row: int, sigma: float) -> tuple[float, float]:
     linear = model.linearised(np.array([unknown.prior_mean for unknown in model.unknowns]))
     place = linear.freedoms.dense()
     whole = np.hstack([linear.design, place]) / linear.noise_scale[:, None]
@@ -49,14 +49,14 @@ def test_it_is_what_a_fit_without_the_observation_leaves(name: str) -> None:
         assert found.u[row] == pytest.approx(u, rel=1e-4)
 
 
-def repeated(errors_um: Floats, machine: Machine) -> MeasurementModel:
+def repeated(errors_um: Floats, machine: Machine) -> RecordingModel:
     count, repeats = errors_um.shape
     m, r = (a.ravel() for a in np.meshgrid(np.arange(1, count + 1), np.arange(1, repeats + 1), indexing="ij"))
     first = np.column_stack([100.0 + 0 * m, 100.0 + 10 * m, -300.0 + 0 * m])
     second = first + np.column_stack([400 + errors_um.ravel() * MICROMETRE, 0 * m, 0 * m])
     one = np.ones(len(m), dtype=np.int64)
     points = Points(np.vstack([first, second]), np.tile(m, 2), np.concatenate([one, 2 * one]), np.tile(r, 2), machine)
-    return MeasurementModel(Ballbar(bar_facts(400.0, 0.5), points), effects(["scale_x"]))
+    return RecordingModel(Ballbar(bar_facts(400.0, 0.5), points), effects(["scale_x"]))
 
 
 def test_the_scatter_of_repeats_is_judged_against_that_of_the_others_by_f(machine: Machine) -> None:

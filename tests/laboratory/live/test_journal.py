@@ -7,8 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.laboratory.live.folder import begin, read_story, sessions_in

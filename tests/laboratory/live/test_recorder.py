@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.laboratory.live.instruments.source import Reading

@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.base.errors import CmmUqError, OutputError
-from cmm_uq.laboratory.records import open_records
-from cmm_uq.laboratory.records import opening as openings
+from cmm_uq.laboratory.records import open_records, opening as openings
 from cmm_uq.laboratory.records.place import place_of, shown
 from tests.laboratory.records.histories import history
 

@@ -10,7 +10,7 @@ import pytest
 
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import with_curvature
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import effects
@@ -49,7 +49,7 @@ def lengths(points: Points, values: Floats) -> Floats:
     return np.sqrt((sx * x) ** 2 + (sy * y) ** 2 - 2 * sx * sy * np.sin(ARCSEC * values[:, 2:3]) * x * y + z**2)
 
 
-def linear_draws(model: MeasurementModel, seed: int = 1, steps: int = 100, walkers: int = 60) -> NoisyPosterior:
+def linear_draws(model: RecordingModel, seed: int = 1, steps: int = 100, walkers: int = 60) -> NoisyPosterior:
     """Exact draws of the linear model about its estimate, the noise known."""
     sigma = model.sigma or SIGMA
     mean, covariance, _ = Density(model.estimate().linear).conditional(float(np.log(sigma)))
@@ -86,7 +86,7 @@ def by_emcee(points: Points) -> Floats:
 
 def test_bent_draws_are_those_of_emcee_on_the_exact_density(parallel: Points) -> None:
     """Draws of the linear model would predict lengths with several times the spread that the bars allow."""
-    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.0), parallel), effects(PLANE), SIGMA)
+    model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.0), parallel), effects(PLANE), SIGMA)
     straight = linear_draws(model)
     bent = with_curvature(model, noise_of(model), straight)
     exact = by_emcee(parallel)
@@ -101,14 +101,14 @@ def test_bent_draws_are_those_of_emcee_on_the_exact_density(parallel: Points) ->
 def test_where_a_model_is_straight_its_draws_are_left_alone() -> None:
     """Thirty bars in all directions, noise of 1 µm: even 1500″ bend it by less than a fiftieth of an uncertainty."""
     points = recorded(np.array([500.0, -500.0, 300.0, 1500.0, -1500.0, 900.0]), sigma=1e-3, count=30)
-    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), 1e-3)
+    model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), 1e-3)
     straight = linear_draws(model, steps=10, walkers=20)
     assert with_curvature(model, noise_of(model), straight) is straight
 
 
 def test_small_angles_are_not_even_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
     points = recorded(np.array([500.0, -500.0, 300.0, 60.0, -60.0, 40.0]), sigma=SIGMA, count=30)
-    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), SIGMA)
+    model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), SIGMA)
     straight = linear_draws(model, steps=10, walkers=20)
     monkeypatch.setattr("cmm_uq.machine.model.measurement.bend", lambda *_: pytest.fail("looked"))
     assert with_curvature(model, noise_of(model), straight) is straight
@@ -119,7 +119,7 @@ def test_the_posterior_is_linear_where_priors_put_the_angle(parallel: Points) ->
 
     By hand: sx + sy − S = −1500″ of which S has 500²/(500² + 2·61.9²) = 0.970, 300 ppm being 61.9″.
     """
-    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), parallel), effects(SIX), SIGMA)
+    model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.5), parallel), effects(SIX), SIGMA)
     estimate = model.estimate()
     angle = estimate.about[SIX.index("squareness_xy")]
     assert angle == pytest.approx(0.970 * 1500, abs=3)
@@ -130,7 +130,7 @@ def test_the_posterior_is_linear_where_priors_put_the_angle(parallel: Points) ->
 
 def test_a_well_measured_machine_is_linear_about_its_estimate() -> None:
     points = recorded(np.array([0.0, 0, 0, 1500.0, -1500.0, 900.0]), sigma=1e-3)
-    model = MeasurementModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), 1e-3)
+    model = RecordingModel(Ballbar(bar_facts(LENGTH, 0.5), points), effects(SIX), 1e-3)
     estimate = model.estimate()
     assert estimate.about is estimate.least_squares.value or np.array_equal(
         estimate.about, estimate.least_squares.value

@@ -10,12 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.recordings import TRAVEL, bar_facts, bars
 
@@ -45,8 +44,8 @@ def recorded(truth: Floats, sigma: float = 0.0, seed: int = 0, count: int = 60, 
     return points.at(read + sigma * random.standard_normal(read.shape))
 
 
-def model_of(points: Points, length: float | None = LENGTH, sigma: float = 1e-3) -> MeasurementModel:
-    return MeasurementModel(Ballbar(bar_facts(length, 0.5), points), effects(SIX), sigma)
+def model_of(points: Points, length: float | None = LENGTH, sigma: float = 1e-3) -> RecordingModel:
+    return RecordingModel(Ballbar(bar_facts(length, 0.5), points), effects(SIX), sigma)
 
 
 @pytest.mark.parametrize("truth", MACHINES.values(), ids=MACHINES.keys())

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Machine, Points
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.physics.catalogue import effects
 from tests.recordings import TRAVEL, bar_facts, bars
 
@@ -21,13 +20,13 @@ VALUES = np.array([250.0, -90.0, 30.0, -173.0, -19.0, 210.0])
 
 
 def simulated(points: Points, true_length: float, sigma: float = 0.0, seed: int = 0) -> Points:
-    model = MeasurementModel(Ballbar(bar_facts(), points), effects(SIX))
+    model = RecordingModel(Ballbar(bar_facts(), points), effects(SIX))
     random = np.random.default_rng(seed)
     return points.at(model.simulate(VALUES, np.array([true_length]), Noise(coordinate=sigma), random))
 
 
-def estimated(points: Points, length: float | None = 400.0, sigma: float | None = 1e-3) -> MeasurementModel:
-    return MeasurementModel(Ballbar(bar_facts(length), points), effects(SIX), sigma)
+def estimated(points: Points, length: float | None = 400.0, sigma: float | None = 1e-3) -> RecordingModel:
+    return RecordingModel(Ballbar(bar_facts(length), points), effects(SIX), sigma)
 
 
 def test_a_recording_without_noise_gives_back_the_truth(ballbar_points: Points) -> None:
@@ -96,7 +95,7 @@ def test_coverage_of_the_least_squares_interval_is_95_percent() -> None:
 
 def test_the_length_of_the_bar_carries_its_uncertainty_into_the_scales(ballbar_points: Points) -> None:
     facts = bar_facts(400.0, 4.0)
-    model = MeasurementModel(Ballbar(facts, simulated(ballbar_points, 400.0)), effects(SIX), 1e-9)
+    model = RecordingModel(Ballbar(facts, simulated(ballbar_points, 400.0)), effects(SIX), 1e-9)
     found = model.estimate().least_squares
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance))[:3], 4e-3 / 400 * 1e6, rtol=1e-3)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance))[3:6], 0, atol=2e-2)
@@ -107,7 +106,7 @@ def test_measurements_set_aside_do_not_count(ballbar_points: Points) -> None:
     spoiled = points.xyz.copy()
     spoiled[0] += 1.0
     used = np.arange(40) > 0
-    model = MeasurementModel(Ballbar(bar_facts(), points.at(spoiled)), effects(SIX), 1e-3, used)
+    model = RecordingModel(Ballbar(bar_facts(), points.at(spoiled)), effects(SIX), 1e-3, used)
     found = model.estimate().least_squares
     np.testing.assert_allclose(found.value[:6], VALUES, atol=1e-6)
     assert abs(model.residuals(found.value)[0]) > 0.1
@@ -122,7 +121,7 @@ def test_a_placing_is_off_by_the_same_in_all_its_repeats(ballbar_points: Points)
         repeat=np.tile([1, 2], len(ballbar_points)),
         lines=np.zeros(0, dtype=np.int64),
     )
-    model = MeasurementModel(Ballbar(bar_facts(), twice), effects([]))
+    model = RecordingModel(Ballbar(bar_facts(), twice), effects([]))
     drawn = model.simulate(np.zeros(0), np.array([400.0]), Noise(placing=2e-3), np.random.default_rng(3)) - twice.xyz
     np.testing.assert_array_equal(drawn[::2], drawn[1::2])
     assert drawn.std() == pytest.approx(2e-3, rel=0.2)
@@ -130,19 +129,19 @@ def test_a_placing_is_off_by_the_same_in_all_its_repeats(ballbar_points: Points)
 
 def test_an_effect_with_a_period_needs_that_period(ballbar_points: Points) -> None:
     artefact = Ballbar(bar_facts(), ballbar_points)
-    held = MeasurementModel(artefact, effects(["periodic_scale_x"]), shapes={"periodic_scale_x": (40.0,)})
+    held = RecordingModel(artefact, effects(["periodic_scale_x"]), shapes={"periodic_scale_x": (40.0,)})
     assert held.estimate().least_squares.rank == 2
 
 
 def test_a_period_is_not_estimated_here(ballbar_points: Points) -> None:
     with pytest.raises(CmmUqError, match="nonlinear parameter period_mm"):
-        MeasurementModel(Ballbar(bar_facts(), ballbar_points), effects(["periodic_scale_x"]))
+        RecordingModel(Ballbar(bar_facts(), ballbar_points), effects(["periodic_scale_x"]))
 
 
 def test_draws_of_one_effect_are_reported_beside_others_whose_shape_is_not_held(ballbar_points: Points) -> None:
     """The columns of a periodic error come before those of the squareness that is asked for."""
     named = effects(["periodic_scale_x", "squareness_xy"])
-    model = MeasurementModel(Ballbar(bar_facts(400.0), ballbar_points), named, shapes={"periodic_scale_x": (50.0,)})
+    model = RecordingModel(Ballbar(bar_facts(400.0), ballbar_points), named, shapes={"periodic_scale_x": (50.0,)})
     ((key, (values, _)),) = model.reported(np.array([[1.0, 2.0, 3.0, 4.0]]), ["squareness_xy"]).items()
     assert key == ("squareness_xy", "angle_arcsec")
     assert values.tolist() == [3.0]
@@ -156,4 +155,4 @@ def test_bars_between_places_that_have_nothing_to_do_with_each_other_are_no_mach
     ends *= 400 / np.linalg.norm(ends[::2] - ends[1::2], axis=1).mean()
     six = ["scale_x", "scale_y", "scale_z", "squareness_xy", "squareness_yz", "squareness_zx"]
     with pytest.raises(CmmUqError, match="they are no machine's"):
-        MeasurementModel(Ballbar(bar_facts(), twelve.at(ends)), effects(six)).estimate()
+        RecordingModel(Ballbar(bar_facts(), twelve.at(ends)), effects(six)).estimate()

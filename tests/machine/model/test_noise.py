@@ -12,7 +12,7 @@ from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_facts, artefact_of, kind_of
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import mean_and_contrasts, noise_of
 from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Sizes
 from tests.artefacts.constructions import plate
@@ -20,7 +20,7 @@ from tests.artefacts.constructions import plate
 EXAMPLES = Path(__file__).parents[3] / "examples"
 
 
-def example(name: str, repeats: int = 1, *, timed: bool = False) -> MeasurementModel:
+def example(name: str, repeats: int = 1, *, timed: bool = False) -> RecordingModel:
     """The model of an example, each row read so many times, perhaps one a minute."""
     job = read_job(EXAMPLES / name)
     points = job.points
@@ -34,10 +34,10 @@ def example(name: str, repeats: int = 1, *, timed: bool = False) -> MeasurementM
     )  # fmt: skip
     model, _ = screened_model(job)
     observe = kind_of(job).observing("tested")
-    return MeasurementModel(observe(job.facts.artefact, read, where="recording"), model.effects)
+    return RecordingModel(observe(job.facts.artefact, read, where="recording"), model.effects)
 
 
-def seen(model: MeasurementModel, noise: Noise, draws: int) -> Floats:
+def seen(model: RecordingModel, noise: Noise, draws: int) -> Floats:
     """Observations (draws, m), mm, of noise drawn at the points."""
     random = np.random.default_rng(8)
     each = np.stack([noise.drawn(model.artefact.points, random) for _ in range(draws)], axis=2)
@@ -92,7 +92,7 @@ def test_the_last_digits_of_a_square_plate_do_not_decide_whether_noise_may_grow(
             twice, xyz=(twice.xyz + random.normal(0, sd, twice.xyz.shape))[order], measurement=twice.measurement[order],
             point=twice.point[order], repeat=twice.repeat[order], columns={k: v[order] for k, v in twice.columns.items()},
         )  # fmt: skip
-        possible = noise_of(MeasurementModel(artefact_of(facts, read), ())).possible
+        possible = noise_of(RecordingModel(artefact_of(facts, read), ())).possible
         assert (GROWTH in possible) is grows, sd
 
 

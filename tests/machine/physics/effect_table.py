@@ -10,7 +10,7 @@ import numpy as np
 from cmm_uq.app.commands.reading import read_job
 from cmm_uq.artefacts import artefact_of
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import CATALOGUE, EVERY, FURTHER, OWN
 from cmm_uq.machine.physics.effect import Effect, Parameter, Shape
@@ -78,7 +78,7 @@ def seen_by(effect: Effect, artefact: Artefact) -> bool:
         return False
     sizes = [c.prior_sd for c in effect.coefficients]
     effect = artefact.acting(effect)
-    model = MeasurementModel(artefact, ())
+    model = RecordingModel(artefact, ())
     values = np.array([size.nominal for size in artefact.sizes])
     shape = list(effect.trials())[-4 if effect.shape else 0]
     basis = effect.basis(points, shape) * (sizes if len(sizes) == len(effect.coefficients) else sizes[0])

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Machine, Points
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.machine.physics.compensation import Circumstances, Compensation, compensate_points, machine_compensation
+from cmm_uq.machine.physics.compensation import Compensation, PointConditions, compensate_points, machine_compensation
 from cmm_uq.machine.physics.error_map import AxisErrors, ErrorMap, read_error_map
 from cmm_uq.machine.physics.map_interpolation import ErrorMaps
 
@@ -40,7 +39,7 @@ def recording(columns: dict[str, np.ndarray] | None = None, n: int = 4) -> Point
 def test_there_and_back_again_is_closer_than_a_nanometre(seed, chain, rigid):
     compensation = Compensation(maps(), chain, (0.0, 0.0, 0.0), rigid)
     indicated = somewhere(50, seed)
-    when = Circumstances(tip=np.array([20.0, -30, -150]))
+    when = PointConditions(tip=np.array([20.0, -30, -150]))
     true, _ = compensation.compensate(indicated, when)
     again, _ = compensation.indicated_from_true(true, when)
     assert np.abs(again - indicated).max() < 1e-9
@@ -101,7 +100,7 @@ def test_the_recordings_own_tips_and_temperatures_count():
     tips = {f"tip_{a}_mm": np.array([0.0, 50, -50, 100]) for a in "xyz"}
     points = recording(tips)
     compensation = machine_compensation(points, maps())
-    expected, _ = compensation.compensate(points.xyz, Circumstances(tip=np.tile(tips["tip_x_mm"], (3, 1)).T))
+    expected, _ = compensation.compensate(points.xyz, PointConditions(tip=np.tile(tips["tip_x_mm"], (3, 1)).T))
     np.testing.assert_array_equal(compensate_points(points, compensation).xyz, expected)
     hot = recording({f"temp_{a}_c": np.array([20.0, 20.2, 28, 20]) for a in "xyz"})
     with pytest.raises(CmmUqError, match="line 4: a scale is at"):

@@ -2,13 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.machine.physics.kinematics import (
     PARAMETRIC_ERRORS,
-    Chain,
+    KinematicChain,
     axis_directions,
     carried_offset,
     exact,
@@ -181,14 +180,14 @@ def test_no_other_name_is_an_error(name):
 
 @pytest.mark.parametrize("chain", CHAINS)
 def test_chains_are_written_as_they_are_read(chain):
-    assert Chain.of(chain).letters == chain
+    assert KinematicChain.of(chain).letters == chain
 
 
 def test_the_frame_may_be_named_where_every_carriage_moves_the_probe():
-    assert Chain.of("FXYZ") == Chain.of("xyz") == Chain()
+    assert KinematicChain.of("FXYZ") == KinematicChain.of("xyz") == KinematicChain()
 
 
 @pytest.mark.parametrize("chain", ["XY", "XXZ", "XYZA", "XFYFZ", ""])
 def test_no_other_chain_is_one(chain):
     with pytest.raises(CmmUqError, match="no chain of three carriages"):
-        Chain.of(chain)
+        KinematicChain.of(chain)

@@ -11,7 +11,7 @@ from scipy.stats import binom
 from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import EVERY, OWN, effects
 from cmm_uq.machine.physics.effect import CommonSize, Effect
@@ -207,7 +207,7 @@ def test_a_kind_has_only_the_faults_that_it_can_have(facts: object, points: Poin
     artefact = artefact_of(facts, points)  # type: ignore[arg-type]
     assert set(artefact.faults) == has
     with pytest.raises(CmmUqError, match="has no artefact_pattern"):
-        MeasurementModel(artefact, effects(["artefact_pattern"]))
+        RecordingModel(artefact, effects(["artefact_pattern"]))
 
 
 def test_a_certificate_leaves_less_than_a_drawing_and_is_rarely_thought_of() -> None:

@@ -13,7 +13,7 @@ from cmm_uq.maths.uncertainty.budget import (
     JUDGEMENT,
     REPEATS,
     Budget,
-    Line,
+    BudgetLine,
     budget_of,
     joint_line,
 )
@@ -27,19 +27,21 @@ def end_gauge() -> Budget:
     d = Budget(
         "d",
         [
-            Line("repeated observations", 5.8, REPEATS, dof=24),
-            Line("random effects of the comparator", 3.9, CERTIFICATE, dof=5),
-            Line("systematic effects of the comparator", 6.7, CERTIFICATE, dof=8),
+            BudgetLine("repeated observations", 5.8, REPEATS, dof=24),
+            BudgetLine("random effects of the comparator", 3.9, CERTIFICATE, dof=5),
+            BudgetLine("systematic effects of the comparator", 6.7, CERTIFICATE, dof=8),
         ],
         215.0,
     )
     return Budget(
         "l",
         [
-            Line("standard", 25.0, CERTIFICATE, 50000623.0, "nm", dof=18),
+            BudgetLine("standard", 25.0, CERTIFICATE, 50000623.0, "nm", dof=18),
             d.as_line("difference"),
-            Line("expansion", 1e-6 / sqrt(3), JUDGEMENT, 0.0, "1/°C", "rectangular", 50, sensitivity=50000623 * 0.1),
-            Line(
+            BudgetLine(
+                "expansion", 1e-6 / sqrt(3), JUDGEMENT, 0.0, "1/°C", "rectangular", 50, sensitivity=50000623 * 0.1
+            ),
+            BudgetLine(
                 "temperature", 0.05 / sqrt(3), JUDGEMENT, 0.0, "°C", "rectangular", 2, sensitivity=-50000623 * 11.5e-6
             ),
         ],
@@ -119,14 +121,14 @@ def test_rows_of_text() -> None:
     assert rows[-1] == (
         "temperature", "0.000", "0.029", "°C", "rectangular", "2", "−575", "17", "27.5 %", "judgement",
     )  # fmt: skip
-    joint = Budget("y", [Line("x", 1.0, JUDGEMENT), joint_line("correlation of a, b", -0.25)]).as_text()[1]
+    joint = Budget("y", [BudgetLine("x", 1.0, JUDGEMENT), joint_line("correlation of a, b", -0.25)]).as_text()[1]
     assert joint == ("correlation of a, b", "", "", "", "", "", "", "−0.50", "−33.3 %", "model")
 
 
 def test_what_no_line_can_be_is_refused() -> None:
     with pytest.raises(CmmUqError, match="budget line 'x'"):
-        Line("x", -1.0, JUDGEMENT)
+        BudgetLine("x", -1.0, JUDGEMENT)
     with pytest.raises(CmmUqError, match="degrees of freedom"):
-        Line("x", 1.0, JUDGEMENT, dof=0.5)
+        BudgetLine("x", 1.0, JUDGEMENT, dof=0.5)
     with pytest.raises(CmmUqError, match="standard uncertainty of inf"):
-        Line("x", inf, JUDGEMENT)
+        BudgetLine("x", inf, JUDGEMENT)

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.expression import LONGEST, name_problem, parse

@@ -10,14 +10,14 @@ import pytest
 from scipy import integrate, stats
 
 from cmm_uq.maths.uncertainty import shapes
-from cmm_uq.maths.uncertainty.shapes import Shape
+from cmm_uq.maths.uncertainty.shapes import DistributionShape
 
 N = 1_000_000
 KS = 2.225 / np.sqrt(N)
 """Kolmogorov's distance that one sample of ten thousand exceeds: P = 2·exp(−2·2.225²)."""
 P = np.array([1e-6, 0.01, 0.02625, 0.1, 0.125, 0.2686, 0.3, 0.4999, 0.5, 0.5001, 0.7, 0.875, 0.99, 1 - 1e-6])
 
-PEERS: dict[str, tuple[Callable[[], Shape], Any]] = {
+PEERS: dict[str, tuple[Callable[[], DistributionShape], Any]] = {
     "normal": (lambda: shapes.NORMAL, stats.norm()),
     "rectangular": (lambda: shapes.RECTANGULAR, stats.uniform(-1, 2)),
     "triangular": (lambda: shapes.TRIANGULAR, stats.triang(0.5, -1, 2)),
@@ -81,7 +81,7 @@ def test_a_rectangle_of_uncertain_width_is_the_mean_of_rectangles(doubt: float) 
 
 
 @pytest.mark.parametrize("shape", [shapes.RECTANGULAR, shapes.TRIANGULAR, shapes.ARCSINE, shapes.trapezoidal(0.4)])
-def test_a_bounded_shape_reaches_from_minus_one_to_one(shape: Shape) -> None:
+def test_a_bounded_shape_reaches_from_minus_one_to_one(shape: DistributionShape) -> None:
     ends = shape.inverse(np.array([0.0, 1.0]))
     np.testing.assert_allclose(ends, [-1.0, 1.0], atol=1e-15)
     draws = shape.draw(np.random.default_rng(3), N)

@@ -15,7 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect, Nonparametric
@@ -91,7 +91,7 @@ def effect_of(explanation: Explanation) -> Effect:
     return every()[explanation.name] if explanation.effect is None else explanation.effect
 
 
-def known_effects(model: MeasurementModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
+def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
     """Every effect of the catalogue that could act here and is not named in the model already.
 
     ``values`` (k,) parameters about which it is linear.
@@ -139,7 +139,7 @@ def possible_effects(artefact: Artefact) -> Iterator[Effect]:
             yield artefact.faults[effect.name]
 
 
-def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
+def _roughly(model: RecordingModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
     """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
     along = effect.course(points)
     if along is None:
@@ -158,7 +158,7 @@ def _roughly(model: MeasurementModel, effect: Effect, points: Points, values: Fl
         yield Member(columns, weight=_ROUGH / (1 - _ROUGH) / len(forms), rough=True)
 
 
-def refine(model: MeasurementModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
+def refine(model: RecordingModel, values: Floats, explanation: Explanation, members: Iterable[int]) -> Explanation:
     """An explanation with some of its shapes divided: each gives way to five about it that share its weight."""
     effect = explanation.effect
     if effect is None:
@@ -179,7 +179,7 @@ def refine(model: MeasurementModel, values: Floats, explanation: Explanation, me
     return replace(explanation, members=tuple(kept))
 
 
-def with_shorter_periods(model: MeasurementModel, values: Floats, explanation: Explanation) -> Explanation:
+def with_shorter_periods(model: RecordingModel, values: Floats, explanation: Explanation) -> Explanation:
     """A periodic effect with the periods below those that are searched: between positions at equal distances they fit as well.
 
     Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
@@ -241,6 +241,6 @@ def shapes(effect: Effect, points: Points) -> Iterator[tuple[float, ...]]:
         yield (float(1 / frequency),)
 
 
-def _seen(model: MeasurementModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:
+def _seen(model: RecordingModel, effect: Effect, points: Points, shape: tuple[float, ...], values: Floats) -> Floats:
     scale = np.array([c.prior_sd for c in effect.coefficients])
     return model.seen(model.columns(effect, shape, values) * scale, values)

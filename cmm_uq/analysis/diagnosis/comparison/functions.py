@@ -11,7 +11,7 @@ from cmm_uq.analysis.diagnosis.comparison.explanations import UNKNOWN, UNKNOWN_S
 from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.jobs.columns import in_words
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.effect import Effect, Nonparametric
 
 LENGTH_SCALES = (0.6, 0.25, 0.1)  # of smooth functions, in parts of the covariate's range
@@ -37,7 +37,7 @@ _KEPT = 1e-3
 _GRID = 60
 
 
-def unknown_functions(model: MeasurementModel, values: Floats) -> list[Explanation]:
+def unknown_functions(model: RecordingModel, values: Floats) -> list[Explanation]:
     """Nonparametric terms, smooth or with one jump.
 
     Errors along each axis of each reading and of the place, scales of time, and anything of each covariate of the
@@ -58,7 +58,7 @@ def unknown_functions(model: MeasurementModel, values: Floats) -> list[Explanati
     return found
 
 
-def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+def _of_readings(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
     for axis, readings in points.readings.items():
         if np.ptp(readings) < 1.0:
             continue
@@ -74,7 +74,7 @@ def _of_readings(model: MeasurementModel, points: Points, values: Floats) -> Ite
             yield Explanation(name, UNKNOWN, members, readings, term.of, term)
 
 
-def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+def _of_place(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
     if np.sum(np.ptp(points.machine_xyz, axis=0) > 1.0) < 2:
         return
     factors = list(_smooth_in_space(points.machine_xyz))
@@ -87,7 +87,7 @@ def _of_place(model: MeasurementModel, points: Points, values: Floats) -> Iterat
         )
 
 
-def _of_time(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+def _of_time(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
     time = points.columns.get("time_s")
     if time is None or len(np.unique(time)) < 3:
         return
@@ -115,7 +115,7 @@ def _in_proportion(effect: Effect, points: Points, axis: str) -> bool:
     return bool(factor and np.allclose(moved, factor * read, atol=1e-9 * abs(factor) * np.abs(read).max()))
 
 
-def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
+def _of_direction(model: RecordingModel) -> Iterator[Explanation]:
     """Anything of the direction in which points were probed, where there are many; and lobes about Z."""
     among = directions(model)
     if len(np.unique(np.round(among, 3), axis=0)) < _MANY_DIRECTIONS:
@@ -128,7 +128,7 @@ def _of_direction(model: MeasurementModel) -> Iterator[Explanation]:
     yield Explanation(say("error in lobes about Z"), UNKNOWN, members, np.degrees(azimuth), "azimuth_deg")
 
 
-def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> Iterator[Explanation]:
+def _of_all_scales(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
     """One scale of all axes, about their zero or their middle, as a function of each further column."""
     readings = points.carriages
     middle = 0.5 * (readings.min(axis=0) + readings.max(axis=0))
@@ -147,7 +147,7 @@ def _of_all_scales(model: MeasurementModel, points: Points, values: Floats) -> I
         )
 
 
-def directions(model: MeasurementModel) -> Floats:
+def directions(model: RecordingModel) -> Floats:
     """Unit vectors (m, 3) along which used observations see a point move; zero where they see differences of points."""
     points = model.artefact.points
     values = model.estimate().about
@@ -162,7 +162,7 @@ def _along(axis: int, factor: Floats) -> Floats:
     return displacement
 
 
-def covariates(model: MeasurementModel) -> dict[str, Floats]:
+def covariates(model: RecordingModel) -> dict[str, Floats]:
     """What each used observation may depend on, (m,): the mean of every recorded column, and its place in the order of time.
 
     Without a time the order of rows says nothing: whoever sorted them is no cause.
@@ -181,7 +181,7 @@ def covariates(model: MeasurementModel) -> dict[str, Floats]:
     return kept
 
 
-def mean_of(model: MeasurementModel, values: Floats) -> Floats:
+def mean_of(model: RecordingModel, values: Floats) -> Floats:
     """Mean of a column (n,) over the points of each used observation, (m,)."""
     return np.asarray(values[model.artefact.rows].mean(axis=1)[model.used], dtype=np.float64)
 

@@ -31,7 +31,7 @@ from cmm_uq.analysis.diagnosis.comparison.lack_of_fit import NOTHING, lack_of_fi
 from cmm_uq.analysis.diagnosis.noise import sigma_grid
 from cmm_uq.analysis.diagnosis.noise_shapes import noise_kinds
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.measurement import SMALL_LEAN
 from cmm_uq.machine.model.noise import display_of
 
@@ -67,7 +67,7 @@ class ModelComparison:
     largest log evidence of a nonparametric term over nothing, under nothing.
     """
 
-    model: MeasurementModel
+    model: RecordingModel
     values: Floats
     comparison: CandidateComparison
     log_odds: Floats
@@ -98,7 +98,7 @@ class SearchResult:
     combinations: Combinations | None
     chosen: Key
     versions: tuple[Version, ...]
-    model: MeasurementModel
+    model: RecordingModel
     unexplained: float
     rough: Key = frozenset()
     stated: float | None = None
@@ -108,7 +108,7 @@ class SearchResult:
         return tuple(self.first.explanations[i].name for i in sorted(self.chosen))
 
 
-def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed: int) -> SearchResult:
+def search(model: RecordingModel, stated: float | None, *, alpha: float, seed: int) -> SearchResult:
     """Find what a model leaves out.
 
     Squarenesses that are found so large that the model bends are modelled, and everything is compared again about them: else
@@ -133,13 +133,13 @@ def search(model: MeasurementModel, stated: float | None, *, alpha: float, seed:
     return found
 
 
-def _without(model: MeasurementModel, whole: MeasurementModel) -> Floats:
+def _without(model: RecordingModel, whole: RecordingModel) -> Floats:
     """What the model by itself estimates, as parameters (k,) of one with effects more."""
     own = dict(zip((u.key for u in model.unknowns), model.estimate().about, strict=True))
     return np.array([own.get(unknown.key, 0.0) for unknown in whole.unknowns])
 
 
-def _search(model: MeasurementModel, stated: float | None, alpha: float, seed: int) -> SearchResult:
+def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int) -> SearchResult:
     first = model_comparison(model, stated, seed, alpha)
     if first.p_value >= alpha:
         return SearchResult(first, first.comparison, None, frozenset(), (), model, 0.0, stated=stated)
@@ -330,7 +330,7 @@ def rivals_of(combinations: Combinations, chosen: Key, index: int) -> Key:
 
 
 def model_comparison(
-    model: MeasurementModel, stated: float | None, seed: int, alpha: float | None = None
+    model: RecordingModel, stated: float | None, seed: int, alpha: float | None = None
 ) -> ModelComparison:
     values = model.estimate().about
     singles = known_effects(model, values, tuple(effect.name for effect in model.effects))
@@ -348,7 +348,7 @@ def model_comparison(
 
 
 def comparison_of(
-    model: MeasurementModel, stated: float | None, candidates: Sequence[Explanation]
+    model: RecordingModel, stated: float | None, candidates: Sequence[Explanation]
 ) -> CandidateComparison:
     """Candidates, possibly none, against what a model leaves."""
     estimate = model.estimate()
@@ -365,7 +365,7 @@ def comparison_of(
     )  # fmt: skip
 
 
-def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> MeasurementModel:
+def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen: Key) -> RecordingModel:
     """The model with known effects more, of the shapes that are most probable together."""
     shapes, added = dict(compared.model.shapes), []
     for version in sorted(versions, key=lambda v: v.explanation):
@@ -379,7 +379,7 @@ def with_effects(compared: ModelComparison, versions: Sequence[Version], chosen:
     return replace(compared.model, effects=(*compared.model.effects, *added), shapes=shapes, within=None)
 
 
-def _certified(model: MeasurementModel, sigma: float) -> Floats:
+def _certified(model: RecordingModel, sigma: float) -> Floats:
     """What the certificates of sizes leave open (m, c), for one standard deviation, in units of this noise."""
     artefact = model.artefact
     certified = np.array([size.certified for size in artefact.sizes], dtype=bool)
@@ -388,6 +388,6 @@ def _certified(model: MeasurementModel, sigma: float) -> Floats:
     return np.asarray(change / artefact.noise_scale[model.used, None] / sigma, dtype=np.float64)
 
 
-def _held(model: MeasurementModel) -> NDArray[np.bool_]:
+def _held(model: RecordingModel) -> NDArray[np.bool_]:
     """Which parameters of the linear model are sizes with a certificate; all others may take any value."""
     return np.array([unknown.known for unknown in model.unknowns], dtype=bool)

@@ -12,7 +12,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from cmm_uq.analysis.parts.causes.cause import CommonCause, PartCause, field_components, normal
-from cmm_uq.analysis.parts.plan import DIRECTED, Feature, Plan
+from cmm_uq.analysis.parts.plan import DIRECTED, PartFeature, Plan
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
@@ -39,7 +39,7 @@ class SurfaceForm:
             raise CmmUqError("a field of form needs the distance over which it is correlated",
                              where=f"form of {self.feature!r}", fix="Give correlation_mm")  # fmt: skip
 
-    def kernel(self, feature: Feature, points: Floats, some: slice = slice(None)) -> Floats:
+    def kernel(self, feature: PartFeature, points: Floats, some: slice = slice(None)) -> Floats:
         """(m, n) covariance of some along the normals with all points (n, 3), mm²; without roughness."""
         own = points[some]
         found = np.zeros((len(own), len(points)))
@@ -52,7 +52,7 @@ class SurfaceForm:
                 found += size**2 * np.cos(count * np.subtract.outer(angle[some], angle))
         return np.asarray(MICROMETRE**2 * found)
 
-    def components(self, feature: Feature, points: Floats) -> Floats:
+    def components(self, feature: PartFeature, points: Floats) -> Floats:
         """(K, n) of the form on points (n, 3), mm; without roughness."""
         variance = MICROMETRE**2 * (self.field_um**2 + sum(size**2 for _, size in self.harmonics_um))
         return field_components(partial(self.kernel, feature, points), np.full(len(points), variance))
@@ -128,7 +128,7 @@ def _placed(shapes: Floats, plan: Plan, rows: slice) -> Floats:
     return basis
 
 
-def _angles(feature: Feature, points: Floats) -> Floats:
+def _angles(feature: PartFeature, points: Floats) -> Floats:
     """(n,) about the feature's axis."""
     axis = feature.nominal.direction
     if feature.kind not in DIRECTED or axis is None:

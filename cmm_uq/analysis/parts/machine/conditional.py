@@ -30,7 +30,7 @@ from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise, Unmod
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.base.units import unit
-from cmm_uq.machine.model.measurement import ARTEFACT, MeasurementModel
+from cmm_uq.machine.model.measurement import ARTEFACT, RecordingModel
 from cmm_uq.machine.model.noise import growing_lengths, noise_of
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.machine.physics.effects.drives import PeriodicScale
@@ -54,7 +54,7 @@ class PointwiseEffect(Effect):
         return found
 
 
-def shown(model: MeasurementModel, effect: Effect) -> Floats:
+def shown(model: RecordingModel, effect: Effect) -> Floats:
     """(m, n) of the model's used observations, of a millimetre of error at each of its points."""
     about = model.estimate().about
     return model.seen(model.columns(PointwiseEffect(effect), (), about), about)
@@ -92,7 +92,7 @@ class _Shown:
     impulse: Floats
 
     @classmethod
-    def of(cls, effect: Effect, model: MeasurementModel, own: LinearModel, about: Floats) -> _Shown:
+    def of(cls, effect: Effect, model: RecordingModel, own: LinearModel, about: Floats) -> _Shown:
         whole, nothing = linear(effect), np.zeros(0)
         sd = np.array([coefficient.prior_sd for coefficient in whole.coefficients])
         if not isinstance(effect, PeriodicScale):
@@ -138,7 +138,7 @@ class JointModel:
     gain: Floats  # (r, f) what a combination that is larger by one says of each coefficient
 
     @classmethod
-    def of(cls, model: MeasurementModel, further: Sequence[Unmodelled]) -> JointModel:
+    def of(cls, model: RecordingModel, further: Sequence[Unmodelled]) -> JointModel:
         """Of a calibration and of what it left out; what needs columns that were not recorded takes no part."""
         recorded = model.artefact.points.columns
         which = tuple(i for i, one in enumerate(further) if all(name in recorded for name in one.effect.columns))
@@ -208,7 +208,7 @@ def open_size() -> CmmUqError:
                       where="the calibration", fix="Give the artefact's length")  # fmt: skip
 
 
-def stated_noise(model: MeasurementModel, components: Components, sizes: Sizes) -> StatedNoise:
+def stated_noise(model: RecordingModel, components: Components, sizes: Sizes) -> StatedNoise:
     """Noise of a coordinate for each of N sizes; what the display rounds off is part of a reading."""
     lengths = growing_lengths(model, model.placed(model.estimate().about))[model.used]
     duration = _duration(model)
@@ -222,7 +222,7 @@ def stated_noise(model: MeasurementModel, components: Components, sizes: Sizes) 
     )  # fmt: skip
 
 
-def _duration(model: MeasurementModel) -> float:
+def _duration(model: RecordingModel) -> float:
     """Of the recording, s; one second where it has no times."""
     time = model.artefact.points.columns.get("time_s")
     if time is None:
@@ -237,7 +237,7 @@ _UNTOLD = 100.0
 
 
 def joint_posterior(
-    model: MeasurementModel, further: Sequence[Unmodelled], sigma_mm: float
+    model: RecordingModel, further: Sequence[Unmodelled], sigma_mm: float
 ) -> tuple[tuple[int, ...], Floats, Floats]:
     """Normal posterior of a calibration's errors and of errors that it did not model, for a white noise that is known.
 
@@ -265,7 +265,7 @@ def draws_given(whole: JointModel, components: Components, sizes: Sizes, random:
 
 def given_recording(
     state: MachineState,
-    model: MeasurementModel,
+    model: RecordingModel,
     sigma_mm: float | None = None,
     draws: int = DRAWS,
     seed: int = 0,
@@ -298,7 +298,7 @@ def given_recording(
 
 
 def _with(
-    state: MachineState, model: MeasurementModel, whole: JointModel, drawn: Floats, noise: StatedNoise
+    state: MachineState, model: RecordingModel, whole: JointModel, drawn: Floats, noise: StatedNoise
 ) -> MachineState:
     """The state with draws (N, k + f) of all errors together."""
     if not np.isfinite(drawn).all():

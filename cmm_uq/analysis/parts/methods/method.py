@@ -35,7 +35,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.uncertainty.analysis_of_variance import OneWay, one_way
-from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, Line
+from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budgets.machine import FEWEST_READINGS, use_by_calibrated_workpiece
 
 # virtual measurements; a calibrated part measured again and again; the part itself in several orientations
@@ -306,20 +306,20 @@ def _sign(tip: CalibratedStandard) -> float:
     return -1.0 if tip.inner else 1.0
 
 
-def _of_standard(one: CalibratedStandard, name: Text, slope: float) -> list[Line]:
+def _of_standard(one: CalibratedStandard, name: Text, slope: float) -> list[BudgetLine]:
     mm = unit("mm")
     return [
-        Line(say("{standard}: calibration", standard=name), one.u, CERTIFICATE, unit=mm, sensitivity=slope),
+        BudgetLine(say("{standard}: calibration", standard=name), one.u, CERTIFICATE, unit=mm, sensitivity=slope),
         one.variances.line(say("{standard}: measurements", standard=name), _ORIENTATIONS, _REPEATS, mm, slope),
-        Line(say("{standard}: expansion", standard=name), one.u_expansion, JUDGEMENT, unit=mm, sensitivity=slope),
+        BudgetLine(say("{standard}: expansion", standard=name), one.u_expansion, JUDGEMENT, unit=mm, sensitivity=slope),
     ]
 
 
-def _of_warmth(scale: float, warm: PartWarmth) -> list[Line]:
+def _of_warmth(scale: float, warm: PartWarmth) -> list[BudgetLine]:
     away = abs(warm.temperature_c - REFERENCE_TEMPERATURE)
     return [
-        Line(say("expansion coefficient of the part"), warm.u_cte_per_k, JUDGEMENT, unit=unit("1/K"),
+        BudgetLine(say("expansion coefficient of the part"), warm.u_cte_per_k, JUDGEMENT, unit=unit("1/K"),
              sensitivity=abs(scale) * away),
-        Line(say("temperature of the part"), warm.u_temperature_k, JUDGEMENT, unit=unit("K"),
+        BudgetLine(say("temperature of the part"), warm.u_temperature_k, JUDGEMENT, unit=unit("K"),
              sensitivity=abs(scale * warm.cte_per_k)),
     ]  # fmt: skip

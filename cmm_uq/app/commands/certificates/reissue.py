@@ -22,15 +22,12 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, 
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.results.reissue import KEY
-from cmm_uq.certificate.results.reissue import ChangedFigure as Difference
-from cmm_uq.certificate.results.reissue import Reissue as Comparison
+from cmm_uq.certificate.results.reissue import KEY, ChangedFigure as Difference, Reissue as Comparison
 from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import results_named
 from cmm_uq.jobs.source import RESULTS
-from cmm_uq.jobs.tables.identification import REPLACED as FILE
-from cmm_uq.jobs.tables.identification import denies_a_change
+from cmm_uq.jobs.tables.identification import REPLACED as FILE, denies_a_change
 from cmm_uq.jobs.tables.origin import MEASURED
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.content import values

@@ -27,8 +27,7 @@ from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.clauses import Requirement as Clause
-from cmm_uq.certificate.clauses import certifies, clauses, contradictions, missing
+from cmm_uq.certificate.clauses import Requirement as Clause, certifies, clauses, contradictions, missing
 from cmm_uq.jobs.importing.recording import read_recording
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import is_part, read_part

@@ -17,12 +17,10 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.importing.imported import ImportedTable as Imported
-from cmm_uq.jobs.importing.imported import imported
+from cmm_uq.jobs.importing.imported import ImportedTable as Imported, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.recording import WHOLE, points_of
-from cmm_uq.jobs.reports import ReportResults as Reported
-from cmm_uq.jobs.reports import read_results
+from cmm_uq.jobs.reports import ReportResults as Reported, read_results
 from cmm_uq.jobs.source import RESULTS
 
 _FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")

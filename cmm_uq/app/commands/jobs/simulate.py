@@ -29,7 +29,7 @@ from cmm_uq.jobs.derived_job import IN_THE_RECORDING, derived_toml, kept_inputs,
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import PLANNED, first_line
 from cmm_uq.jobs.truth import NoiseFacts, Truth
-from cmm_uq.machine.model import MeasurementModel, Noise
+from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.effect import Effect
@@ -61,7 +61,7 @@ def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str
     acting = tuple(_acting(artefact, effect, where) for effect in effects(tuple(truth.effects), where=where))
     _refuse_unrecorded(points, acting, truth, truth_path)
     given = [_given(effect, truth, truth_path) for effect in acting]
-    model = MeasurementModel(
+    model = RecordingModel(
         artefact, acting, shapes={effect.name: shape for effect, (_, shape) in zip(acting, given, strict=True)}
     )
     noise = _noise(truth.noise)

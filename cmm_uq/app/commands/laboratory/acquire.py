@@ -26,8 +26,7 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.jobs.importing.imported import ImportedTable as Imported
-from cmm_uq.jobs.importing.imported import imported, is_own
+from cmm_uq.jobs.importing.imported import ImportedTable as Imported, imported, is_own
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.recording import REQUIRED, read_recording
 from cmm_uq.jobs.job import Job

@@ -14,8 +14,7 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.plots.style import fonts_of
-from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
-from cmm_uq.certificate.results.provenance import Behind, provenance_of
+from cmm_uq.certificate.results.provenance import FILE as PROVENANCE, Behind, provenance_of
 from cmm_uq.jobs.part.job import PartJob, read_part
 from cmm_uq.jobs.tables.origin import SIMULATED
 

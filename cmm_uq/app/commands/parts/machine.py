@@ -20,8 +20,7 @@ from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.files import Stage, silent
-from cmm_uq.app.commands.parts.drift import FILE as HISTORY
-from cmm_uq.app.commands.parts.drift import with_drift
+from cmm_uq.app.commands.parts.drift import FILE as HISTORY, with_drift
 from cmm_uq.app.commands.reading import job_of, read_job
 from cmm_uq.app.commands.verification import Verification, examine_certificate, verify_given
 from cmm_uq.artefacts import kind_of
@@ -35,7 +34,7 @@ from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import PartJob
 from cmm_uq.jobs.reading import sha256 as hashes
 from cmm_uq.jobs.tables.origin import COMPENSATED, MEASURED, SIMULATED
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.draws import Draws
 
 _ORIGINS = {SIMULATED: say("simulated"), COMPENSATED: say("compensated")}
@@ -388,7 +387,7 @@ def _given(state: MachineState, job: Job | None, seed: int) -> tuple[MachineStat
     return together, text, True
 
 
-def _quantities(model: MeasurementModel) -> int:
+def _quantities(model: RecordingModel) -> int:
     """How many of the used observations are no repeats of others."""
     artefact = model.artefact
     first = artefact.points.point[artefact.rows[model.used, 0]]

@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
-from cmm_uq.analysis.conformity.limits import LimitDecision as Judged
-from cmm_uq.analysis.conformity.limits import Limits, judge
-from cmm_uq.analysis.parts.budget import DRAWS as SHARED
-from cmm_uq.analysis.parts.budget import VarianceShares, point_errors, variance_shares
+from cmm_uq.analysis.conformity.limits import LimitDecision as Judged, Limits, judge
+from cmm_uq.analysis.parts.budget import DRAWS as SHARED, VarianceShares, point_errors, variance_shares
 from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.methods.comparison import compare_methods
 from cmm_uq.analysis.parts.methods.of_job import methods_of
@@ -28,7 +26,7 @@ from cmm_uq.analysis.parts.setup import (
     refuse_out_of_reach,
     refuse_unfit,
 )
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.analysis.parts.ways import ways
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.further import further_of
@@ -136,7 +134,7 @@ def _together(together: float, decisions: Iterable[Judged | None]) -> float | No
     return within_bounds(together, np.array(each)) if each else None
 
 
-def _with_twice_the_points(job: PartJob, machine: MachineState) -> tuple[Plan, Circumstances]:
+def _with_twice_the_points(job: PartJob, machine: MachineState) -> tuple[Plan, MeasurementConditions]:
     other = doubled(job)
     plan = plan_of(other)
     return plan, circumstances_of(other, machine, plan, PLACES)

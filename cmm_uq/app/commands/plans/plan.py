@@ -24,8 +24,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.results.contents import head
-from cmm_uq.certificate.wording import Figure, Summary
-from cmm_uq.certificate.wording import Headline as Verdict
+from cmm_uq.certificate.wording import Figure, Headline as Verdict, Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.linear_model import Unknown
 

@@ -28,7 +28,7 @@ from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.job import Job
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.effect import Effect
 
 _NANOMETRE = 1e-6
@@ -289,7 +289,7 @@ def _outlook(
     return Outlook(placings, points, found, tuple(predicted))
 
 
-def _drawn(model: MeasurementModel, noise: PlannedNoise) -> DrawnNoise:
+def _drawn(model: RecordingModel, noise: PlannedNoise) -> DrawnNoise:
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     return DrawnNoise(noise.components(model, values), noise.typical, model.artefact.noise_scale)
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from cmm_uq.base.errors import printable
-from cmm_uq.base.files.table import AnyFloat, Column, Table
+from cmm_uq.base.files.table import AnyFloat, Column, JobTable
 
 NAMES = (
     "NUL", "SOH", "STX", "ETX", "EOT", "ENQ", "ACK", "BEL", "BS", "HT", "LF", "VT", "FF", "CR", "SO", "SI", "DLE",
@@ -79,7 +79,7 @@ Unit = Annotated[str, Field(pattern=r"^[A-Za-z_°µ%/ ]*$", max_length=40)]
 Seconds = Annotated[float, Field(gt=0, le=86400)]
 
 
-class Connection(Table):
+class Connection(JobTable):
     """``[connection]``: the serial line; a socket has no such settings, and a device server has its own."""
 
     baud: Annotated[int, Field(gt=0, le=4_000_000)] = 9600
@@ -98,7 +98,7 @@ class Connection(Table):
     """Whether the line RTS is on."""
 
 
-class MessageFrame(Table):
+class MessageFrame(JobTable):
     """``[frame]``: where a message begins and ends: a terminator; or a length; or a first byte with a last one or a length."""
 
     terminator: Bytes = ""
@@ -124,7 +124,7 @@ class MessageFrame(Table):
         return self
 
 
-class Poll(Table):
+class Poll(JobTable):
     """One question, and what its answer looks like where that differs from the others."""
 
     send: Bytes
@@ -133,7 +133,7 @@ class Poll(Table):
     """Regular expression of its answer, with a group for each quantity; that of `[parse]` where it is left out."""
 
 
-class Send(Table):
+class Send(JobTable):
     """``[send]``: what the instrument is sent; nothing where it speaks by itself."""
 
     start: Annotated[list[Bytes], Field(max_length=50)] = []
@@ -150,7 +150,7 @@ class Send(Table):
     """Time without a message after which an instrument that speaks by itself is said to be silent; never where left out."""
 
 
-class Parse(Table):
+class Parse(JobTable):
     """``[parse]``: what a message says. One of: a pattern; fields with a separator; binary fields of fixed length."""
 
     pattern: Pattern | None = None
@@ -187,7 +187,7 @@ class Parse(Table):
             raise ValueError(f"struct has {count} fields, and fields names {len(self.fields)}")
 
 
-class ProfileQuantity(Table):
+class ProfileQuantity(JobTable):
     """``[quantities.NAME]``: what is to be known of one quantity beside its name."""
 
     unit: Unit = ""
@@ -202,7 +202,7 @@ class ProfileQuantity(Table):
     """Least and largest plausible value, in the unit of the name's ending; what lies outside is no value."""
 
 
-class Ill(Table):
+class Ill(JobTable):
     """One ``[[ill]]``: what the instrument says when something is wrong."""
 
     pattern: Pattern
@@ -211,7 +211,7 @@ class Ill(Table):
     """What it means."""
 
 
-class Identify(Table):
+class Identify(JobTable):
     """``[identify]``: how the instrument says which one it is."""
 
     send: Bytes
@@ -220,7 +220,7 @@ class Identify(Table):
     """Regular expression that is searched in the answer's lines together, with groups maker, model, serial, firmware."""
 
 
-class Example(Table):
+class Example(JobTable):
     """One ``[[example]]``: a message and what it says; a profile that reads its own examples otherwise is refused."""
 
     received: Bytes
@@ -233,7 +233,7 @@ class Example(Table):
     """Which question it answers, counted from 0."""
 
 
-class ProfileFacts(Table):
+class ProfileFacts(JobTable):
     """``[facts]``: whence all this is known."""
 
     sources: Annotated[list[str], Field(max_length=50)] = []
@@ -244,7 +244,7 @@ class ProfileFacts(Table):
     """What the profile was tried on."""
 
 
-class Positions(Table):
+class Positions(JobTable):
     """``[ipp]``: what a CMM's I++ DME server is asked for."""
 
     every_s: Annotated[float, Field(ge=0, le=86400)] = 0.0
@@ -255,7 +255,7 @@ class Positions(Table):
     """Whether positions are reported while the machine moves."""
 
 
-class ProfileFile(Table):
+class ProfileFile(JobTable):
     """A profile."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9.-]*$", max_length=60)]

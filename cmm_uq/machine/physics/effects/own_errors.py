@@ -20,14 +20,13 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.effect import OWN, PRIOR_WEIGHT, CommonSize, Effect, Nonparametric, Parameter
 from cmm_uq.machine.physics.effects.own_body import Body
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
-from cmm_uq.machine.physics.effects.scales import EFFECTS as FURTHER_OF_SCALES
-from cmm_uq.machine.physics.effects.scales import ScaleCurvature
+from cmm_uq.machine.physics.effects.scales import EFFECTS as FURTHER_OF_SCALES, ScaleCurvature
 
 _FEWEST = 3  # places that were met in two set-ups, for a pattern
 
 
 @dataclass(frozen=True, eq=False)
-class Owner:
+class FaultyArtefact:
     """An artefact as its faults know it."""
 
     body: Body  # its places
@@ -45,20 +44,20 @@ class OwnFault(Effect):
     mechanism = "artefact"
     tier = OWN
     of_artefact = True
-    owner: Owner | None = None
+    owner: FaultyArtefact | None = None
 
     @property
     def prior_weight(self) -> float:
         return PRIOR_WEIGHT[OWN] if self.owner is None else self.owner.weight
 
-    def made(self, owner: Owner) -> OwnFault:
+    def made(self, owner: FaultyArtefact) -> OwnFault:
         """The fault of one artefact."""
         found = copy(self)
         found.owner, found.mostly = owner, owner.mostly
         found.coefficients = found.sized(owner)
         return found
 
-    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+    def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         """The coefficients with the size that is plausible for this artefact."""
         return tuple(Parameter(c.name, c.unit, owner.size) for c in self.coefficients)
 
@@ -66,7 +65,7 @@ class OwnFault(Effect):
         """Whether it is a fault of the artefact that was recorded in these points."""
         return self.owner is not None and self.owner.body.covers(points)
 
-    def whose(self) -> Owner:
+    def whose(self) -> FaultyArtefact:
         """The artefact."""
         if self.owner is None:
             raise CmmUqError(
@@ -95,7 +94,7 @@ class OwnGeometry(OwnFault):
         self.idealised_over = effect.idealised_over
         self.everywhere = effect.everywhere
 
-    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+    def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         (c,) = self.coefficients
         _, rows = np.unique(owner.body.poses(owner.points).node, return_index=True)
         field = self.effect.basis(self._there(owner.points))[rows, :, 0] @ self._rotation
@@ -105,7 +104,7 @@ class OwnGeometry(OwnFault):
         sd = min(c.prior_sd, owner.size / largest) if largest > 0 else c.prior_sd
         return (Parameter(c.name, c.unit, sd),)
 
-    def made(self, owner: Owner) -> OwnFault:
+    def made(self, owner: FaultyArtefact) -> OwnFault:
         found = copy(self)
         found.owner, found.mostly = owner, owner.mostly
         found._lies(owner)
@@ -121,7 +120,7 @@ class OwnGeometry(OwnFault):
     def course(self, points: Points) -> Floats | None:
         return self.effect.course(self._there(points))
 
-    def _lies(self, owner: Owner) -> None:
+    def _lies(self, owner: FaultyArtefact) -> None:
         """Find where it is like the machine's error: in the set-up least turned against its own axes, however numbered."""
         poses = owner.body.poses(owner.points)
         middle = owner.body.places.mean(axis=0)
@@ -156,10 +155,10 @@ class OwnPattern(OwnFault, CommonSize):
     stands_for = tuple(Nonparametric(f"reference_{name}mm") for name in ("", "x_", "y_", "z_"))
     _shown: Floats
 
-    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+    def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         return tuple(Parameter(f"c{i + 1}_um", unit("µm"), owner.size) for i in range(deformations(owner).shape[1]))
 
-    def made(self, owner: Owner) -> OwnFault:
+    def made(self, owner: FaultyArtefact) -> OwnFault:
         found = copy(self)
         found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found._shown = deformations(owner)
@@ -183,7 +182,7 @@ class OwnPattern(OwnFault, CommonSize):
         return -MICROMETRE * np.asarray(np.einsum("nij,njk->nik", poses.rotation[:, :, : owner.axes], own))
 
 
-def deformations(owner: Owner) -> Floats:
+def deformations(owner: FaultyArtefact) -> Floats:
     """Orthonormal deviations (N·a, r) of N places along a axes that contain no shift, turn or scale of the whole."""
     places = owner.body.about_middle()[:, : owner.axes]
     count, a = places.shape

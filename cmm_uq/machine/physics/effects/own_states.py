@@ -12,7 +12,7 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.effect import CommonSize, Effect, Harmonic, Parameter
-from cmm_uq.machine.physics.effects.own_errors import Owner, OwnFault
+from cmm_uq.machine.physics.effects.own_errors import FaultyArtefact, OwnFault
 from cmm_uq.maths.geometry.feature import frame_about, upward
 
 KELVIN = Parameter("k", unit("K"), 1.0)
@@ -44,17 +44,17 @@ class OfSetUps(OwnFault, CommonSize):
 
     each: tuple[str, ...]
 
-    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+    def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         (c,) = self.coefficients
         return tuple(
             Parameter(f"{name}_{m}_{c.name}", c.unit, owner.size) for m in self.numbered(owner) for name in self.each
         )
 
-    def numbered(self, owner: Owner) -> Ints:
+    def numbered(self, owner: FaultyArtefact) -> Ints:
         """Numbers of the coefficients: those of the set-ups."""
         return np.unique(owner.points.measurement)
 
-    def made(self, owner: Owner) -> OwnFault:
+    def made(self, owner: FaultyArtefact) -> OwnFault:
         found = copy(self)
         found.owner, found.coefficients, found.mostly = owner, self.sized(owner), owner.mostly
         found.size = Parameter(self.size.name, self.size.unit, owner.size)
@@ -88,7 +88,7 @@ class SetUpTemperature(OfSetUps):
         each = self.by_set_up(points, (-self.whose().cte * _about_set_up(points))[:, :, None])
         return np.asarray(each @ self._contrasts())
 
-    def numbered(self, owner: Owner) -> Ints:
+    def numbered(self, owner: FaultyArtefact) -> Ints:
         return np.arange(1, len(np.unique(owner.points.measurement)))
 
     def errors(self, coefficients: Floats) -> Floats:
@@ -171,7 +171,7 @@ class OwnForm(OwnFault, CommonSize):
     def belongs_to(self, points: Points) -> bool:
         return self.owner is not None
 
-    def sized(self, owner: Owner) -> tuple[Parameter, ...]:
+    def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
         return tuple(
             Parameter(f"c{degree}_{order}_um", unit("µm"), owner.size)
             for degree in _DEGREES
@@ -211,7 +211,7 @@ def _about_set_up(points: Points) -> Floats:
     return np.asarray(points.xyz - (total / np.bincount(index)[:, None])[index], dtype=np.float64)
 
 
-def _flat(owner: Owner, points: Points) -> tuple[Floats, Floats]:
+def _flat(owner: FaultyArtefact, points: Points) -> tuple[Floats, Floats]:
     """Normal (n, 3) of a flat artefact as it lay, and place (n, 2) across it, over the largest distance from its middle."""
     places = owner.body.about_middle()
     u, v, normal = frame_about(upward(np.linalg.svd(places, full_matrices=False)[2][2]))

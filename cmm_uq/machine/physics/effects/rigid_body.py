@@ -14,7 +14,7 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
 from cmm_uq.machine.physics.effect import Amount, Effect, Nonparametric, Parameter, along
-from cmm_uq.machine.physics.kinematics import Chain, carried_offset
+from cmm_uq.machine.physics.kinematics import KinematicChain, carried_offset
 
 # of each plane the axis along which a point moves, and the one that leans, by whose reading it moves
 LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})
@@ -155,7 +155,7 @@ class Rotation(Effect):
 
 def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     """Basis (n, 3, 1) of carriage ``axis`` turning about ``about`` by ``angle`` (n,) rad: ε × what it carries."""
-    chain = Chain.of(points.machine.chain)
+    chain = KinematicChain.of(points.machine.chain)
     acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
     carried = carried_offset(
         axis, points.carriages, tip_offsets(points) if acts_on_tip else None, chain, points.directions

@@ -16,7 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import REFERENCE_TEMPERATURE, unit
-from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, Line
+from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, REPEATS, Budget, BudgetLine
 
 FACTOR = 2.0  # coverage factor that ISO/TS 23165 and ISO 15530-3 prescribe
 SIMULATION = say("simulation")
@@ -62,11 +62,11 @@ def length_test_uncertainty(
     return Budget(
         say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm),
         [
-            Line(
+            BudgetLine(
                 say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=unit("mm"), dof=calibration_dof
             ),
             _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
-            Line(
+            BudgetLine(
                 say("temperature of the artefact"),
                 u_temperature_k,
                 JUDGEMENT,
@@ -74,10 +74,10 @@ def length_test_uncertainty(
                 unit("K"),
                 sensitivity=length_mm * cte_per_k,
             ),
-            Line(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=unit("mm")),
-            Line(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=unit("mm")),
+            BudgetLine(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=unit("mm")),
+            BudgetLine(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=unit("mm")),
             *(
-                [Line(say("calibration of the short gauge"), u_beside_mm, CERTIFICATE, unit=unit("mm"))]
+                [BudgetLine(say("calibration of the short gauge"), u_beside_mm, CERTIFICATE, unit=unit("mm"))]
                 if u_beside_mm
                 else []
             ),
@@ -93,8 +93,8 @@ def probing_test_uncertainty(form_mm: float, u_form_mm: float) -> Budget:
     return Budget(
         say("test value of the probing error"),
         [
-            Line(say("form of the test sphere, F/2"), form_mm / 2, CERTIFICATE, unit=unit("mm")),
-            Line(say("calibration of the form"), u_form_mm, CERTIFICATE, unit=unit("mm")),
+            BudgetLine(say("form of the test sphere, F/2"), form_mm / 2, CERTIFICATE, unit=unit("mm")),
+            BudgetLine(say("calibration of the form"), u_form_mm, CERTIFICATE, unit=unit("mm")),
         ],
         unit=unit("mm"),
         factor=FACTOR,
@@ -144,8 +144,8 @@ def use_by_calibrated_workpiece(
     return Budget(
         say("systematic error of the measurement process"),
         [
-            Line(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=own),
-            Line(
+            BudgetLine(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=own),
+            BudgetLine(
                 say("scatter of the process"),
                 float(readings.std(ddof=1)),
                 REPEATS,
@@ -159,7 +159,7 @@ def use_by_calibrated_workpiece(
                 temperature_c,
             ),
             _expansion(say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, length, temperature_c),
-            Line(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=own),
+            BudgetLine(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=own),
         ],
         float(readings.mean()) - calibrated_mm,
         own,
@@ -174,7 +174,7 @@ def expanded_without_correction(budget: Budget) -> float:
 
 
 def use_by_simulation(
-    simulated_errors_mm: Sequence[float] | Floats, not_simulated: Sequence[Line] = (), coverage: float = 0.95
+    simulated_errors_mm: Sequence[float] | Floats, not_simulated: Sequence[BudgetLine] = (), coverage: float = 0.95
 ) -> Budget:
     """Uncertainty of using the machine, from simulated measurements of the task (ISO 15530-4:2008), mm.
 
@@ -188,7 +188,7 @@ def use_by_simulation(
     return Budget(
         say("error of the measurement task"),
         [
-            Line(
+            BudgetLine(
                 say("simulated scatter"), float(errors.std(ddof=1)), SIMULATION, unit=unit("mm"), dof=len(errors) - 1.0
             ),
             *not_simulated,
@@ -200,7 +200,7 @@ def use_by_simulation(
     )
 
 
-def _expansion(name: Text, u_cte_per_k: float, length_mm: float, temperature_c: float) -> Line:
+def _expansion(name: Text, u_cte_per_k: float, length_mm: float, temperature_c: float) -> BudgetLine:
     """L |t − 20 °C| u(α)."""
     slope = length_mm * abs(temperature_c - REFERENCE_TEMPERATURE)
-    return Line(name, u_cte_per_k, JUDGEMENT, unit=unit("1/K"), sensitivity=slope)
+    return BudgetLine(name, u_cte_per_k, JUDGEMENT, unit=unit("1/K"), sensitivity=slope)

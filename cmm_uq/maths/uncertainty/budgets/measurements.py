@@ -37,8 +37,8 @@ from cmm_uq.maths.uncertainty.budget import (
     REPEATS,
     SPECIFICATION,
     Budget,
+    BudgetLine,
     Labels,
-    Line,
     joint_line,
 )
 from cmm_uq.maths.uncertainty.correlation import Correlations
@@ -90,7 +90,7 @@ def ballbar_length(position: BallbarPosition) -> Budget:
     w, length = np.asarray(position.direction), position.length_mm
     scatter = float(w @ position.centre_covariance_mm2 @ w)
     lines = [
-        Line(say("scatter of the points, ball {ball}", ball=ball), sqrt(scatter), REPEATS, unit=unit("mm"))
+        BudgetLine(say("scatter of the points, ball {ball}", ball=ball), sqrt(scatter), REPEATS, unit=unit("mm"))
         for ball in (1, 2)
     ]
     lines += [_limit(say("form of ball {ball}", ball=ball), position.form_shift_mm, CERTIFICATE) for ball in (1, 2)]
@@ -109,7 +109,7 @@ def ballbar_length(position: BallbarPosition) -> Budget:
     for name, (i, j), u in zip(("xy", "yz", "zx"), ((0, 1), (1, 2), (2, 0)), position.u_squareness_rad, strict=True):
         slope = float(abs(w[i] * w[j])) * length
         lines.append(
-            Line(
+            BudgetLine(
                 say("squareness {name}", name=Verbatim(name)),
                 u,
                 CERTIFICATE,
@@ -119,14 +119,16 @@ def ballbar_length(position: BallbarPosition) -> Budget:
             )
         )
     warm, slope = position.u_temperature_k, position.cte_per_k * length
-    lines.append(Line(say("temperature of the bar"), warm, JUDGEMENT, unit=unit("K"), sensitivity=slope, shared=True))
+    lines.append(
+        BudgetLine(say("temperature of the bar"), warm, JUDGEMENT, unit=unit("K"), sensitivity=slope, shared=True)
+    )
     told = [replace(line, origin=foreign(position.origins.get(line.name, line.origin))) for line in lines if line.part]
     return Budget(say("length of the ballbar, one position"), told, length, unit("mm"))
 
 
-def _limit(name: Text, limit_mm: float, origin: Text, sensitivity: float = 1.0) -> Line:
+def _limit(name: Text, limit_mm: float, origin: Text, sensitivity: float = 1.0) -> BudgetLine:
     u = limit_mm / sqrt(3)
-    return Line(name, u, origin, 0.0, unit("mm"), "rectangular", sensitivity=sensitivity, shared=True)
+    return BudgetLine(name, u, origin, 0.0, unit("mm"), "rectangular", sensitivity=sensitivity, shared=True)
 
 
 def harris_compensated() -> Budget:
@@ -134,8 +136,8 @@ def harris_compensated() -> Budget:
     centre = Budget(
         say("centre of a sphere"),
         [
-            Line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
-            Line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
+            BudgetLine(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
+            BudgetLine(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
         ],
         unit=unit("mm"),
     )
@@ -155,10 +157,10 @@ def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budge
     return Budget(
         say("length of the ballbar, as printed in Harris 2004 section 6.4.1"),
         [
-            Line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
-            Line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
+            BudgetLine(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
+            BudgetLine(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
             *(
-                Line(
+                BudgetLine(
                     say("largest scale error of {axis}", axis=Verbatim(axis)),
                     limit * MICROMETRE,
                     say("error map"),
@@ -233,7 +235,7 @@ def sphere_budgets(
     *,
     dof: float = inf,
     form_origin: Text = say("certificate of the ball"),
-    further: Sequence[Line] = (),
+    further: Sequence[BudgetLine] = (),
 ) -> dict[str, Budget]:
     """Budgets of x, y, z and radius.
 
@@ -246,10 +248,12 @@ def sphere_budgets(
         variance = float(np.asarray(covariance_mm2)[k, k])
         if not variance > 0:
             raise CmmUqError(f"a variance of {variance} mm² of {name}", fix="Give the covariance matrix of the fit")
-        lines = [Line(say("scatter of the points"), sqrt(variance), REPEATS, unit=unit("mm"), dof=dof)]
+        lines = [BudgetLine(say("scatter of the points"), sqrt(variance), REPEATS, unit=unit("mm"), dof=dof)]
         shift = float(form_shift_mm[k])
         if shift:
-            lines.append(Line(say("form of the ball"), shift / sqrt(3), form_origin, 0.0, unit("mm"), "rectangular"))
+            lines.append(
+                BudgetLine(say("form of the ball"), shift / sqrt(3), form_origin, 0.0, unit("mm"), "rectangular")
+            )
         budgets[name] = Budget(Verbatim(name), [*lines, *further], float(estimate_mm[k]), unit("mm"))
     return budgets
 

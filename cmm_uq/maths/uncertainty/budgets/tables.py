@@ -15,13 +15,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import Length, Position, Table, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable as Table, Length, Position, Temperature, Triple, Uncertainty
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.geometry import cap_directions
 from cmm_uq.maths.geometry.feature import BallForm
-from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, Line
+from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine as Line
 from cmm_uq.maths.uncertainty.budgets.machine import (
     expanded_without_correction,
     length_test_uncertainty,
@@ -213,7 +213,7 @@ class ProbingTest(MachineTest):
         return probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
 
 
-class Ballbar(BudgetTable):
+class BallbarBudget(BudgetTable):
     """``method = "ballbar length"``."""
 
     meaning = say("Length of a ballbar from one position of it, or from the mean of several.")
@@ -309,6 +309,6 @@ class FittedSphere(BudgetTable):
 
 TABLES: Mapping[str, type[BudgetTable]] = {
     "ISO 15530-3": CalibratedWorkpiece, "ISO 15530-4": SimulatedTask, "ISO/TS 23165 length": LengthTest,
-    "ISO/TS 23165 probing": ProbingTest, "ballbar length": Ballbar, "sphere fit": FittedSphere,
+    "ISO/TS 23165 probing": ProbingTest, "ballbar length": BallbarBudget, "sphere fit": FittedSphere,
 }  # fmt: skip
 """By ``method``."""

@@ -13,7 +13,7 @@ from cmm_uq.artefacts import artefact_facts, artefact_of
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import Machine, Points
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.machine.physics.effect import FURTHER
 from tests.artefacts.constructions import spheres
@@ -31,7 +31,7 @@ class Torn(Effect):
 
 
 def candidates(points: Points, named: tuple[str, ...] = ()) -> dict[str, Explanation]:
-    model = MeasurementModel(Ballbar(bar_facts(), points), ())
+    model = RecordingModel(Ballbar(bar_facts(), points), ())
     values = np.array([size.nominal for size in model.artefact.sizes])
     return {explanation.name: explanation for explanation in known_effects(model, values, named)}
 
@@ -69,7 +69,7 @@ def test_scales_and_squarenesses_belong_together_where_the_artefact_is_longer_th
 ) -> None:
     six = {name for name, effect in EVERY.items() if effect.everywhere and not effect.of_artefact}
     assert {name for name, each in candidates(ballbar_points).items() if each.together} == six
-    model = MeasurementModel(artefact_of(artefact_facts(kind="sphere"), spheres()), ())
+    model = RecordingModel(artefact_of(artefact_facts(kind="sphere"), spheres()), ())
     found = known_effects(model, np.array([size.nominal for size in model.artefact.sizes]), ())
     assert six <= {each.name for each in found}
     assert not [each.name for each in found if each.together]

@@ -14,19 +14,19 @@ from cmm_uq.analysis.parts.causes.stylus import DEGREES, directions, styli
 from cmm_uq.analysis.parts.causes.surroundings import elapsed, moving_part
 from cmm_uq.analysis.parts.machine.state import StatedNoise, coefficients_of, noise_of_draws, unmodelled_errors
 from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Plan, Stylus
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.plan import PartCharacteristic, PartFeature, Plan, Stylus
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.machine.physics.catalogue import CATALOGUE, effects
 from cmm_uq.maths.inference.draws import Draws
 from tests.parts_drawn import POSE, UP, ball, bore, circle, machine, plane, ring, spot
 
 
-def drawn(plan: Plan, given: Circumstances, n: int = 20_000, *, exact: bool = False) -> np.ndarray:
+def drawn(plan: Plan, given: MeasurementConditions, n: int = 20_000, *, exact: bool = False) -> np.ndarray:
     at = AtPose(plan, given, POSE)
     return at.errors(at.drawn(np.random.default_rng(0), n), exact=exact)
 
 
-def round_hole(count: int, *, whole: int = 0) -> Feature:
+def round_hole(count: int, *, whole: int = 0) -> PartFeature:
     if not whole:
         return circle("c", [0, 0, 0], 10.0, count, hole=False)
     surface, out = ring([0, 0, 0], 10.0, 0.0, whole, 0.001)
@@ -36,15 +36,15 @@ def round_hole(count: int, *, whole: int = 0) -> Feature:
 @pytest.mark.parametrize(("count", "u"), [(3, 2 * 5e-3), (4, 0.0), (6, 0.0)])
 def test_three_points_take_three_lobes_for_size(count: int, u: float) -> None:
     """A cosine of 3θ, its amplitude of standard deviation 5 µm, is the same at 120° steps, and no size to 4 or 6 points."""
-    plan = Plan((round_hole(count, whole=90),), (Characteristic("d", "size", ("c",)),))
-    given = Circumstances(machine(), forms=(SurfaceForm("c", ((3, 5.0),)),))
+    plan = Plan((round_hole(count, whole=90),), (PartCharacteristic("d", "size", ("c",)),))
+    given = MeasurementConditions(machine(), forms=(SurfaceForm("c", ((3, 5.0),)),))
     assert drawn(plan, given).std() == pytest.approx(u, abs=1e-4)
 
 
 def test_few_points_find_less_form_than_there_is() -> None:
     """The whole surface has the range of its cosine, 2·A; four points of two lobes see 2·A·|cos φ|, on average 2/π of it."""
-    one = (Characteristic("round", "roundness", ("c",)),)
-    given = Circumstances(machine(), forms=(SurfaceForm("c", ((2, 5.0),)),))
+    one = (PartCharacteristic("round", "roundness", ("c",)),)
+    given = MeasurementConditions(machine(), forms=(SurfaceForm("c", ((2, 5.0),)),))
     found = drawn(Plan((round_hole(4, whole=180),), one), given, 4000)[:, 0]
     assert (found <= 2e-5).all()  # of 180 points the nearest to a crest is a degree away
     # the amplitude is Rayleigh's, of mean σ·√(π/2); the phase is any
@@ -57,8 +57,8 @@ def test_lobing_has_neither_size_nor_offset_and_the_variance_that_was_stated() -
     rings = [ring([0, 0, 0], np.sqrt(1 - z**2), z, 8)[0] for z in (*heights, 0.0, *-heights)]
     toward = np.vstack(rings)
     sphere = ball("b", [0, 0, 0], 10.0, toward)
-    plan = Plan((sphere,), (Characteristic("d", "size", ("b",)),), (Stylus("stylus", lobing_um=2.0),))
-    at = AtPose(plan, Circumstances(machine()), POSE)
+    plan = Plan((sphere,), (PartCharacteristic("d", "size", ("b",)),), (Stylus("stylus", lobing_um=2.0),))
+    at = AtPose(plan, MeasurementConditions(machine()), POSE)
     lobing = at.causes[-1]
     moved = lobing.moved(np.eye(len(lobing.factors)), slice(None))
     along = np.einsum("kni,ni->kn", moved, toward)
@@ -76,9 +76,9 @@ def test_noise_keeps_to_the_axes_of_the_machine() -> None:
     """Noise of z alone is along the part's x where the part stands upright."""
     upright = PartPose(np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]]), np.array([300.0, 200, -300]))
     plan = Plan(
-        (spot("one", [0, 0, 0]), spot("other", [100, 0, 0])), (Characteristic("", "distance", ("one", "other")),)
+        (spot("one", [0, 0, 0]), spot("other", [100, 0, 0])), (PartCharacteristic("", "distance", ("one", "other")),)
     )
-    given = Circumstances(machine(noise=StatedNoise(np.array([0.0, 0.0, 2e-3]))), repeats=4)
+    given = MeasurementConditions(machine(noise=StatedNoise(np.array([0.0, 0.0, 2e-3]))), repeats=4)
     for pose, u in ((upright, 2e-3 * np.sqrt(2) / 2), (POSE, 0.0)):
         at = AtPose(plan, given, pose)
         assert at.errors(at.drawn(np.random.default_rng(0), 20_000)).std() == pytest.approx(u, rel=0.02, abs=1e-6)
@@ -90,8 +90,8 @@ def test_slow_noise_is_common_to_points_that_follow_each_other() -> None:
     points = (spot("one", [0, 0, 0]), spot("other", [100, 0, 0]))
     noise = StatedNoise(slow_mm=2e-3, slow_time_s=600.0)
     for seconds in (6.0, 600.0):
-        plan = Plan(points, (Characteristic("", "distance", ("one", "other")),), times_s=np.array([0.0, seconds]))
-        u = drawn(plan, Circumstances(machine(noise=noise))).std()
+        plan = Plan(points, (PartCharacteristic("", "distance", ("one", "other")),), times_s=np.array([0.0, seconds]))
+        u = drawn(plan, MeasurementConditions(machine(noise=noise))).std()
         assert u == pytest.approx(2e-3 * np.sqrt(2 * (1 - np.exp(-seconds / 600))), rel=0.02)
 
 
@@ -108,10 +108,10 @@ def test_what_was_not_modelled_is_as_large_as_its_calibration_would_not_have_sho
 
 def test_an_error_with_a_period_has_one_period_a_draw() -> None:
     plan = Plan(
-        (spot("one", [0, 0, 0]), spot("other", [31, 0, 0])), (Characteristic("", "distance", ("one", "other")),)
+        (spot("one", [0, 0, 0]), spot("other", [31, 0, 0])), (PartCharacteristic("", "distance", ("one", "other")),)
     )
     state = machine(unmodelled=tuple(u for u in unmodelled_errors([], {}) if u.effect.name == "periodic_scale_x"))
-    at = AtPose(plan, Circumstances(state), POSE)
+    at = AtPose(plan, MeasurementConditions(state), POSE)
     coefficients = np.asarray(at.drawn(np.random.default_rng(0), 1000)[1]).reshape(1000, -1, 2)
     assert (np.count_nonzero(np.any(coefficients != 0, axis=2), axis=1) == 1).all()
     assert coefficients[coefficients != 0].std() == pytest.approx(10.0, rel=0.05)
@@ -120,9 +120,9 @@ def test_an_error_with_a_period_has_one_period_a_draw() -> None:
 
 def test_an_error_of_which_the_column_is_not_there_is_named() -> None:
     plan = Plan(
-        (plane("A", [0, 0, 1], [0, 0, 0], [[100, 0, 0], [0, 100, 0]]),), (Characteristic("", "flatness", ("A",)),)
+        (plane("A", [0, 0, 1], [0, 0, 0], [[100, 0, 0], [0, 100, 0]]),), (PartCharacteristic("", "flatness", ("A",)),)
     )
-    at = AtPose(plan, Circumstances(machine(unmodelled=unmodelled_errors([], {}))), POSE)
+    at = AtPose(plan, MeasurementConditions(machine(unmodelled=unmodelled_errors([], {}))), POSE)
     assert at.lacking == {f"drift_{axis}": "time_s" for axis in "xyz"}
 
 
@@ -150,9 +150,9 @@ def test_the_reference_sphere_is_probed_at_25_points_of_its_upper_half() -> None
 def test_what_is_probed_later_has_moved_farther(order: tuple[int, ...], times: tuple[float, ...], part: float) -> None:
     """Of three points the second is off by that part of the whole movement which is over when it is probed."""
     spots = (spot("a", [0, 0, 0]), spot("b", [100, 0, 0]), spot("c", [200, 0, 0]))
-    plan = Plan(spots, (Characteristic("", "distance", ("a", "b")),),
+    plan = Plan(spots, (PartCharacteristic("", "distance", ("a", "b")),),
                 order=np.array(order, dtype=np.int64), times_s=np.array(times))  # fmt: skip
-    given = Circumstances(machine(), further=(moving_part(plan, 4.0),))
+    given = MeasurementConditions(machine(), further=(moving_part(plan, 4.0),))
     assert drawn(plan, given).std() == pytest.approx(4e-3 * part, rel=0.02)
     turned = moving_part(plan, 0.0, 1.0).moved(np.array([[0.0, 0, 0, 0, 0, 1.0]]), slice(None))[0]
     assert turned[-1, 1] == pytest.approx(100 * 4.848e-6 * elapsed(plan)[-1], rel=1e-3)

@@ -11,8 +11,8 @@ from cmm_uq.analysis.parts import virtual
 from cmm_uq.analysis.parts.causes import condensing
 from cmm_uq.analysis.parts.causes.form import SurfaceForm
 from cmm_uq.analysis.parts.machine.state import MachineState, StatedNoise
-from cmm_uq.analysis.parts.plan import Characteristic, Feature, Nominal, PartAlignment, Plan
-from cmm_uq.analysis.parts.virtual import Circumstances, Virtual
+from cmm_uq.analysis.parts.plan import Nominal, PartAlignment, PartCharacteristic, PartFeature, Plan
+from cmm_uq.analysis.parts.virtual import MeasurementConditions, Virtual
 from cmm_uq.base.points import Floats, Machine
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.geometry import exchange
@@ -21,40 +21,40 @@ from cmm_uq.maths.geometry.repeated import Raised, Repeated
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def face(rows: int, columns: int) -> Feature:
+def face(rows: int, columns: int) -> PartFeature:
     x, y = np.meshgrid(np.linspace(0, 110, columns), np.linspace(0, 70, rows))
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    return Feature("A", "plane", points, np.tile(UP, (len(points), 1)), "stylus", Nominal(points.mean(axis=0), UP))
+    return PartFeature("A", "plane", points, np.tile(UP, (len(points), 1)), "stylus", Nominal(points.mean(axis=0), UP))
 
 
-def bore(sections: int, count: int) -> Feature:
+def bore(sections: int, count: int) -> PartFeature:
     z, angle = (
         each.ravel() for each in np.meshgrid(np.linspace(2, 18, sections), 2 * np.pi * np.arange(count) / count)
     )
     normals = -np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(z))])
     points = np.array([50.0, 30.0, -20.0]) + np.column_stack([np.zeros((len(z), 2)), z]) - 15 * normals
-    return Feature("bore", "cylinder", points, normals, "stylus", Nominal(np.array([50.0, 30.0, -10.0]), UP, 30.0))
+    return PartFeature("bore", "cylinder", points, normals, "stylus", Nominal(np.array([50.0, 30.0, -10.0]), UP, 30.0))
 
 
 PLAN = Plan(
     (face(15, 16), bore(15, 14)),
     (
-        Characteristic("flatness", "flatness", ("A",), association="minimum_zone"),
-        Characteristic("size", "size", ("bore",)),
-        Characteristic("squareness", "perpendicularity", ("bore",), ("A",)),
+        PartCharacteristic("flatness", "flatness", ("A",), association="minimum_zone"),
+        PartCharacteristic("size", "size", ("bore",)),
+        PartCharacteristic("squareness", "perpendicularity", ("bore",), ("A",)),
     ),
     alignment=PartAlignment(("A",)),
 )
 
 
-def circumstances(measured: Floats | None) -> Circumstances:
+def circumstances(measured: Floats | None) -> MeasurementConditions:
     draws = np.random.default_rng(1).standard_normal((2000, 2)) * [3.0, 2.0]
     noise = StatedNoise(np.tile([[1e-3, 2e-3, 1.5e-3], [2e-3, 1e-3, 1e-3]], (1000, 1)))
     machine = MachineState(Machine("mine"), effects(["scale_x", "squareness_zx"]), draws, noise)
-    return Circumstances(machine, forms=(SurfaceForm("A", roughness_um=0.5),), measured=measured)
+    return MeasurementConditions(machine, forms=(SurfaceForm("A", roughness_um=0.5),), measured=measured)
 
 
-def lighter(monkeypatch: pytest.MonkeyPatch, given: Circumstances) -> Virtual:
+def lighter(monkeypatch: pytest.MonkeyPatch, given: MeasurementConditions) -> Virtual:
     for module in (condensing, virtual):
         monkeypatch.setattr(module, "LARGE", 200)
     return Virtual(PLAN, given)
@@ -84,7 +84,7 @@ def test_errors_of_large_features_are_distributed_as_those_of_every_coordinate(
 
 @pytest.mark.parametrize("association", ["least_squares", "minimum_zone"])
 @pytest.mark.parametrize("feature", [face(12, 12), bore(12, 12)], ids=["plane", "cylinder"])
-def test_points_along_their_normals_are_those_points(feature: Feature, association: str) -> None:
+def test_points_along_their_normals_are_those_points(feature: PartFeature, association: str) -> None:
     repeated, random = Repeated(feature.kind, feature.points), np.random.default_rng(4)
     heights, offset = 2e-3 * random.standard_normal((5, 144)), 1e-3 * random.standard_normal((144, 3))
     every = getattr(repeated, association)(offset + heights[:, :, None] * feature.normals)
@@ -95,7 +95,7 @@ def test_points_along_their_normals_are_those_points(feature: Feature, associati
 
 @pytest.mark.parametrize("feature", [face(35, 36), bore(35, 36)], ids=["plane", "cylinder"])
 def test_zones_of_points_that_stand_out_are_those_of_all_points(
-    monkeypatch: pytest.MonkeyPatch, feature: Feature
+    monkeypatch: pytest.MonkeyPatch, feature: PartFeature
 ) -> None:
     repeated, random = Repeated(feature.kind, feature.points), np.random.default_rng(5)
     errors = 1e-3 * random.standard_normal((8, 1260, 3)) + 0.01 * np.sin(feature.points / 20)

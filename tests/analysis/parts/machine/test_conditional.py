@@ -30,13 +30,13 @@ from cmm_uq.analysis.parts.machine.state import (
     of_machine,
 )
 from cmm_uq.analysis.parts.placing import PartPose
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.app.commands.model import recorded_model
 from cmm_uq.artefacts.ballbar.observe import Ballbar
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.machine.model import MeasurementModel
+from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.drawn_noise import Noise
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import effects
@@ -56,9 +56,9 @@ def left_out(*names: str) -> tuple[Unmodelled, ...]:
     return tuple(Unmodelled(e, np.array([c.prior_sd for c in e.coefficients])) for e in effects(names))
 
 
-def calibration(xyz: Floats | None = None) -> MeasurementModel:
+def calibration(xyz: Floats | None = None) -> RecordingModel:
     points = BARS if xyz is None else BARS.at(xyz)
-    return MeasurementModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
+    return RecordingModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
 
 
 def test_the_joint_posterior_is_the_normal_distribution_of_parameters_given_observations() -> None:
@@ -99,13 +99,13 @@ def test_all_trial_periods_together_have_nearly_the_covariance_of_a_period_that_
     np.testing.assert_allclose(np.diagonal(off), 0.0, atol=1e-12)
 
 
-def gauge() -> MeasurementModel:
+def gauge() -> RecordingModel:
     """The example's step gauge: seven lines of 7 to 15 faces, three times."""
     model, _ = recorded_model(cmm_uq.read(ROOT / "examples" / "step-gauge-simulated"))
     return replace(model, effects=effects(MODELLED))
 
 
-def beside(model: MeasurementModel, sigma: float, between: Floats) -> tuple[Floats, Floats]:
+def beside(model: RecordingModel, sigma: float, between: Floats) -> tuple[Floats, Floats]:
     """Mean (t,) and covariance (t, t), mm, of a periodic error of y at readings, in the space of observations with its
     covariance itself: K** − K*(K + D·P·Dᵀ + σ²)⁻¹K*ᵀ (Rasmussen, Williams 2006, eq. 2.24); each reading moved by 1 mm."""
     (periodic,), linear = effects(["periodic_scale_y"]), model.estimate().linear
@@ -158,7 +158,7 @@ def test_a_draw_of_an_error_with_a_period_has_one_beforehand_with_the_covariance
     )
 
 
-def repeated(times: int) -> MeasurementModel:
+def repeated(times: int) -> RecordingModel:
     """The bars, each measured so many times in its set-up."""
     n = len(BARS)
     points = replace(
@@ -166,7 +166,7 @@ def repeated(times: int) -> MeasurementModel:
         point=np.tile(BARS.point, times), repeat=np.repeat(np.arange(1, times + 1), n), lines=np.arange(n * times),
         columns={name: np.tile(values, times) for name, values in BARS.columns.items()},
     )  # fmt: skip
-    return MeasurementModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
+    return RecordingModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
 
 
 def test_offsets_of_set_ups_widen_what_is_left_out_as_generalised_least_squares_says() -> None:
@@ -221,7 +221,7 @@ def test_components_of_a_recording_act_on_a_part_as_they_did_there() -> None:
     part of the recording's duration; steps of a display."""
     model = repeated(3)
     points = replace(model.artefact.points, columns={"time_s": 7.0 * np.arange(len(model.artefact.points))})
-    model = MeasurementModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
+    model = RecordingModel(Ballbar(JOB.facts.artefact, points), effects(MODELLED))
     one = np.ones(1)
     sizes = Sizes(2e-3 * np.ones((1, 3)), 3e-3 * one, 4e-3 * one, 5e-3 * one, 10 * one)
     components = replace(noise_of(model), display=1e-3)
@@ -261,7 +261,7 @@ def test_an_error_that_was_left_out_does_not_make_intervals_of_parts_too_narrow(
     # a diagonal of x and y close above the table: by x·z·roll it is another one than halfway up, which no squareness is
     noise, pose = StatedNoise(np.full(3, SIGMA)), PartPose(np.eye(3), np.array([-400.0, -200.0, -180.0]))
     pair = spot("one", [0, 0, 0]), spot("other", [300, 300, 0])
-    plan = Plan(pair, (Characteristic("", "distance", ("one", "other")),))
+    plan = Plan(pair, (PartCharacteristic("", "distance", ("one", "other")),))
     inside = np.zeros(2)
     for _ in range(machines):
         truth = sd * random.standard_normal(len(sd))
@@ -283,7 +283,7 @@ def test_an_error_that_was_left_out_does_not_make_intervals_of_parts_too_narrow(
 
 
 def _errors(plan: Plan, state: MachineState, pose: PartPose, random: np.random.Generator, n: int) -> Floats:
-    at = AtPose(plan, Circumstances(state), pose)
+    at = AtPose(plan, MeasurementConditions(state), pose)
     return at.errors(at.drawn(random, n))[:, 0]
 
 

@@ -9,15 +9,15 @@ import pytest
 
 from cmm_uq.analysis.parts.causes.surroundings import Expansion, Surroundings
 from cmm_uq.analysis.parts.machine.state import StatedNoise, aged
-from cmm_uq.analysis.parts.plan import Characteristic, Plan
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from tests.parts_drawn import POSE, machine, spot
 
-APART = (Characteristic("apart", "distance", ("one", "other")),)
+APART = (PartCharacteristic("apart", "distance", ("one", "other")),)
 PAIR = Plan((spot("one", [0, 0, 0]), spot("other", [300, 0, 0])), APART)
 
 
-def errors(plan: Plan, given: Circumstances, n: int = 20_000) -> np.ndarray:
+def errors(plan: Plan, given: MeasurementConditions, n: int = 20_000) -> np.ndarray:
     at = AtPose(plan, given, POSE)
     return at.errors(at.drawn(np.random.default_rng(0), n))[:, 0]
 
@@ -35,7 +35,7 @@ def test_what_a_scale_may_have_drifted_by_is_drawn_with_it() -> None:
     now = aged(state, date(2026, 4, 11), change)
     assert asked == [("scale_x.ppm", 100.0)]
     assert (now.age_days, now.drift_unknown) == (100, ())
-    assert errors(PAIR, Circumstances(now)).std() == pytest.approx(300 * 5e-6, rel=0.02)
+    assert errors(PAIR, MeasurementConditions(now)).std() == pytest.approx(300 * 5e-6, rel=0.02)
 
 
 def test_a_drift_that_nobody_knows_is_named() -> None:
@@ -55,27 +55,29 @@ def test_a_warm_scale_that_was_calibrated_warm_reads_right() -> None:
     """Steel scales at 23 °C that nobody compensates: their certificate of 23 °C has their expansion, one of 20 °C has not."""
     warm = Expansion(10e-6, 0.0, 23.0, corrected=False)
     for at_c, error in ((None, -300 * 10e-6 * 3), (20.0, -300 * 10e-6 * 3), (23.0, 0.0), (22.0, -300 * 10e-6)):
-        given = Circumstances(machine(temperature_c=at_c), surroundings=Surroundings(scales=(warm,) * 3))
+        given = MeasurementConditions(machine(temperature_c=at_c), surroundings=Surroundings(scales=(warm,) * 3))
         assert errors(PAIR, given, 2)[0] == pytest.approx(error, abs=1e-8)
 
 
 def test_a_coefficient_of_expansion_is_uncertain_by_the_distance_from_the_calibration() -> None:
     """u(α)·ΔT·L with ΔT = 24 − 22 K."""
     scale = Expansion(10e-6, 1e-6, 24.0)
-    given = Circumstances(machine(temperature_c=22.0), surroundings=Surroundings(scales=(scale,) * 3))
+    given = MeasurementConditions(machine(temperature_c=22.0), surroundings=Surroundings(scales=(scale,) * 3))
     assert errors(PAIR, given).std() == pytest.approx(300 * 1e-6 * 2, rel=0.02)
 
 
 def test_what_is_probed_later_is_warmer() -> None:
     """α·u·L/2: the ends of a part, by its middle, are 150 mm away, and only the second is warm; so is a scale, at 600 mm."""
     part = Surroundings(Expansion(10e-6), u_drift_k=0.5)
-    assert errors(PAIR, Circumstances(machine(), surroundings=part)).std() == pytest.approx(150 * 10e-6 * 0.5, rel=0.02)
+    assert errors(PAIR, MeasurementConditions(machine(), surroundings=part)).std() == pytest.approx(
+        150 * 10e-6 * 0.5, rel=0.02
+    )
     scales = Surroundings(scales=(Expansion(10e-6), Expansion(), Expansion()), u_drift_k=0.5)
-    assert errors(PAIR, Circumstances(machine(), surroundings=scales)).std() == pytest.approx(
+    assert errors(PAIR, MeasurementConditions(machine(), surroundings=scales)).std() == pytest.approx(
         600 * 10e-6 * 0.5, rel=0.02
     )
     turned = Plan(PAIR.features, APART, order=np.array([1, 0]))
-    assert errors(turned, Circumstances(machine(), surroundings=scales)).std() == pytest.approx(
+    assert errors(turned, MeasurementConditions(machine(), surroundings=scales)).std() == pytest.approx(
         300 * 10e-6 * 0.5, rel=0.02
     )
 
@@ -97,12 +99,12 @@ def test_noise_that_grows(longest: float, first: int, u: float) -> None:
     order = np.array([first, 1 - first])
     plan = Plan(PAIR.features, APART, order=order)
     noise = StatedNoise(growth_mm=3e-3, longest_mm=longest)
-    assert errors(plan, Circumstances(machine(noise=noise))).std() == pytest.approx(3e-3 * u, rel=0.02)
+    assert errors(plan, MeasurementConditions(machine(noise=noise))).std() == pytest.approx(3e-3 * u, rel=0.02)
 
 
 def test_an_offset_of_a_set_up_is_as_its_draws_are() -> None:
     """Absent in three of four draws: a mixture with the variance of all, and many errors of zero."""
     noise = StatedNoise(placing_mm=np.array([0.0, 0.0, 0.0, 4e-3]))
-    found = errors(PAIR, Circumstances(machine(noise=noise), repeats=9))
+    found = errors(PAIR, MeasurementConditions(machine(noise=noise), repeats=9))
     assert found.std() == pytest.approx(4e-3 * np.sqrt(2) / 2, rel=0.03)
     assert np.mean(np.abs(found) < 1e-9) == pytest.approx(0.75, abs=0.01)

@@ -13,7 +13,7 @@ from cmm_uq.analysis.parts.methods.method import MethodComparison, MethodFigure,
 from cmm_uq.analysis.parts.result import StatedCharacteristic
 from cmm_uq.base.messages import say
 from cmm_uq.base.units import ARCSECOND, unit
-from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, Line
+from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 
 NAME = "d"
 STATED = StatedCharacteristic(NAME, 20.001, 0.0, 5e-3, (19.991, 20.011), 2.0)
@@ -25,7 +25,7 @@ SHARES = Shares((NAME,), CAUSES, TOTAL, TOTAL, (), np.zeros((0, 1)), np.array([5
 
 def figure(**changes: object) -> MethodFigure:
     """U = 2 · 1.5 µm; what varied scattered by 5 µm · √0.32 = 2.83 µm."""
-    budget = Budget(say("b"), [Line(say("all"), 1.5e-3, REPEATS, unit=unit("mm"))], 2e-3, unit("mm"), factor=2.0)
+    budget = Budget(say("b"), [BudgetLine(say("all"), 1.5e-3, REPEATS, unit=unit("mm"))], 2e-3, unit("mm"), factor=2.0)
     given = {"value": 19.999, "systematic": 2e-3, "scatter": 2.83e-3, "scatter_dof": 19.0}
     return MethodFigure(NAME, budget, **{**given, **changes})  # type: ignore[arg-type]
 

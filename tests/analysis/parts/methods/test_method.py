@@ -22,8 +22,8 @@ from cmm_uq.analysis.parts.methods.method import (
     by_orientations,
 )
 from cmm_uq.analysis.parts.methods.of_job import sensitivities
-from cmm_uq.analysis.parts.plan import Characteristic, Plan, Stylus
-from cmm_uq.analysis.parts.virtual import AtPose, Circumstances
+from cmm_uq.analysis.parts.plan import PartCharacteristic, Plan, Stylus
+from cmm_uq.analysis.parts.virtual import AtPose, MeasurementConditions
 from cmm_uq.base.errors import CmmUqError
 from tests.parts_drawn import POSE, block, bore, machine, plane, spot
 
@@ -61,9 +61,9 @@ def test_an_angle_is_in_rad_and_does_not_expand() -> None:
 
 def test_it_sees_what_repeats_vary_and_as_a_systematic_error_what_they_keep() -> None:
     """One machine of a scale error of 8 ppm, and temperatures that differ from set-up to set-up by 0.3 K."""
-    plan = Plan((spot("o", [0, 0, 0]), spot("x", [300, 0, 0])), (Characteristic("l", "distance", ("o", "x")),))
+    plan = Plan((spot("o", [0, 0, 0]), spot("x", [300, 0, 0])), (PartCharacteristic("l", "distance", ("o", "x")),))
     warm = Surroundings(Expansion(11.5e-6, u_temperature_k=0.3))
-    at = AtPose(plan, Circumstances(machine(["scale_x"], [[8.0]], 0.5, corrected=False), (POSE,), warm), POSE)
+    at = AtPose(plan, MeasurementConditions(machine(["scale_x"], [[8.0]], 0.5, corrected=False), (POSE,), warm), POSE)
     n = 4000
     errors = at.errors(at.drawn(np.random.default_rng(1), n))[:, 0]
     found = by_calibrated_part("l", 300 + errors, np.arange(n), CalibratedCharacteristic(300.0, 0.2e-3))
@@ -175,7 +175,7 @@ def test_a_tip_moves_what_it_probes_alone() -> None:
         bore("h", [0, 0, 0], 10.0, stylus="one"),
         plane("A", [0, 0, 1], [0, 0, 0], [[9, 0, 0], [0, 9, 0]], stylus="two"),
     )
-    plan = Plan(features, (Characteristic("d", "size", ("h",)),), (Stylus("one"), Stylus("two")))
+    plan = Plan(features, (PartCharacteristic("d", "size", ("h",)),), (Stylus("one"), Stylus("two")))
     found = sensitivities(plan)
     assert found.tips["one"] == pytest.approx([-1.0], rel=1e-6)
     assert found.tips["two"] == pytest.approx([0.0], abs=1e-9)

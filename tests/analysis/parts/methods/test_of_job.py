@@ -12,9 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.examples.part_methods_job import BESIDE_MM, LARGER_MM, TABLES, made
-from benchmarks.examples.part_methods_job import FOLDER as EXAMPLE
-from benchmarks.examples.part_methods_job import files as example_files
+from benchmarks.examples.part_methods_job import (
+    BESIDE_MM,
+    FOLDER as EXAMPLE,
+    LARGER_MM,
+    TABLES,
+    files as example_files,
+    made,
+)
 from cmm_uq.analysis.parts.methods.method import MethodResult
 from cmm_uq.analysis.parts.methods.of_job import lacking, methods_of
 from cmm_uq.analysis.parts.result import evaluated

@@ -32,8 +32,7 @@ from cmm_uq.base.points import Machine
 from cmm_uq.jobs.part import characteristic, feature
 from cmm_uq.jobs.part.job import TABLES, read_part
 from cmm_uq.maths.geometry.association import ASSOCIATIONS
-from tests.jobs.part.parts import feature as probed_feature
-from tests.jobs.part.parts import plate
+from tests.jobs.part.parts import feature as probed_feature, plate
 from tests.jobs.part.test_dmis import BORE, EDGE, HEAD, TOP
 from tests.jobs.part.test_qif import document
 
@@ -159,9 +158,9 @@ def test_what_a_job_may_ask_the_virtual_measurement_evaluates(what: str, kind: A
     asks = characteristic.ASKS[what]  # type: ignore[index]
     names = [f"f{i}" for i in range(asks.features)]
     one = plan_feature(kind)
-    features = [plan.Feature(name, *one) for name in names] + [plan.Feature("datum", *plan_feature(datum))]
+    features = [plan.PartFeature(name, *one) for name in names] + [plan.PartFeature("datum", *plan_feature(datum))]
     datums = ("datum",) if asks.datums else ()
-    asked = plan.Characteristic("1", what, tuple(names), datums)
+    asked = plan.PartCharacteristic("1", what, tuple(names), datums)
     CharacteristicEvaluation(asked, plan.Plan(tuple(features), (asked,), alignment=plan.PartAlignment(("datum",))), {})
 
 

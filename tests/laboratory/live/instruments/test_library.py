@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.live.instruments.library import ProfileDraft, drafted, numbers_in, profile_of

@@ -12,8 +12,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.profile import bytes_of, shown

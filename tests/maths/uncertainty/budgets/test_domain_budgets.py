@@ -7,7 +7,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.units import ARCSECOND
-from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Line
+from cmm_uq.maths.uncertainty.budget import JUDGEMENT, BudgetLine
 from cmm_uq.maths.uncertainty.budgets.machine import (
     expanded_without_correction,
     length_test_uncertainty,
@@ -209,7 +209,7 @@ def test_use_of_the_machine_by_a_calibrated_workpiece() -> None:
 
 def test_use_of_the_machine_by_simulation() -> None:
     errors = np.random.default_rng(1).normal(1e-3, 2e-3, 1000)
-    budget = use_by_simulation(errors, [Line("workpiece temperature", 1e-3, JUDGEMENT, unit="mm")])
+    budget = use_by_simulation(errors, [BudgetLine("workpiece temperature", 1e-3, JUDGEMENT, unit="mm")])
     assert budget.u == pytest.approx(np.hypot(errors.std(ddof=1), 1e-3))
     assert budget.value == pytest.approx(errors.mean())
     with pytest.raises(CmmUqError, match="99 simulated"):
