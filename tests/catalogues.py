@@ -50,19 +50,38 @@ def sentences() -> dict[Key, list[str]]:
 
 def patterns(tree: ast.AST) -> Iterator[Key]:
     """Of the calls of ``say`` and ``plural`` in a module, as they stand in it; a plural of two literals is one."""
-    calls = sorted(
-        (node for node in ast.walk(tree) if isinstance(node, ast.Call)), key=lambda n: (n.lineno, n.col_offset)
-    )
-    within: set[ast.AST] = set()
+    calls = sorted((node for node in ast.walk(tree) if isinstance(node, ast.Call)), key=_place)
+    pairs = {one: many for call in calls if _named(call, "plural") for one, many in plural_forms(call, tree)}
     for call in calls:
-        if _named(call, "plural"):
-            forms = [keyword.value for keyword in sorted(call.keywords, key=lambda k: k.arg != "one")]
-            both = tuple(found for form in forms if (found := _pattern(form)) is not None)
-            if len(both) == 2:
-                within.update(forms)
-                yield both
-        elif call not in within and (own := _pattern(call)) is not None:
-            yield (own,)
+        if call not in pairs.values() and (own := _pattern(call)) is not None:
+            yield (own, str(_pattern(pairs[call]))) if call in pairs else (own,)
+
+
+def _place(node: ast.expr) -> tuple[int, int]:
+    return node.lineno, node.col_offset
+
+
+def plural_forms(plural: ast.Call, tree: ast.AST) -> list[tuple[ast.Call, ast.Call]]:
+    """The literals of one and of many, in the call itself or in what its names were given before it in the same block."""
+    given = {keyword.arg: keyword.value for keyword in plural.keywords}
+    found = [_literals(given[form], plural, tree) for form in ("one", "many") if form in given]
+    return list(zip(*found, strict=False)) if len(found) == 2 else []
+
+
+def _literals(value: ast.expr, plural: ast.Call, tree: ast.AST) -> list[ast.Call]:
+    if _pattern(value) is not None and isinstance(value, ast.Call):
+        return [value]
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) and plural in ast.walk(node)]
+    earlier = [node for function in functions[-1:] for node in ast.walk(function)
+               if isinstance(node, ast.Assign) and node.lineno < plural.lineno]  # fmt: skip
+    since = max((node.end_lineno or 0 for node in ast.walk(tree) if _named(node, "plural") and _place(node) < _place(plural)
+                 and isinstance(node, ast.Call)), default=0)  # fmt: skip
+    return [
+        node.value
+        for node in sorted(earlier, key=lambda n: n.lineno)
+        if node.lineno > since and isinstance(node.value, ast.Call) and _pattern(node.value) is not None
+        and isinstance(value, ast.Name) and [t.id for t in node.targets if isinstance(t, ast.Name)] == [value.id]
+    ]  # fmt: skip
 
 
 def _named(node: ast.AST, name: str) -> bool:

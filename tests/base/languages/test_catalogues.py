@@ -13,7 +13,19 @@ import polib
 import pytest
 
 from cmm_uq.base.languages.translation import Code, catalogue, file_of
-from tests.catalogues import FORMS, PACKAGE, TRANSLATED, forms_of, key_of, merged, patterns, problems, read, sentences
+from tests.catalogues import (
+    FORMS,
+    PACKAGE,
+    TRANSLATED,
+    forms_of,
+    key_of,
+    merged,
+    patterns,
+    plural_forms,
+    problems,
+    read,
+    sentences,
+)
 
 wanted_sentences = cache(sentences)
 
@@ -51,14 +63,11 @@ def test_no_sentence_begins_or_ends_with_a_blank_that_a_translator_would_lose() 
 
 def test_every_plural_has_both_forms_where_it_is_called() -> None:
     """Else each form would be an entry by itself, without the forms that a language has for it."""
-    calls = [
-        (path.name, key) for path in sorted(PACKAGE.rglob("*.py"))
-        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "plural"
-        for key in list(patterns(call))[:1]
-    ]  # fmt: skip
+    trees = [(path.name, ast.parse(path.read_text(encoding="utf-8"))) for path in sorted(PACKAGE.rglob("*.py"))]
+    calls = [(name, call, tree) for name, tree in trees for call in ast.walk(tree)
+             if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "plural"]  # fmt: skip
     assert len(calls) > 40
-    assert [(name, key) for name, key in calls if len(key) != 2] == []
+    assert [(name, call.lineno) for name, call, tree in calls if not plural_forms(call, tree)] == []
 
 
 def test_the_sentences_are_those_of_the_calls() -> None:
