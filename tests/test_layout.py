@@ -1,9 +1,12 @@
-"""The package is laid out as docs/layout.md says: domains in their order, and kinds known by name only where they may be."""
+"""The package is laid out as docs/layout.md says: domains in order, no circles, a class a name, few and full files."""
 
 from __future__ import annotations
 
 import ast
 import re
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +21,15 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 KNOW_KINDS = {"artefacts", "app"}
 """Domains that know all kinds; a plane and a sphere are features of geometry, of parts and of plans of parts too."""
 SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
+MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.migrations\.")
+"""Commands, kinds, effects, formats, profiles and standards are a file each, however short."""
+CEILING = {}
+"""Lines a domain may have; lowered whenever one has fewer."""
+SLICES, OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND, FOLDERS_TOO_FULL = 0, 0, 0, 0
+"""Modules still shorter than their only neighbour needs, imports of the package within functions, exemptions from the formatter,
+folders of more than twenty entries: only falling."""
+LOADED_LATE = set[str]()
+"""Packages that are imported where they are used: extras, and heavy libraries that a quick command does without."""
 
 
 def module_of(path: Path) -> str:
@@ -55,6 +67,34 @@ def domain_of(module: str) -> str:
     return [*module.split("."), ""][1]
 
 
+def circles() -> Iterator[set[str]]:
+    """Sets of modules that import each other: strongly connected components (Tarjan, SIAM J. Comput. 1 (1972) 146)."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+
+    def visit(module: str) -> Iterator[set[str]]:
+        index[module] = low[module] = len(index)
+        stack.append(module)
+        for other in imports(module):
+            if other not in index:
+                yield from visit(other)
+                low[module] = min(low[module], low[other])
+            elif other in stack:
+                low[module] = min(low[module], index[other])
+        if low[module] == index[module]:
+            place = stack.index(module)
+            members = set(stack[place:])
+            del stack[place:]
+            if len(members) > 1:
+                yield members
+
+    sys.setrecursionlimit(10_000)
+    for module in MODULES:
+        if module not in index:
+            yield from visit(module)
+
+
 def test_every_domain_is_in_the_table() -> None:
     assert {domain_of(module) for module, path in MODULES.items() if path.parent != PACKAGE} == set(DOMAINS)
 
@@ -64,6 +104,69 @@ def test_a_domain_imports_from_those_above_it() -> None:
     pairs = [(module, other) for module in inside for other in imports(module) if domain_of(other) in DOMAINS]
     below = [pair for pair in pairs if DOMAINS.index(domain_of(pair[1])) > DOMAINS.index(domain_of(pair[0]))]
     assert not below
+
+
+def test_no_files_import_each_other_in_a_circle() -> None:
+    assert not [sorted(circle) for circle in circles()]
+
+
+def test_a_public_class_has_a_name_of_its_own() -> None:
+    places = defaultdict(list)
+    for module, path in MODULES.items():
+        for node in ast.walk(tree_of(path)):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].append(module)
+    assert not {name: modules for name, modules in places.items() if len(modules) > 1}
+
+
+def test_no_folder_has_more_entries_than_are_taken_in_at_a_glance() -> None:
+    folders = [PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir() and path.name != "__pycache__")]
+    entries = {folder: {path.name for path in folder.iterdir()} - {"__init__.py", "__pycache__"} for folder in folders}
+    full = {folder.relative_to(ROOT): len(names) for folder, names in entries.items() if len(names) > 20}
+    assert len(full) <= FOLDERS_TOO_FULL, full
+
+
+def lines_of(path: Path) -> int:
+    return path.read_text(encoding="utf-8").count("\n")
+
+
+def test_no_file_is_too_long_to_read_at_one_sitting() -> None:
+    assert not {module: lines for module, path in MODULES.items() if (lines := lines_of(path)) > 400}
+
+
+def test_no_file_is_a_slice_of_its_only_neighbour() -> None:
+    """A module whose only importer stands in its own folder has something to say by itself: at least 80 lines."""
+    importers = defaultdict(set)
+    for module in MODULES:
+        for other in imports(module):
+            importers[other].add(module)
+    slices = {
+        module: next(iter(importers[module]))
+        for module, path in MODULES.items()
+        if len(importers[module]) == 1 and path.name != "__init__.py" and not MAY_BE_SHORT.search(module)
+        and MODULES[next(iter(importers[module]))].parent == path.parent and lines_of(path) < 80
+    }  # fmt: skip
+    assert len(slices) <= SLICES, slices
+
+
+def test_imports_stand_at_the_top() -> None:
+    inside = Counter(
+        node.module or "" if isinstance(node, ast.ImportFrom) else node.names[0].name
+        for module in MODULES for function in ast.walk(tree_of(MODULES[module])) if isinstance(function, ast.FunctionDef)
+        for node in ast.walk(function) if isinstance(node, (ast.Import, ast.ImportFrom))
+    )  # fmt: skip
+    own = sum(count for name, count in inside.items() if name.split(".")[0] == "cmm_uq")
+    assert own <= OWN_IMPORTS_INSIDE
+    assert {name.split(".")[0] for name in inside} - {"cmm_uq"} <= LOADED_LATE
+
+
+def test_the_package_does_not_grow() -> None:
+    """As ``wc -l`` counts: what comes is paid for by what goes."""
+    lines: Counter[str] = Counter()
+    for module, path in MODULES.items():
+        lines[domain_of(module)] += lines_of(path)
+    assert not {domain: count for domain, count in lines.items() if count > CEILING.get(domain, 0)}
+    assert sum(path.read_text(encoding="utf-8").count("# fmt: skip") for path in FILES) <= FORMATTED_BY_HAND
 
 
 def test_no_domain_below_knows_a_kind_by_name() -> None:

@@ -14,9 +14,11 @@ from pathlib import Path
 from unittest import mock
 
 import pytest
+from typer.main import get_command
 
 import cmm_uq
 from benchmarks.examples.screens import PAGE, complete
+from cmm_uq.app.cli.commands import app
 from cmm_uq.laboratory.live.instruments.library import profile_of
 from cmm_uq.maths.uncertainty.model_file import read_model_file
 from tests.app.cli.process import run as run_here
@@ -114,7 +116,7 @@ def test_an_excerpt_of_toml_keeps_to_its_form(page: Path) -> None:
 
 @pytest.mark.parametrize("page", having("console", excerpt=True))
 def test_an_excerpt_of_commands_names_commands_that_exist(page: Path) -> None:
-    names = {path.stem for path in (ROOT / "cmm_uq" / "app" / "cli").glob("*.py")} | {"import"}
+    names = set(get_command(app).commands)
     for snippet in snippets(page, "console", excerpt=True):
         for command in re.findall(r"^\$ cmm-uq (\S+)", snippet.text, re.MULTILINE):
             assert command in names or command.startswith("--"), f"{snippet}: {command}"

@@ -1,8 +1,4 @@
-"""Statements of DMIS by their first words: what is read of features, and what says nothing of a plan.
-
-Tolerances of DMIS programs, ``T(…)=TOL/…``, as keys of a characteristic.
-
-DMIS part programs (ISO 22093): nominal features with the points at which they are measured, tolerances, datums, styli.
+"""DMIS part programs (ISO 22093): nominal features with the points at which they are measured, tolerances, datums, styli.
 
 Read are ``F(…)=FEAT/…`` in Cartesian coordinates, measured by ``MEAS`` with ``PTMEAS``; ``T(…)=TOL/…`` that ``OUTPUT`` or
 ``EVAL`` gives to a feature; ``DATDEF``; styli by ``SNSDEF/PROBE``; and the frames of the program (``DATSET``, ``TRANS``,
