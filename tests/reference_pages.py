@@ -33,7 +33,7 @@ from cmm_uq.laboratory.live.instruments.library import profile_named, ready
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile
 from cmm_uq.machine.physics.catalogue import EVERY
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
-from cmm_uq.maths.uncertainty.input_keys import KINDS as DISTRIBUTIONS
+from cmm_uq.maths.uncertainty.models.input_keys import KINDS as DISTRIBUTIONS
 from tests.conftest import ROOT
 
 SHIPPED, PAGES = ROOT / "cmm_uq" / "schemas", ROOT / "docs" / "reference"

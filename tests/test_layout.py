@@ -21,14 +21,23 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 KNOW_KINDS = {"artefacts", "app"}
 """Domains that know all kinds; a plane and a sphere are features of geometry, of parts and of plans of parts too."""
 SHAPES_TOO = ("maths/geometry", "analysis/parts", "jobs/part")
-MAY_BE_SHORT = re.compile(r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.migrations\.")
-"""Commands, kinds, effects, formats, profiles and standards are a file each, however short."""
-CEILING = {}
+MAY_BE_SHORT = re.compile(
+    r"\.app\.|\.artefacts\.|\.effects\.|\.importing\.|\.profiles\.|\.standards|\.migrations\.|\.reference\."
+)
+"""Commands, kinds, effects, formats, profiles, standards and reference cases are a file each, however short."""
+CEILING = {
+    "": 200, "base": 3_050, "maths": 12_600, "jobs": 14_300, "machine": 6_700, "analysis": 18_900, "laboratory": 16_300,
+    "certificate": 18_150, "artefacts": 10_700, "app": 16_800,
+}  # fmt: skip
 """Lines a domain may have; lowered whenever one has fewer."""
-SLICES, OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND, FOLDERS_TOO_FULL = 0, 0, 0, 0
-"""Modules still shorter than their only neighbour needs, imports of the package within functions, exemptions from the formatter,
-folders of more than twenty entries: only falling."""
-LOADED_LATE = set[str]()
+OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 282, 1608
+"""Imports of the package within functions, and exemptions from the formatter: only falling."""
+LOADED_LATE = {
+    "alembic", "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl", "hashlib",
+    "importlib", "jinja2", "json", "lxml", "markupsafe", "matplotlib", "msvcrt", "numpy", "openpyxl", "pandas", "pint", "pkcs11",
+    "pty",     "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "rich", "scipy", "serial", "signxml", "sqlalchemy",
+    "termios", "tty", "typst", "uncertainties", "webbrowser", "xmlschema",
+}  # fmt: skip
 """Packages that are imported where they are used: extras, and heavy libraries that a quick command does without."""
 
 
@@ -122,8 +131,7 @@ def test_a_public_class_has_a_name_of_its_own() -> None:
 def test_no_folder_has_more_entries_than_are_taken_in_at_a_glance() -> None:
     folders = [PACKAGE, *(path for path in PACKAGE.rglob("*") if path.is_dir() and path.name != "__pycache__")]
     entries = {folder: {path.name for path in folder.iterdir()} - {"__init__.py", "__pycache__"} for folder in folders}
-    full = {folder.relative_to(ROOT): len(names) for folder, names in entries.items() if len(names) > 20}
-    assert len(full) <= FOLDERS_TOO_FULL, full
+    assert not {folder.relative_to(ROOT): len(names) for folder, names in entries.items() if len(names) > 20}
 
 
 def lines_of(path: Path) -> int:
@@ -146,15 +154,15 @@ def test_no_file_is_a_slice_of_its_only_neighbour() -> None:
         if len(importers[module]) == 1 and path.name != "__init__.py" and not MAY_BE_SHORT.search(module)
         and MODULES[next(iter(importers[module]))].parent == path.parent and lines_of(path) < 80
     }  # fmt: skip
-    assert len(slices) <= SLICES, slices
+    assert not slices
 
 
 def test_imports_stand_at_the_top() -> None:
-    inside = Counter(
-        node.module or "" if isinstance(node, ast.ImportFrom) else node.names[0].name
-        for module in MODULES for function in ast.walk(tree_of(MODULES[module])) if isinstance(function, ast.FunctionDef)
-        for node in ast.walk(function) if isinstance(node, (ast.Import, ast.ImportFrom))
-    )  # fmt: skip
+    functions = [node for module in MODULES for node in ast.walk(tree_of(MODULES[module]))
+                 if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]  # fmt: skip
+    within = [node for function in functions for node in ast.walk(function)]
+    inside = Counter(node.module or "" for node in within if isinstance(node, ast.ImportFrom))
+    inside.update(node.names[0].name for node in within if isinstance(node, ast.Import))
     own = sum(count for name, count in inside.items() if name.split(".")[0] == "cmm_uq")
     assert own <= OWN_IMPORTS_INSIDE
     assert {name.split(".")[0] for name in inside} - {"cmm_uq"} <= LOADED_LATE
@@ -164,8 +172,8 @@ def test_the_package_does_not_grow() -> None:
     """As ``wc -l`` counts: what comes is paid for by what goes."""
     lines: Counter[str] = Counter()
     for module, path in MODULES.items():
-        lines[domain_of(module)] += lines_of(path)
-    assert not {domain: count for domain, count in lines.items() if count > CEILING.get(domain, 0)}
+        lines[domain_of(module) if domain_of(module) in DOMAINS else ""] += lines_of(path)
+    assert not {domain: count for domain, count in lines.items() if count > CEILING[domain]}
     assert sum(path.read_text(encoding="utf-8").count("# fmt: skip") for path in FILES) <= FORMATTED_BY_HAND
 
 

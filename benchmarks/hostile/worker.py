@@ -35,7 +35,7 @@ def read(kind: str, path: Path) -> None:
     from cmm_uq.base.files.toml_file import checked
     from cmm_uq.jobs.truth import Truth
     from cmm_uq.machine.model.machine_maps import maps_of
-    from cmm_uq.maths.uncertainty.model_file import read_model_file
+    from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 
     if kind == "budget":
         read_model_file(path)

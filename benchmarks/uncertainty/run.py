@@ -16,7 +16,7 @@ import time
 from pathlib import Path
 
 HERE = Path(__file__).parent
-IMPORTS = ("cmm_uq.maths.uncertainty.evaluation", "cmm_uq.maths.uncertainty.model_file")
+IMPORTS = ("cmm_uq.maths.uncertainty.evaluation", "cmm_uq.maths.uncertainty.models.model_file")
 
 
 def contend(task: str, name: str) -> None:

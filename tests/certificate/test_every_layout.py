@@ -23,7 +23,7 @@ from cmm_uq.certificate.origin import marked
 from cmm_uq.certificate.pages.budget import budget_document
 from cmm_uq.certificate.render.html import render_html
 from cmm_uq.certificate.render.pdf import render_pdf
-from cmm_uq.maths.uncertainty.model_file import read_model_file
+from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 from tests.artefacts.simulated import diagnosed, document, planned
 from tests.certificate.samples import ballbar_certificate
 from tests.certificate.test_html_layout import CONTRASTS, LABELS_COLLIDING, OVERLAPS, WIDER_THAN_PAPER

@@ -24,8 +24,8 @@ from cmm_uq.jobs.tables.identification import Laboratory, ReplacedCertificate as
 from cmm_uq.jobs.tables.machine import MachineFacts
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
-from cmm_uq.maths.uncertainty.model_file import ModelFile, read_model_file
-from cmm_uq.maths.uncertainty.ready import READY as MODELS
+from cmm_uq.maths.uncertainty.models.model_file import ModelFile, read_model_file
+from cmm_uq.maths.uncertainty.models.ready import READY as MODELS
 from tests.artefacts.simulated import diagnosed, document, planned
 from tests.catalogues import TRANSLATED
 from tests.certificate.saying import figures, leaves, strangers, untranslated

@@ -20,7 +20,7 @@ import cmm_uq
 from benchmarks.examples.screens import PAGE, complete
 from cmm_uq.app.cli.commands import app
 from cmm_uq.laboratory.live.instruments.library import profile_of
-from cmm_uq.maths.uncertainty.model_file import read_model_file
+from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 from tests.app.cli.process import run as run_here
 from tests.conftest import ROOT
 from tests.site.pages import PAGES, Snippet, snippets

@@ -335,7 +335,7 @@ def budget(
         if inputs is not None:
             raise CmmUqError("inputs belong to a function; a model file has its own", where=str(model),
                              fix="Leave them out")  # fmt: skip
-        from cmm_uq.maths.uncertainty.model_file import read_model_file
+        from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 
         return read_model_file(Path(model)).evaluate(seed)
     if not inputs:

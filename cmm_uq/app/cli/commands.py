@@ -10,25 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli import (
-    acquire,
-    batch,
-    certificates,
-    diagnose,
-    due,
-    evaluations,
-    fleet,
-    history,
-    instruments,
-    jobs,
-    part,
-    prove,
-    records,
-    schedule,
-    serve,
-    sign,
-    verify,
-)
+from cmm_uq.app.cli import certificates, diagnose, evaluations, instruments, jobs, part, prove, sign, verify
+from cmm_uq.app.cli.laboratory import acquire, batch, due, fleet, history, records, schedule, serve
 from cmm_uq.app.cli.options import examples
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from cmm_uq.base.messages import Text
     from cmm_uq.certificate.wording import Headline as Verdict, Summary
     from cmm_uq.maths.uncertainty.evaluation import Evaluation
-    from cmm_uq.maths.uncertainty.selftest import SelfTestResult as Outcome
+    from cmm_uq.maths.uncertainty.reference.selftest import SelfTestResult as Outcome
 
 
 def report(
@@ -85,7 +85,7 @@ def report(
     many: dict[str, object] = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
     _refuse_other_way(job, alone if scheduled else many, scheduled=scheduled)
     if scheduled:
-        from cmm_uq.app.cli.scheduled import STANDARD_OUTPUT, run
+        from cmm_uq.app.cli.laboratory.scheduled import STANDARD_OUTPUT, run
         from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions as Asked
 
         asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
@@ -189,7 +189,7 @@ def selftest(
 ) -> None:
     """Compute published reference figures and compare: expected, got, source. Exit code 4 when any differs."""
     from cmm_uq import __version__
-    from cmm_uq.maths.uncertainty.selftest import run
+    from cmm_uq.maths.uncertainty.reference.selftest import run
 
     outcomes = run()
     passed = int(sum(outcome.passed for outcome in outcomes))
@@ -208,7 +208,7 @@ def _selftest_summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool
     from cmm_uq import __version__
     from cmm_uq.base.messages import NOTHING, Verbatim, say
     from cmm_uq.certificate.wording import Headline as Verdict, Summary
-    from cmm_uq.maths.uncertainty.selftest import as_text
+    from cmm_uq.maths.uncertainty.reference.selftest import as_text
 
     def verdict(what: Text, passed: bool, *remarks: Text) -> Verdict:
         return Verdict("PASS", "good", what, remarks) if passed else Verdict("FAIL", "bad", what, remarks)

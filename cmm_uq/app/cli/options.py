@@ -17,7 +17,7 @@ from cmm_uq.base.errors import CmmUqError, printable
 from cmm_uq.base.languages.translation import Code
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.signing import Signing
+    from cmm_uq.app.commands.certificates.signing import Signing
 
 JOB_FILE = "job.toml"
 
@@ -194,14 +194,14 @@ def time_of(text: str | None) -> dt.timedelta | None:
 
 def open_key(key: str, server: str | None, level: str | None, trust: list[Path] | None) -> Signing:
     """The key, opened."""
-    from cmm_uq.app.commands.signing import Wanted, signing
+    from cmm_uq.app.commands.certificates.signing import Wanted, signing
 
     return signing(Wanted(key, level, server, tuple(trust or ())), ask_secret)
 
 
 def ask_secret(question: str, *, twice: bool = False) -> str:
     """A secret from the keyboard, that is not shown."""
-    from cmm_uq.app.commands.signing import PASSPHRASE_FILE
+    from cmm_uq.app.commands.certificates.signing import PASSPHRASE_FILE
 
     if not on_terminal(sys.stdin):
         raise CmmUqError(f"{question.rstrip(': ')}: nobody is there to be asked", where="standard input",

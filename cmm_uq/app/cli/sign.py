@@ -47,7 +47,7 @@ def command(
     The set in their folder is written anew, all or none, and records that know the certificate are told.
     """
     signing = open_key(key, time_server, level, trust)
-    from cmm_uq.app.commands.sign import sign_files
+    from cmm_uq.app.commands.certificates.sign import sign_files
 
     done = sign_files(files, signing, out=out, records=records)
     if json:

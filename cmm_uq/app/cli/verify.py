@@ -12,7 +12,7 @@ from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED, progress, 
 from cmm_uq.base.errors import printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.verification import Verification
+    from cmm_uq.app.commands.certificates.verification import Verification
 
 EXAMPLES = examples(
     "verify certificate.pdf", "verify reports/iota-1102-20C", "verify certificate.pdf certificate.html --no-rerun",
@@ -57,7 +57,7 @@ def command(
     file cannot be read.
     """
     with progress(quiet=quiet or json, verbose=verbose) as stage:
-        from cmm_uq.app.commands.verify import verify
+        from cmm_uq.app.commands.certificates.verify import verify
 
         found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
     inquiry = found.inquiry

@@ -13,7 +13,7 @@ from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.base.output import Owner, staged
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.maths.uncertainty.evaluation import Evaluation
-from cmm_uq.maths.uncertainty.model_file import read_model_file
+from cmm_uq.maths.uncertainty.models.model_file import read_model_file
 
 FILES = ("budget.html", "budget.pdf", "results.json")
 

@@ -22,7 +22,7 @@ from cmm_uq.laboratory.records.content import certificate_content, folder_from, 
 from cmm_uq.laboratory.records.place import DEFAULT, NONE, beside, place_of
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.signing import Signing
+    from cmm_uq.app.commands.certificates.signing import Signing
     from cmm_uq.laboratory.records.store import Records
 
 _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")

@@ -42,7 +42,7 @@ from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.posterior import sample_with_noise
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.signing import Signing
+    from cmm_uq.app.commands.certificates.signing import Signing
 
 REPORT = Form("report", ("certificate.html", DIGITAL, "certificate.pdf"), further=(PROVENANCE,), recorded=True)
 

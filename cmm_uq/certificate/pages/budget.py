@@ -13,8 +13,8 @@ from cmm_uq.maths.uncertainty.budget_results import COMPARISON, SUMMARY, compari
 
 if TYPE_CHECKING:
     from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult as Stated
-    from cmm_uq.maths.uncertainty.model_file import ModelFile
-    from cmm_uq.maths.uncertainty.ready import ReadyBudget
+    from cmm_uq.maths.uncertainty.models.model_file import ModelFile
+    from cmm_uq.maths.uncertainty.models.ready import ReadyBudget
 
 _TEXT = {"Quantity", "Unit", "Distribution", "Origin", "Method", "Interval"}
 

@@ -9,8 +9,7 @@ import pytest
 import typer
 
 from cmm_uq.app.cli.evaluations import selftest as command
-from cmm_uq.maths.uncertainty import selftest
-from cmm_uq.maths.uncertainty.reference import jcgm_100
+from cmm_uq.maths.uncertainty.reference import jcgm_100, selftest
 from cmm_uq.maths.uncertainty.reference.case import ReferenceCase
 from tests.app.cli.process import run
 

@@ -16,12 +16,12 @@ import pytest
 from typer.testing import CliRunner
 
 from cmm_uq.app.cli.terminal import NOT_VERIFIED, NOT_WHOLLY_CHECKED
+from cmm_uq.app.commands.certificates.verification import Verification
+from cmm_uq.app.commands.certificates.verify import verify
+from cmm_uq.app.commands.certificates.verify_part import _asked_again
 from cmm_uq.app.commands.parts.documents import contents_of, write_part, written
 from cmm_uq.app.commands.parts.machine import state_machine
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
-from cmm_uq.app.commands.verification import Verification
-from cmm_uq.app.commands.verify import verify
-from cmm_uq.app.commands.verify_part import _asked_again
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.part.measurement import PartMeasurement
 from cmm_uq.certificate.part.results import standing_data
@@ -51,7 +51,7 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests whose report was made by :func:`plate_found`, that computing again has no part in."""
-    monkeypatch.setattr("cmm_uq.app.commands.verify_part.evaluate_part", found_again_once)
+    monkeypatch.setattr("cmm_uq.app.commands.certificates.verify_part.evaluate_part", found_again_once)
 
 
 def found_in(folder: Path, files: Mapping[str, bytes], *names: str, rerun: bool = False) -> Verification:

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("pyhanko")
 pytest.importorskip("signxml")
 
-from cmm_uq.app.commands.verify import verify
+from cmm_uq.app.commands.certificates.verify import verify
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate import sign as signing
 from cmm_uq.certificate.sign import sign_pdf, sign_xml, signer_of_file

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cmm_uq.laboratory.due.attributes import interval_test
-from cmm_uq.laboratory.due.interval import interval_by
+from cmm_uq.laboratory.due.due import interval_by
 from cmm_uq.laboratory.due.observed import CompletedInterval, ended_intervals
 from cmm_uq.laboratory.due.rule import DAYS_A_MONTH, Rule
 from cmm_uq.laboratory.due.variables import LastValue, fitted_drift, interval_of_reliability

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.expression import LONGEST, name_problem, parse
 from cmm_uq.maths.uncertainty.measurement_model import derivatives
+from cmm_uq.maths.uncertainty.models.expression import LONGEST, name_problem, parse
 
 
 @pytest.mark.parametrize(

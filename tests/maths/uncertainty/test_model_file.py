@@ -11,7 +11,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.uncertainty.budget_results import comparison_rows, results_of, statement, summary_rows
-from cmm_uq.maths.uncertainty.model_file import ModelFile, read_model_file
+from cmm_uq.maths.uncertainty.models.model_file import ModelFile, read_model_file
 
 Read = Callable[[str], ModelFile]
 

@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.maths.geometry import cap_directions, fit_sphere
 from cmm_uq.maths.uncertainty.budgets.machine import use_by_calibrated_workpiece
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES
-from cmm_uq.maths.uncertainty.ready import READY
+from cmm_uq.maths.uncertainty.models.ready import READY
 from tests.app.cli.process import run
 
 READINGS = (100.0042 + 1e-3 * np.sin(7.0 * np.arange(20))).round(5)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.maths.uncertainty.reference.case import ReferenceCase
-from cmm_uq.maths.uncertainty.selftest import HEADINGS, REFERENCE_CASES, as_text, run
+from cmm_uq.maths.uncertainty.reference.selftest import HEADINGS, REFERENCE_CASES, as_text, run
 
 
 @pytest.mark.parametrize("case", REFERENCE_CASES, ids=lambda case: case.title)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.maths.uncertainty.expression import parse
-from cmm_uq.maths.uncertainty.input_keys import derived_unit, number_in, unit_of
+from cmm_uq.maths.uncertainty.models.expression import parse
+from cmm_uq.maths.uncertainty.models.input_keys import derived_unit, number_in, unit_of
 
 UNITS = {"L": "mm", "M": "mm", "d": "nm", "a": "1/K", "t": "degC", "V": "V", "I": "A", "phi": "rad", "n": "1", "q": ""}
 

@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from cmm_uq.app.commands.signing import Asking, secret
+from cmm_uq.app.commands.certificates.signing import Asking, secret
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.certificate.sign import signing_time, trial_key
 

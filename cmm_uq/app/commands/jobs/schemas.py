@@ -42,7 +42,7 @@ def truth() -> Schema:
 def budget() -> Schema:
     """Of a measurement model of one's own, or of a ready budget."""
     from cmm_uq.maths.uncertainty.budgets.tables import TABLES
-    from cmm_uq.maths.uncertainty.model_file import ModelFileTable
+    from cmm_uq.maths.uncertainty.models.model_file import ModelFileTable
 
     ready = {name: schema_of(table) for name, table in TABLES.items()}
     own = schema_of(ModelFileTable)

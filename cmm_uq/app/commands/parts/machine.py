@@ -17,12 +17,12 @@ from cmm_uq import __version__
 from cmm_uq.analysis.diagnosis.observations import thin_out
 from cmm_uq.analysis.parts.machine.conditional import given_recording
 from cmm_uq.analysis.parts.machine.state import MachineState, machine_stated
+from cmm_uq.app.commands.certificates.verification import Verification, examine_certificate, verify_given
 from cmm_uq.app.commands.diagnose import screened_model
 from cmm_uq.app.commands.estimation import with_noise
 from cmm_uq.app.commands.files import Stage, silent
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY, with_drift
 from cmm_uq.app.commands.reading import job_of, read_job
-from cmm_uq.app.commands.verification import Verification, examine_certificate, verify_given
 from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, day, say

@@ -11,13 +11,13 @@ from typing import Any
 from cmm_uq import __version__
 from cmm_uq.analysis.parts.result import evaluated
 from cmm_uq.analysis.parts.setup import plan_of
+from cmm_uq.app.commands.certificates.verification import Recomputation
+from cmm_uq.app.commands.certificates.verify_again import as_attached, plugins_missing, recomputed
 from cmm_uq.app.commands.files import Finished, Stage
 from cmm_uq.app.commands.parts.documents import contents_of, in_language
 from cmm_uq.app.commands.parts.drift import FILE as HISTORY
 from cmm_uq.app.commands.parts.machine import CALIBRATION, attached_calibration, standing_of, verified, with_history
 from cmm_uq.app.commands.parts.part import PartOptions, evaluate_part
-from cmm_uq.app.commands.verification import Recomputation
-from cmm_uq.app.commands.verify_again import as_attached, plugins_missing, recomputed
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify.again import compare_again
 from cmm_uq.certificate.verify.decisions import check_part_decisions
@@ -36,7 +36,7 @@ TRUSTED = "whose signature the machine's certificate has"
 def examine_part(
     inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None, stage: Stage
 ) -> Recomputation | None:
-    """The report of a part; see :func:`cmm_uq.app.commands.verification.verify_given`."""
+    """The report of a part; see :func:`cmm_uq.app.commands.certificates.verification.verify_given`."""
     if (job := compare_part(inquiry, given, rerun=rerun, trust=trust)) is None:
         return None
     return Recomputation(lambda: _compute_again(inquiry, given, job, trust, stage))

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cmm_uq.app.commands.verification import Recomputation, Verification, examine_certificate, verify_given
+from cmm_uq.app.commands.certificates.verification import Recomputation, Verification, examine_certificate, verify_given
 from cmm_uq.certificate.verify.given import Given, read_given
 
 if TYPE_CHECKING:
+    from cmm_uq.app.commands.certificates.verify_again import Compute
     from cmm_uq.app.commands.files import Stage
-    from cmm_uq.app.commands.verify_again import Compute
     from cmm_uq.certificate.verify.found import Inquiry
 
 
@@ -39,7 +39,7 @@ def verify(
     def examine(inquiry: Inquiry, given: Given) -> Recomputation | None:
         if not given.of_part:
             return examine_certificate(inquiry, given, compute, stage)
-        from cmm_uq.app.commands.verify_part import examine_part
+        from cmm_uq.app.commands.certificates.verify_part import examine_part
 
         return examine_part(inquiry, given, rerun=rerun, trust=trusted, stage=stage)
 

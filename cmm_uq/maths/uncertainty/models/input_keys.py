@@ -20,7 +20,7 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.units import pint_units
 from cmm_uq.maths.uncertainty import distributions as make
 from cmm_uq.maths.uncertainty.distributions import Distribution
-from cmm_uq.maths.uncertainty.expression import Expression, Step
+from cmm_uq.maths.uncertainty.models.expression import Expression, Step
 from cmm_uq.maths.uncertainty.type_a import repeated_readings
 
 if TYPE_CHECKING:

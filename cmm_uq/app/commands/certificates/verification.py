@@ -13,18 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cmm_uq import __version__
-from cmm_uq.app.commands.verify_again import Compute, again, compute_again
+from cmm_uq.app.commands.certificates.verify_again import Compute, again, compute_again
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.verify.digital import check_schema, open_digital
 from cmm_uq.certificate.verify.found import AGAIN, NOT_ASKED, Inquiry
-from cmm_uq.certificate.verify.given import (
-    PART_SCHEMA,
-    RESULTS,
-    RESULTS_SCHEMA,
-    Given,
-    check_files,
-    language_of,
-)
+from cmm_uq.certificate.verify.given import PART_SCHEMA, RESULTS, RESULTS_SCHEMA, Given, check_files, language_of
 from cmm_uq.certificate.verify.signed import check_signatures
 
 if TYPE_CHECKING:

@@ -28,8 +28,9 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution
 from cmm_uq.maths.uncertainty.evaluation import METHODS, Evaluation, Request, evaluate
-from cmm_uq.maths.uncertainty.expression import Expression, Located, name_problem, parse
-from cmm_uq.maths.uncertainty.input_keys import (
+from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.models.expression import Expression, Located, name_problem, parse
+from cmm_uq.maths.uncertainty.models.input_keys import (
     DIFFERENCES,
     KINDS,
     NUMERIC,
@@ -38,8 +39,7 @@ from cmm_uq.maths.uncertainty.input_keys import (
     number_in,
     unit_of,
 )
-from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.ready import KEY, READY, ReadyBudget, read_ready_budget, ready_model
+from cmm_uq.maths.uncertainty.models.ready import KEY, READY, ReadyBudget, read_ready_budget, ready_model
 from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
 
 Figure = float | str  # A number, or a text of a number and its unit, such as ``"25 nm"``

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cmm_uq.app.commands.signing import Signing
+from cmm_uq.app.commands.certificates.signing import Signing
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
 from cmm_uq.base.files.limits import SIGNED_BYTES

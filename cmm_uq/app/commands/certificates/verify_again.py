@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from cmm_uq.certificate.verify.again import Again
     from cmm_uq.jobs.job import Job
 
-
 Compute = Callable[["Given", "Job"], "Again"]
 """The second computation: of the job that is inside a certificate."""
 

@@ -36,8 +36,8 @@ from cmm_uq.maths.uncertainty.choice import Ways
 from cmm_uq.maths.uncertainty.correlation import Correlations
 from cmm_uq.maths.uncertainty.distributions import Distribution
 from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult, Request
-from cmm_uq.maths.uncertainty.expression import Expression
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
+from cmm_uq.maths.uncertainty.models.expression import Expression
 
 Built = tuple[MeasurementModel, Labels]
 

@@ -15,7 +15,6 @@ from cmm_uq.base.errors import OutputError
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions as Asked
 
-
 STANDARD_OUTPUT = Path("-")
 """In place of a file for the lines."""
 

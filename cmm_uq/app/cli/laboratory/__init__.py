@@ -1,0 +1,1 @@
+"""The commands of a laboratory over time: records, due dates, schedules, live recordings."""

@@ -1,0 +1,1 @@
+"""Measurement models and budgets in TOML files."""
