@@ -33,10 +33,11 @@ CEILING = {
 OWN_IMPORTS_INSIDE, FORMATTED_BY_HAND = 282, 1608
 """Imports of the package within functions, and exemptions from the formatter: only falling."""
 LOADED_LATE = {
-    "alembic", "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl", "hashlib",
-    "importlib", "jinja2", "json", "lxml", "markupsafe", "matplotlib", "msvcrt", "numpy", "openpyxl", "pandas", "pint", "pkcs11",
-    "pty",     "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "rich", "scipy", "serial", "signxml", "sqlalchemy",
-    "termios", "tty", "typst", "uncertainties", "webbrowser", "xmlschema",
+    "alembic", "arviz", "asn1crypto", "contourpy", "cryptography", "ctypes", "defusedxml", "emcee", "fcntl",
+    "hashlib", "importlib", "jinja2", "json", "lxml", "markupsafe", "matplotlib", "msvcrt", "numpy", "openpyxl",
+    "pandas", "pint", "pkcs11", "pty", "pydantic", "pyhanko", "pyhanko_certvalidator", "pypdf", "pyvisa", "rich",
+    "scipy", "serial", "signxml", "sqlalchemy", "termios", "tty", "typst", "uncertainties", "webbrowser",
+    "xmlschema",
 }  # fmt: skip
 """Packages that are imported where they are used: extras, and heavy libraries that a quick command does without."""
 

@@ -57,7 +57,7 @@ def evaluate(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Re
     kind = kind_of(job)
     observe = partial(kind.observing("reported"), job.facts.artefact, where=job.recording_path)
 
-    # screen, and model: damaged rows refused, exchanged and copied points told, gross errors set aside
+    # screen, and model: damaged rows refused, exchanged and copied points named, gross errors set aside
     screened, findings = screened_model(job)
 
     # estimate: least squares, a stated noise held against the residuals (χ²), then the posterior with the noise unknown
