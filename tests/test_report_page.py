@@ -22,6 +22,7 @@ BUILT_IN = {
     "noise",
     "noise_of",
     "observing",
+    "contradictions",
 }
 
 
