@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
-from pathlib import Path
+import re
 
 import pytest
 
@@ -102,8 +102,10 @@ def test_a_unit_survives_pickling_with_all_that_it_says() -> None:
     assert (again, again.dsi, again.qif, again.si) == ("µm", r"\micro\metre", "micrometer", 1e-6)
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "cmm_uq").rglob("*.py")), ids=lambda p: str(p.relative_to(ROOT)))
-def test_no_module_asks_for_a_unit_that_the_table_lacks(path: Path) -> None:
-    import re
-
-    assert set(re.findall(r'\bunit\("([^"]*)"\)', path.read_text(encoding="utf-8"))) <= set(UNITS)
+def test_no_module_asks_for_a_unit_that_the_table_lacks() -> None:
+    units = {
+        unit
+        for path in (ROOT / "cmm_uq").rglob("*.py")
+        for unit in re.findall(r'\bunit\("([^"]*)"\)', path.read_text("utf-8"))
+    }
+    assert units <= set(UNITS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
 import pytest
 
@@ -55,9 +54,12 @@ def clocks(source: str) -> set[str]:
     return {call.attr for call in named if call.attr in CLOCKS} | of_time
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "cmm_uq").rglob("*.py")), ids=lambda p: str(p.relative_to(ROOT)))
-def test_no_module_reads_a_clock(path: Path) -> None:
-    assert clocks(path.read_text(encoding="utf-8")) == READ.get(path.relative_to(ROOT).as_posix(), set())
+def test_no_module_reads_a_clock() -> None:
+    read = {
+        path.relative_to(ROOT).as_posix(): clocks(path.read_text(encoding="utf-8"))
+        for path in (ROOT / "cmm_uq").rglob("*.py")
+    }
+    assert {name: found for name, found in read.items() if found} == READ
 
 
 @pytest.mark.parametrize("call", ["dt.datetime.now()", "date.today()", "time.time()", "time.perf_counter()"])

@@ -46,7 +46,7 @@ def test_what_was_verified_is_the_root_without_its_signature(xml: bytes, signed:
 
 def test_properties_that_are_of_another_signature_by_their_target_do_not_count(signed: bytes, trust: Trust) -> None:
     """No signature covers its own name; what is signed says whose properties it is (XAdES, EN 319 132-1, 5.1)."""
-    (name,) = {one.get("Id") for one in etree.fromstring(signed).iter(f"{DS}FileSignature")}
+    (name,) = {one.get("Id") for one in etree.fromstring(signed).iter(f"{DS}Signature")}
     other = signed.replace(f'Id="{name}"'.encode(), f'Id="{name}9"'.encode(), 1)
     assert only(signatures_of_xml(other, trust)).problems == ("the signed properties are not those of this signature",)
 
@@ -103,7 +103,7 @@ def test_the_signature_stands_where_the_schema_of_the_dcc_has_it() -> None:
     sequence = etree.parse(schema).find(f"{own}/{xs}complexType/{xs}sequence")
     if sequence is None:
         sequence = etree.parse(schema).find(f"{xs}complexType[@name='digitalCalibrationCertificateType']/{xs}sequence")
-    assert [one.get("ref") for one in sequence.iterchildren(f"{xs}element")][-1] == "ds:FileSignature"
+    assert [one.get("ref") for one in sequence.iterchildren(f"{xs}element")][-1] == "ds:Signature"
 
 
 @settings(max_examples=40)
