@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
+import io
 import logging
 from collections.abc import Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from cmm_uq.base.errors import NotInstalledError
+from cmm_uq.base.errors import CmmUqError, NotInstalledError
+
+if TYPE_CHECKING:
+    from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
 
 _T = TypeVar("_T")
 _SILENT = logging.NullHandler()
@@ -35,3 +40,25 @@ def ran(coroutine: Coroutine[Any, Any, _T]) -> _T:
         return asyncio.run(coroutine)
     with ThreadPoolExecutor(1) as other:
         return other.submit(asyncio.run, coroutine).result()
+
+
+def appending(pdf: bytes) -> IncrementalPdfFileWriter:
+    """A writer that appends a revision, and draws nothing at random."""
+    with installed():
+        from pyhanko.pdf_utils import generic
+        from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
+        from pyhanko.pdf_utils.misc import PdfError
+
+    class Appending(IncrementalPdfFileWriter):  # type: ignore[misc]
+        def _update_meta(self) -> None:
+            """Metadata stay: they are of the document, and PDF/A asks that both its copies agree."""
+
+        @classmethod
+        def _handle_id(cls, prev: Any) -> Any:
+            drawn = generic.ByteStringObject(hashlib.sha256(pdf).digest()[:16])
+            return generic.ArrayObject([prev.trailer["/ID"][0] if "/ID" in prev.trailer else drawn, drawn])
+
+    try:
+        return Appending(io.BytesIO(pdf))
+    except (PdfError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None

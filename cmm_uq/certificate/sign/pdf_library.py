@@ -9,7 +9,6 @@ rule here lets the structure grow by form controls of signatures, at its end, an
 from __future__ import annotations
 
 import datetime as dt
-import hashlib
 import http.client
 import io
 import urllib.error
@@ -42,7 +41,7 @@ from pyhanko_certvalidator.errors import PathBuildingError, PathValidationError
 from pyhanko_certvalidator.registry import SimpleCertificateStore
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.certificate.sign.extra import installed
+from cmm_uq.certificate.sign.extra import appending
 from cmm_uq.certificate.sign.found import Trust
 from cmm_uq.certificate.sign.signer import ONE_DIGEST, Signer
 
@@ -122,28 +121,6 @@ def _to(held: PdfObject) -> IndirectObject:
     """To an object that has a number of its own."""
     place = held.container_ref
     return IndirectObject(place.idnum, place.generation, place.get_pdf_handler())
-
-
-def appending(pdf: bytes) -> IncrementalPdfFileWriter:
-    """A writer that appends a revision, and draws nothing at random."""
-    with installed():
-        from pyhanko.pdf_utils import generic
-        from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
-        from pyhanko.pdf_utils.misc import PdfError
-
-    class Appending(IncrementalPdfFileWriter):  # type: ignore[misc]
-        def _update_meta(self) -> None:
-            """Metadata stay: they are of the document, and PDF/A asks that both its copies agree."""
-
-        @classmethod
-        def _handle_id(cls, prev: Any) -> Any:
-            drawn = generic.ByteStringObject(hashlib.sha256(pdf).digest()[:16])
-            return generic.ArrayObject([prev.trailer["/ID"][0] if "/ID" in prev.trailer else drawn, drawn])
-
-    try:
-        return Appending(io.BytesIO(pdf))
-    except (PdfError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise CmmUqError(f"cannot be read as a PDF: {error}", fix="Name a PDF that is whole") from None
 
 
 _ELEMENT = {"/Type", "/S", "/P", "/Alt", "/Pg", "/K"}
