@@ -14,7 +14,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, in_a_row, plural, say, signed
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
-from cmm_uq.certificate.result import SimulatedTwin as Simulated
+from cmm_uq.certificate.result import SimulatedTwin
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY, SimulationFacts
 from cmm_uq.jobs.tables.artefact import ArtefactFacts
@@ -54,7 +54,7 @@ class Against:
     findings: tuple[Finding, ...]
     observe: Observe
     stated_um: float | None
-    simulated: Simulated
+    simulated: SimulatedTwin
 
 
 def against_simulation(job: Job, facts: SimulationFacts) -> Against:
@@ -91,7 +91,7 @@ def against_simulation(job: Job, facts: SimulationFacts) -> Against:
         plain, artefact=weighed(job.facts.artefact, points, where=where), least_noise=least,
         sigma=None if together is None else together * MICROMETRE,
     )  # fmt: skip
-    simulated = Simulated.of(facts, job, found, named, recorded)
+    simulated = SimulatedTwin.of(facts, job, found, named, recorded)
     return Against(model, (*findings, *_odd(found)), weighed, together, simulated)
 
 

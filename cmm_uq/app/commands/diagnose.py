@@ -28,8 +28,8 @@ from cmm_uq.base.overflow import refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.diagnosis.page import diagnosed_outcome
 from cmm_uq.certificate.diagnosis.sections import TO_FILL_IN
-from cmm_uq.certificate.outcome import AnalysisResult as Found, Outcome, Recipe
-from cmm_uq.certificate.result import JobDiagnosis as Diagnosed
+from cmm_uq.certificate.outcome import AnalysisResult, Outcome, Recipe
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.recording.prediction import KEY
 from cmm_uq.laboratory.records.place import NONE
@@ -40,7 +40,9 @@ from cmm_uq.maths.inference.posterior import NoisyPosterior
 DIAGNOSE = Form("diagnose", ("diagnosis.html", "diagnosis.pdf"), "diagnosis", (TO_FILL_IN,), recorded=True)
 
 
-def diagnose_read(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None) -> Found:
+def diagnose_read(
+    job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
+) -> AnalysisResult:
     """Diagnose a job that was read, in the way of its kind."""
     _check_rate(alpha)
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
@@ -49,7 +51,7 @@ def diagnose_read(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, progr
 
 def diagnose_job(
     folder: Path, *, seed: int = 0, alpha: float = FALSE_ALARMS, progress: Progress | None = None
-) -> Diagnosed:
+) -> JobDiagnosis:
     """Diagnose a recording of an artefact; see :func:`diagnose_read`."""
     _check_rate(alpha)
     return _diagnose(read_job(folder), seed=seed, alpha=alpha, progress=progress)
@@ -60,7 +62,7 @@ def _check_rate(alpha: float) -> None:
         raise CmmUqError(f"a false-alarm rate of {alpha:g}", fix="Give one between 0.000001 and 0.5; 0.01 is usual")
 
 
-def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> Diagnosed:
+def _diagnose(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> JobDiagnosis:
     refuse_planned(job)
     kind_of(job).observing("diagnosed as a recording of an artefact")
     simulation = job.facts.simulation
@@ -84,7 +86,7 @@ def diagnose_model(
     job: Job, model: RecordingModel, findings: tuple[Finding, ...], *, seed: int, alpha: float = FALSE_ALARMS,
     progress: Progress | None = None, known: NoisyPosterior | None = None, show: bool = False,
     against: Against | None = None,
-) -> Diagnosed:  # fmt: skip
+) -> JobDiagnosis:  # fmt: skip
     """Diagnose the screened model of a job, or what a simulation leaves of its recording.
 
     ``known`` is its posterior where it was sampled already; ``show`` whether what to measure next shall also show what
@@ -101,7 +103,9 @@ def diagnose_model(
     unseen = smallest_effects(diagnosis.search, alpha, diagnosis.after)
     goals = detection_goals(job, diagnosis, unseen) if show else ()
     plan = next_plan(diagnosis, facts.artefact, observe, kind.offers("plan", Planning), facts.plan, goals)
-    found = Diagnosed(job, findings, diagnosis, suggestions(plan, model.artefact.title), unseen=unseen, next_plan=plan)
+    found = JobDiagnosis(
+        job, findings, diagnosis, suggestions(plan, model.artefact.title), unseen=unseen, next_plan=plan
+    )
     if against is not None:
         return replace(found, simulated=against.simulated)
     outside = OutsideReadings.of(job.points, findings, artefact_at)
@@ -127,7 +131,7 @@ def detection_goals(job: Job, diagnosis: Diagnosis, unseen: Sequence[SmallestEff
     return tuple(goals)
 
 
-def outcome_of(result: Found, seed: int = 0) -> Outcome:
+def outcome_of(result: AnalysisResult, seed: int = 0) -> Outcome:
     """What there is to write of what :func:`diagnose_read` found."""
     return _recipe(result.job).outcome(result, seed)
 
@@ -140,7 +144,7 @@ def _recipe(job: Job) -> Recipe:
     return recipe_of(job, lambda own: own.diagnose, lambda kind: usual, "diagnosed as a recording of an artefact")
 
 
-def _outcome(result: Diagnosed) -> Outcome:
+def _outcome(result: JobDiagnosis) -> Outcome:
     from cmm_uq.app.commands.jobs.simulate import to_fill_in
 
     plan = result.next_plan

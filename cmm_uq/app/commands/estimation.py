@@ -16,7 +16,7 @@ from cmm_uq.analysis.screening.screening import counted_with, gross_outliers
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE, PPM, unit
-from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction, NoiseComponent as Component, RecordingNoise as Noise
+from cmm_uq.certificate.result import LACK_OF_FIT, Contradiction, NoiseComponent, RecordingNoise
 from cmm_uq.machine.model import Estimate, RecordingModel
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.model.artefact_doubt import growth
@@ -157,16 +157,16 @@ def noise(
     posterior: NoisyPosterior,
     stated_um: float | None,
     p_value: float | None,
-) -> Noise:
+) -> RecordingNoise:
     """What the noise is, by component, and what it does to the uncertainties."""
     found = {
-        name: Component(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
+        name: NoiseComponent(Quantity.of_draws(values / MICROMETRE, unit("µm")), float(np.mean(values > 0)))
         for name, values in sizes_of_noise(components, posterior).items()
     }
     coordinate = found.pop("coordinate").size
     apart = float(np.mean(np.ptp(posterior.sizes.reading, axis=1) > 0))
     step = components.display / MICROMETRE
-    return Noise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
+    return RecordingNoise(coordinate, found, apart, _wider(estimate, posterior), stated_um, p_value, step)
 
 
 def _wider(estimate: Estimate, posterior: Posterior) -> float:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import translated as said_in
 from cmm_uq.base.output import Ledger, Owner, staged
-from cmm_uq.certificate.outcome import AnalysisResult as Found, Outcome
+from cmm_uq.certificate.outcome import AnalysisResult, Outcome
 from cmm_uq.certificate.plots.style import fonts_of
 from cmm_uq.certificate.wording import Summary
 from cmm_uq.jobs.job import Job
@@ -129,7 +129,7 @@ class Written:
     records: str = ""
 
     @property
-    def found(self) -> Found:
+    def found(self) -> AnalysisResult:
         """In the kind's own terms."""
         return self.outcome.found
 

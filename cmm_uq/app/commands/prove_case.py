@@ -19,7 +19,7 @@ from cmm_uq.artefacts import kind_of
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import BrokenPluginError
 from cmm_uq.base.points import Floats, Points
-from cmm_uq.certificate.result import JobDiagnosis as Diagnosed
+from cmm_uq.certificate.result import JobDiagnosis
 from cmm_uq.jobs.job import Job
 from cmm_uq.laboratory.proving.answers import Record
 from cmm_uq.laboratory.proving.cases import Case
@@ -75,7 +75,7 @@ def diagnosed_case(job: Job, design: Design, case: Case, setting: CaseSetting) -
         return {"number": case.number, REFUSED: str(error)}
     except Exception as error:
         return {"number": case.number, REFUSED: f"{type(error).__name__}: {error}"}
-    if not isinstance(found, Diagnosed):
+    if not isinstance(found, JobDiagnosis):
         kind = job.facts.artefact.kind
         raise CmmUqError(f"a diagnosis of a job of kind {kind!r} names no effects", where="job.toml [artefact] kind",
                          fix="Prove a job whose recording is explained by effects")  # fmt: skip

@@ -29,7 +29,7 @@ from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.certificate.certificate import certified
 from cmm_uq.certificate.origin import DIGITAL
-from cmm_uq.certificate.outcome import AnalysisResult as Found, Outcome, Page, Recipe
+from cmm_uq.certificate.outcome import AnalysisResult, Outcome, Page, Recipe
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.provenance import FILE as PROVENANCE
 from cmm_uq.jobs.job import Job
@@ -107,17 +107,17 @@ def report_recipe(job: Job) -> Recipe:
     return recipe_of(job, lambda own: own.report, usual, "reported")
 
 
-def evaluate_job(job: Job, *, seed: int = 0, progress: Progress | None = None) -> Found:
+def evaluate_job(job: Job, *, seed: int = 0, progress: Progress | None = None) -> AnalysisResult:
     """What the analysis of a job finds, of any kind; the same seed gives the same result."""
     with refusing_overflow(job.recording_path, OVERFLOW_FIX):
         return report_recipe(job).analyse(job, seed=seed, progress=progress)
 
 
-def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> Found:
+def analyse(folder: Path, *, seed: int = 0, progress: Progress | None = None) -> AnalysisResult:
     return evaluate_job(read_job(folder), seed=seed, progress=progress)
 
 
-def outcome_of(found: Found, seed: int = 0) -> Outcome:
+def outcome_of(found: AnalysisResult, seed: int = 0) -> Outcome:
     """What there is to write of what :func:`evaluate_job` found."""
     return report_recipe(found.job).outcome(found, seed)
 

@@ -23,7 +23,7 @@ from cmm_uq.base.units import ARCSECOND, MICROMETRE, PPM, unit
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.results.plain import quantity_data
 from cmm_uq.machine.physics.effects.rigid_body import SCALE, SQUARENESS
-from cmm_uq.machine.physics.kinematics import KinematicChain as Chain, axis_directions
+from cmm_uq.machine.physics.kinematics import KinematicChain, axis_directions
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 
@@ -185,7 +185,7 @@ def _turns(result: Result) -> dict[str, Quantity]:
     draws = {name: values for (name, _), (values, _) in result.model.reported(result.values).items()}
     none = np.zeros(len(result.values))
     squareness = np.column_stack([draws.get(effect.name, none) for effect in SQUARENESS.values()])
-    rides = Chain.of(result.artefact.points.machine.chain).rides("z", on="y")
+    rides = KinematicChain.of(result.artefact.points.machine.chain).rides("z", on="y")
     each = turns(ARCSECOND * squareness, rides).T / ARCSECOND
     return {
         effect.name: Quantity.of_draws(values, unit("″"))

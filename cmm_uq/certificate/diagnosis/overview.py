@@ -21,7 +21,7 @@ from cmm_uq.certificate.sections.findings import (
     sentences as withheld_sentences,
 )
 from cmm_uq.certificate.sections.where import by_columns, place_words
-from cmm_uq.certificate.wording import Headline as Verdict, Summary, probability
+from cmm_uq.certificate.wording import Headline, Summary, probability
 from cmm_uq.jobs.job import JobFile
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.uncertainty.quantity import alike
@@ -304,7 +304,7 @@ def noise_words(diagnosis: Diagnosis, stated_um: float | None) -> tuple[Text, ..
 
 def summary_of(facts: JobFile, verdict: str, sentences: Sequence[Text], findings: Iterable[Finding]) -> Summary:
     """Verdict and everything that follows from it, and what the screening found, for the end of a command."""
-    first = Verdict(VERDICTS_IN_SHORT[verdict], STANDING[verdict], sentences[0], ())
+    first = Headline(VERDICTS_IN_SHORT[verdict], STANDING[verdict], sentences[0], ())
     warned = tuple(say("{why:capital}.", why=finding.why) for finding in findings)
     machine = Verbatim(facts.machine.name)
     return Summary(machine, day(facts.job.date), (first,), remarks=tuple(sentences[1:]), warnings=warned)

@@ -19,7 +19,7 @@ from cmm_uq.base.messages import DASH, NOTHING, Number, Text, Verbatim, commas, 
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, Unit, unit
 from cmm_uq.certificate.effect_words import titles
 from cmm_uq.certificate.part.measurement import FurtherSetUps, PartMeasurement
-from cmm_uq.certificate.wording import Figure, Headline as Verdict, Summary, probability
+from cmm_uq.certificate.wording import Figure, Headline, Summary, probability
 from cmm_uq.jobs.verdicts import standing_of
 from cmm_uq.maths.uncertainty.quantity import rounded, significant
 
@@ -242,19 +242,19 @@ def part_summary(found: PartMeasurement) -> Summary:
     )  # fmt: skip
 
 
-def _verdicts(found: PartMeasurement) -> list[Verdict]:
+def _verdicts(found: PartMeasurement) -> list[Headline]:
     told = []
     for i, judged in enumerate(found.judged):
         if judged is None or judged.outcome is None:
             continue
         chance = say("conforms with {p}", p=probability(judged.probability or 0.0))
         told.append(
-            Verdict(judged.outcome.upper(), standing_of(judged.outcome), _named(found, i), (chance, judged.rule))
+            Headline(judged.outcome.upper(), standing_of(judged.outcome), _named(found, i), (chance, judged.rule))
         )
     if found.together is not None and len(told) > 1:
         whole = found.outcome or "undecided"
         chance = say("all conform with {p}", p=probability(found.together))
-        told.insert(0, Verdict(whole.upper(), standing_of(whole), say("the part"), (chance,)))
+        told.insert(0, Headline(whole.upper(), standing_of(whole), say("the part"), (chance,)))
     return told
 
 

@@ -24,7 +24,7 @@ from cmm_uq.jobs.part.probed import Probed, probed
 from cmm_uq.jobs.part.readings import OtherReadings, measured_points, other_readings
 from cmm_uq.jobs.part.tables import MachineStateFacts, PartFile, Places
 from cmm_uq.jobs.reading import PART
-from cmm_uq.jobs.source import RESULTS, FilesInFolder as InFolder, FilesInMemory as InMemory, JobFiles as Source
+from cmm_uq.jobs.source import RESULTS, FilesInFolder, FilesInMemory, JobFiles
 from cmm_uq.jobs.tables.origin import COMPENSATED, SIMULATED, check_examples, check_mark
 
 _FIX = "A part's job is a folder with a job.toml; cmm-uq new part begins one"
@@ -67,15 +67,15 @@ def read_part(folder: Path, *, machine: bool = True) -> PartJob:
     """
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
-    return _read(InFolder(path), machine=machine)
+    return _read(FilesInFolder(path), machine=machine)
 
 
 def part_of(files: Mapping[str, bytes], *, machine: bool = True) -> PartJob:
     """Read and check a part's job that lies in no folder yet; see :func:`read_part`."""
-    return _read(InMemory(files), machine=machine)
+    return _read(FilesInMemory(files), machine=machine)
 
 
-def files_of_the_machine(facts: MachineStateFacts, source: Source) -> tuple[str, ...]:
+def files_of_the_machine(facts: MachineStateFacts, source: JobFiles) -> tuple[str, ...]:
     """Names of the files that state the machine.
 
     Beside ``results.json`` lie the draws that it names, which a certificate carries in itself; in a folder that certificate
@@ -97,7 +97,7 @@ def files_of_the_machine(facts: MachineStateFacts, source: Source) -> tuple[str,
     return (results, drawn, *(f"{folder}/{one}" for one in certificates))
 
 
-def _posterior_named(source: Source, results: str) -> str:
+def _posterior_named(source: JobFiles, results: str) -> str:
     """The file of draws that ``results.json`` names; the usual one where it cannot be read or names none."""
     try:
         named = json.loads(source.content(results, JSON_BYTES, "", written=True))["posterior"]["file"]
@@ -110,7 +110,7 @@ def _beside(folder: str, name: str) -> str:
     return f"{folder}/{name}" if folder else name
 
 
-def _read(source: Source, *, machine: bool) -> PartJob:
+def _read(source: JobFiles, *, machine: bool) -> PartJob:
     path, folder = source.toml, source.toml.parent
     content = source.job_file(JOB_BYTES, _FIX)
     facts = checked(content, path, PartFile)

@@ -18,7 +18,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output.manifest import sha256_of
-from cmm_uq.jobs.acquired import AcquisitionRecord as Acquired, as_file, provenance_name
+from cmm_uq.jobs.acquired import AcquisitionRecord, as_file, provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
 from cmm_uq.laboratory.live.folder import EVENTS, FOLDER
 from cmm_uq.laboratory.live.journal import written_whole
@@ -149,7 +149,7 @@ class LiveRecording:
 
     def _own(self) -> list[str]:
         try:
-            return Acquired.model_validate_json(self._beside.read_bytes()).recording_sha256
+            return AcquisitionRecord.model_validate_json(self._beside.read_bytes()).recording_sha256
         except (OSError, ValueError):
             return []
 

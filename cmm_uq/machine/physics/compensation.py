@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import AXES, Floats, Ints, Points
-from cmm_uq.machine.physics.kinematics import KinematicChain as Chain, exact, on_leaning_axes
+from cmm_uq.machine.physics.kinematics import KinematicChain, exact, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.maths.geometry import Plane, fit_plane
 
@@ -71,7 +71,9 @@ class Compensation:
     """
 
     maps: ErrorMaps  # its error maps
-    chain: str | Chain = "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
+    chain: str | KinematicChain = (
+        "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
+    )
     origin: Floats | tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,) scale reading = coordinate + origin, mm
     # True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004 eq. 10–13), on
     # axes that lean exactly.
@@ -142,7 +144,7 @@ class Compensation:
                 }
                 for m in self.maps.maps
             ],
-            "chain": Chain.of(self.chain).letters,
+            "chain": KinematicChain.of(self.chain).letters,
             "origin_mm": [float(o) for o in self.origin],
             "form": "rigid transformations" if self.rigid else "first order on exact axes",
             "sign": "true = indicated + e",

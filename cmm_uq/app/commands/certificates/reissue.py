@@ -22,7 +22,7 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, number, say, 
 from cmm_uq.base.output.manifest import sha256_of
 from cmm_uq.base.units import UNITS, printed_unit
 from cmm_uq.certificate.outcome import Outcome
-from cmm_uq.certificate.results.reissue import KEY, ChangedFigure as Difference, Reissue as Comparison
+from cmm_uq.certificate.results.reissue import KEY, ChangedFigure, Reissue
 from cmm_uq.certificate.wording import OUTCOME_WORDS, with_uncertainty
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reports import results_named
@@ -108,7 +108,7 @@ def reissued(outcome: Outcome) -> Outcome:
     if replaces is None or job.origin != MEASURED:
         return outcome
     name = _name(job)
-    comparison = Comparison(replaces.number)
+    comparison = Reissue(replaces.number)
     if name is not None:
         comparison = compared(replaces.number, _read(job.inputs[name], str(job.folder / name), job), outcome.results)
     if replaces.denies:
@@ -119,31 +119,31 @@ def reissued(outcome: Outcome) -> Outcome:
     )  # fmt: skip
 
 
-def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Comparison:
+def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Reissue:
     """What differs between both results, as printed.
 
     number : of the certificate that is replaced.
     before : its results.json, or what the records have of it.
     after : results.json of the one in its place.
     """
-    differences, added, count = list[Difference](), list[Difference](), 0
+    differences, added, count = list[ChangedFigure](), list[ChangedFigure](), 0
     for shown in (_decisions, _figures):
         then, now = shown(before), shown(after)
         count += len(then)
         differences += [
-            Difference(what, printed, now[name][1] if name in now else NOTHING, unit)
+            ChangedFigure(what, printed, now[name][1] if name in now else NOTHING, unit)
             for name, (what, printed, unit) in then.items() if name not in now or str(now[name][1]) != str(printed)
         ]  # fmt: skip
         if before["schema"] != _ENTRY:
             added += [
-                Difference(what, NOTHING, printed, unit)
+                ChangedFigure(what, NOTHING, printed, unit)
                 for name, (what, printed, unit) in now.items()
                 if name not in then
             ]
-    return Comparison(number, count, tuple(differences), tuple(added))
+    return Reissue(number, count, tuple(differences), tuple(added))
 
 
-def refuse_denied(comparison: Comparison, where: str) -> None:
+def refuse_denied(comparison: Reissue, where: str) -> None:
     """Refuse the statement that nothing is changed where anything is."""
     if comparison.differences:
         told = semicolons([one.sentence for one in comparison.differences[:3]])
@@ -159,7 +159,7 @@ def refuse_unlike(records: Records, certificate: Certificate) -> None:
     if not file.is_file() or sha256_of(file) != certificate.results_sha256:
         return
     data = json.loads(content_of(file, TABLE_BYTES, ""))
-    comparison, replaces = Comparison.of_results(data), data["job"].get("replaces")
+    comparison, replaces = Reissue.of_results(data), data["job"].get("replaces")
     if replaces is None or (comparison is not None and comparison.compared is not None):
         return
     other = replaced_in(records, replaces["number"], "")

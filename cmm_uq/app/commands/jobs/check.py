@@ -27,7 +27,7 @@ from cmm_uq.base.files.limits import JOB_BYTES, TABLE_BYTES
 from cmm_uq.base.messages import html_table
 from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
-from cmm_uq.certificate.clauses import Requirement as Clause, certifies, clauses, contradictions, missing
+from cmm_uq.certificate.clauses import Requirement, certifies, clauses, contradictions, missing
 from cmm_uq.jobs.importing.recording import read_recording
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.part.job import is_part, read_part
@@ -96,7 +96,7 @@ class JobCheck:
     job: str
     problems: tuple[Problem, ...]
     warnings: tuple[Problem, ...]
-    clauses: tuple[Clause, ...] = ()
+    clauses: tuple[Requirement, ...] = ()
     command: str = "report"
 
     @property
@@ -178,7 +178,7 @@ def check_read(job: Job) -> JobCheck:
     return JobCheck(job.facts.job.id, problems, _once(warnings), _clauses(job))
 
 
-def _clauses(job: Job | None) -> tuple[Clause, ...]:
+def _clauses(job: Job | None) -> tuple[Requirement, ...]:
     return clauses(job) if job is not None and certifies(job) else ()
 
 

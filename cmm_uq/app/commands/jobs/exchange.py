@@ -17,10 +17,10 @@ from cmm_uq.base.plugins import naming_package
 from cmm_uq.base.points import Machine
 from cmm_uq.certificate.results.qif_file import qif
 from cmm_uq.jobs.dcc import Certificate, read
-from cmm_uq.jobs.importing.imported import ImportedTable as Imported, imported
+from cmm_uq.jobs.importing.imported import ImportedTable, imported
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.recording import WHOLE, points_of
-from cmm_uq.jobs.reports import ReportResults as Reported, read_results
+from cmm_uq.jobs.reports import ReportResults, read_results
 from cmm_uq.jobs.source import RESULTS
 
 _FIRST = ("measurement", "point", "repeat", "x_mm", "y_mm", "z_mm")
@@ -28,7 +28,7 @@ _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
 
 
 @naming_package()
-def read_export(path: Path, keys: ImportKeys | None = None) -> Imported:
+def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
     """A file in any format that is known.
 
     keys : what it leaves open.
@@ -39,7 +39,7 @@ def read_export(path: Path, keys: ImportKeys | None = None) -> Imported:
     return found
 
 
-def own_format(found: Imported) -> bytes:
+def own_format(found: ImportedTable) -> bytes:
     """The same in the project's own format: numbers with as many digits as they need to be read back the same."""
     names = [name for name in _FIRST if name in found.columns]
     names += [name for name in found.columns if name not in _FIRST]
@@ -52,7 +52,7 @@ def own_format(found: Imported) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def write_recording(path: Path, found: Imported, out: Path) -> None:
+def write_recording(path: Path, found: ImportedTable, out: Path) -> None:
     """Write a recording in the project's own format, whole or not at all, and over nothing.
 
     path : of the export; a first line that says what a recording was made by is kept.
@@ -104,7 +104,7 @@ def write_qif(report: Path, out: Path | None = None) -> Path:
     """
     path = report / RESULTS if report.is_dir() else report
     found = read_results(
-        Reported, content_of(path, TABLE_BYTES, _FIX), str(path), "is no results.json of a report", _FIX
+        ReportResults, content_of(path, TABLE_BYTES, _FIX), str(path), "is no results.json of a report", _FIX
     )
     file = out or Path(f"{found.job.id}.qif")
     refuse_taken(file)

@@ -26,7 +26,7 @@ from cmm_uq.base.points import Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.jobs.acquired import provenance_name
 from cmm_uq.jobs.derived_job import PROGRAM
-from cmm_uq.jobs.importing.imported import ImportedTable as Imported, imported, is_own
+from cmm_uq.jobs.importing.imported import ImportedTable, imported, is_own
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.recording import REQUIRED, read_recording
 from cmm_uq.jobs.job import Job
@@ -101,7 +101,7 @@ def _rows(file: DroppedFile, job: Job) -> list[dict[str, float]]:
     return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def _imported(content: bytes, where: str, keys: ImportKeys) -> Imported:
+def _imported(content: bytes, where: str, keys: ImportKeys) -> ImportedTable:
     """As any import; where nothing says which points belong together, they come in the order of the plan."""
     try:
         return imported(content, where, keys)

@@ -18,7 +18,7 @@ from cmm_uq.analysis.parts.machine.state import MachineState, aged
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, commas, plural, say
 from cmm_uq.certificate.effect_words import titles
-from cmm_uq.laboratory.due.drift import DriftHistory as History, history
+from cmm_uq.laboratory.due.drift import DriftHistory, history
 from cmm_uq.laboratory.due.drift_filter import change_since
 from cmm_uq.laboratory.due.history import MachineHistory
 from cmm_uq.laboratory.records.facts import Series
@@ -47,7 +47,7 @@ class KnownChanges:
             return None
         series, adjusted_after = self.values[name]
         try:
-            of: History = history(series, adjusted_after)
+            of: DriftHistory = history(series, adjusted_after)
             return change_since(of, days, limit=series.limit)
         except CmmUqError:
             return None

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cmm_uq.analysis.conformity.decision import PriorKnowledge as Known
-from cmm_uq.analysis.conformity.limits import LimitDecision as Judged, Limits, judge
+from cmm_uq.analysis.conformity.decision import PriorKnowledge
+from cmm_uq.analysis.conformity.limits import LimitDecision, Limits, judge
 from cmm_uq.analysis.parts.budget import DRAWS as SHARED, VarianceShares, point_errors, variance_shares
 from cmm_uq.analysis.parts.machine.state import MachineState
 from cmm_uq.analysis.parts.methods.comparison import compare_methods
@@ -128,7 +128,7 @@ def affordable(draws: int, plan: Plan) -> int:
     return max(draws // 10, min(draws, draws * MANY // points))
 
 
-def _together(together: float, decisions: Iterable[Judged | None]) -> float | None:
+def _together(together: float, decisions: Iterable[LimitDecision | None]) -> float | None:
     """The probability that all limits are kept, beside those of each as they are told: with a prior, and rare tails."""
     each = [one.probability for one in decisions if one is not None and one.probability is not None]
     return within_bounds(together, np.array(each)) if each else None
@@ -169,7 +169,9 @@ def _unseen(virtual: Virtual, shares: VarianceShares) -> tuple[UnseenError, ...]
     return tuple(found)
 
 
-def decide_limits(job: PartJob, plan: Plan, errors: Floats, measured: Floats | None) -> tuple[Judged | None, ...]:
+def decide_limits(
+    job: PartJob, plan: Plan, errors: Floats, measured: Floats | None
+) -> tuple[LimitDecision | None, ...]:
     """What follows from each characteristic's limits, by the job's rule.
 
     Where nothing was measured, what would be accepted is told of a value that is not corrected for its mean error. A zone is
@@ -178,7 +180,7 @@ def decide_limits(job: PartJob, plan: Plan, errors: Floats, measured: Floats | N
 
     ``errors``: (N, c) of virtual measurements. ``measured``: (c,) values; ``None`` where nothing was measured.
     """
-    found: list[Judged | None] = []
+    found: list[LimitDecision | None] = []
     for i, (facts, one) in enumerate(zip(job.facts.characteristic, plan.characteristics, strict=True)):
         if one.lower is None and one.upper is None:
             found.append(None)
@@ -197,7 +199,7 @@ def decide_limits(job: PartJob, plan: Plan, errors: Floats, measured: Floats | N
 
 def _prior(
     job: PartJob, facts: CharacteristicFacts, lower: float | None, upper: float | None, *, zone: bool
-) -> Known | None:
+) -> PriorKnowledge | None:
     """What is known of the value beforehand: about the middle of its limits, of a zone about zero."""
     given = job.facts.decision.prior
     if given is None:
@@ -211,7 +213,7 @@ def _prior(
     else:
         middle, limit = 0.5 * (lower + upper), 0.5 * (upper - lower)
     if given.share_of_limit is not None:
-        return Known(middle, given.share_of_limit * limit)
+        return PriorKnowledge(middle, given.share_of_limit * limit)
     if facts.asks.limits == "angles":
         raise CmmUqError("a prior in µm is none of an angle", where=where, fix="Give share_of_limit")
-    return Known(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))
+    return PriorKnowledge(middle + MICROMETRE * given.mean_um, MICROMETRE * float(given.sd_um or 0.0))

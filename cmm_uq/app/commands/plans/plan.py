@@ -24,7 +24,7 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.outcome import Outcome
 from cmm_uq.certificate.plots.style import lettered_in
 from cmm_uq.certificate.results.contents import head
-from cmm_uq.certificate.wording import Figure, Headline as Verdict, Summary
+from cmm_uq.certificate.wording import Figure, Headline, Summary
 from cmm_uq.jobs.job import Job
 from cmm_uq.maths.inference.linear_model import Unknown
 
@@ -199,7 +199,7 @@ def plan_summary(plan: MeasurementPlan) -> Summary:
     """For the end of the command; its details are the placings, below their headings."""
     found = plan.outlook.identifiability
     met = tuple(
-        Verdict("MET", "good", one.what, ()) if one.met else Verdict("NOT MET", "open", one.what, ())
+        Headline("MET", "good", one.what, ()) if one.met else Headline("NOT MET", "open", one.what, ())
         for one in plan.conditions
     )
     free = tuple(say("No reading shows: {what}.", what=text) for text in plan.free)

@@ -15,13 +15,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from cmm_uq.base.files.limits import LISTED
-from cmm_uq.base.files.table import JobTable as Table, Length, Position, Temperature, Triple, Uncertainty
+from cmm_uq.base.files.table import JobTable, Length, Position, Temperature, Triple, Uncertainty
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, foreign, say
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import ARCSECOND, MICROMETRE, REFERENCE_TEMPERATURE, unit
 from cmm_uq.maths.geometry import cap_directions
 from cmm_uq.maths.geometry.feature import BallForm
-from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine as Line
+from cmm_uq.maths.uncertainty.budget import JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.budgets.machine import (
     expanded_without_correction,
     length_test_uncertainty,
@@ -51,7 +51,7 @@ def _none() -> list[float]:
     return [0.0, 0.0, 0.0]
 
 
-class BudgetTable(Table):
+class BudgetTable(JobTable):
     """What every ready budget has: its name, a title, and what the method is for (``meaning``)."""
 
     meaning: ClassVar[Text] = NOTHING
@@ -108,7 +108,7 @@ class CalibratedWorkpiece(BudgetTable):
         return {"U_without_correction_mm": expanded_without_correction(self.budgets()["systematic_error"])}
 
 
-class NotSimulated(Table):
+class NotSimulated(JobTable):
     """A contribution that a simulation leaves out."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -134,7 +134,7 @@ class SimulatedTask(BudgetTable):
     def budgets(self) -> Mapping[str, Budget]:
         """Of the error that the simulation found."""
         lines = [
-            Line(Verbatim(one.name), one.u_um * MICROMETRE, foreign(one.source), unit=unit("mm"))
+            BudgetLine(Verbatim(one.name), one.u_um * MICROMETRE, foreign(one.source), unit=unit("mm"))
             for one in self.not_simulated
         ]
         return {"error": use_by_simulation(np.array(self.simulated_errors_um) * MICROMETRE, lines)}
