@@ -130,7 +130,7 @@ FACTORS = listed(FACTOR, "coverage factors, 1 or more")
 PROBABILITIES = listed(PROBABILITY, "probabilities")
 
 
-_LAST = "id ref_id ref_type"
+_LAST = ("id", "ref_id", "ref_type")
 """Fields that stand behind all others of a class, in this order."""
 
 
@@ -153,7 +153,8 @@ class Element:
     def __init_subclass__(cls, *, kw_only: bool = True) -> None:
         own = [name for name, hint in cls.__annotations__.items() if not hint.startswith("ClassVar")]
         fields = {**cls.FIELDS, **{name: cls.__dict__.get(name, _Missing) for name in own}}
-        cls.FIELDS = MappingProxyType({name: fields[name] for name in sorted(fields, key=_LAST.find)})
+        last = {name: fields.pop(name) for name in _LAST if name in fields}
+        cls.FIELDS = MappingProxyType(fields | last)
 
     def __init__(self, *given: Any, **named: Any) -> None:
         values = {**self.FIELDS, **dict(zip(self.FIELDS, given, strict=False)), **named}
