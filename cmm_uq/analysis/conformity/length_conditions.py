@@ -37,23 +37,26 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
     for found in _lines(plan, artefact, copies):
         measured.setdefault(found.position, []).append(found)
     absent = tuple(line for line in plan.positions if line not in measured)
+    asked = commas(plan.positions)
+    if set(plan.positions) == {*SPACE_DIAGONALS, *PARALLELS}:
+        asked = say("four space diagonals and three axes")
+    wanted, counts = plan.lengths, {line: len(found) for line, found in measured.items()}
+    missing = tuple(
+        say("{lengths} different lengths ({line}: {count})", lengths=wanted, line=line, count=count)
+        for line, count in counts.items() if count < wanted
+    )  # fmt: skip
+    every = list(counts.values())
+    span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
     return (
-        Condition(_positions(plan, absent), absent),
+        Condition(say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked, absent),
         _long_enough(plan, artefact.points.machine, measured),
-        _different(plan, measured),
+        Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing),
         _spread(plan, measured),
         _shortest(plan, measured),
         _repeated(plan, measured),
         *_both_sides(plan, artefact, measured),
         *_offset(plan, artefact),
     )
-
-
-def _positions(plan: LengthPlan, absent: tuple[Text, ...]) -> Text:
-    asked = commas(plan.positions)
-    if set(plan.positions) == {*SPACE_DIAGONALS, *PARALLELS}:
-        asked = say("four space diagonals and three axes")
-    return say("{asked}; missing: {absent}", asked=asked, absent=commas(absent)) if absent else asked
 
 
 def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
@@ -176,17 +179,6 @@ def _long_enough(plan: LengthPlan, machine: Machine, places: _Places) -> Conditi
     every = list(shares.values())
     span = say("{low:.0f} % to {high:.0f} %", low=min(every), high=max(every)) if every else say("none")
     return Condition(say("{what}: {span}", what=what, span=span), missing)
-
-
-def _different(plan: LengthPlan, places: _Places) -> Condition:
-    wanted, counts = plan.lengths, {line: len(found) for line, found in places.items()}
-    missing = tuple(
-        say("{lengths} different lengths ({line}: {count})", lengths=wanted, line=line, count=count)
-        for line, count in counts.items() if count < wanted
-    )  # fmt: skip
-    every = list(counts.values())
-    span = say("{low:.0f} to {high:.0f}", low=min(every), high=max(every)) if every else say("none")
-    return Condition(say("{lengths} lengths on each line: {span}", lengths=wanted, span=span), missing)
 
 
 def _spread(plan: LengthPlan, places: _Places) -> Condition:

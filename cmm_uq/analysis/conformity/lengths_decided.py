@@ -85,7 +85,15 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
     worst = least_favourable(items)
     named = int(rows[items.index(worst)])
     remarks = [_uncertainty_in_words(worst, test.circumstances.uncertainty), _counted_in_words(items, worst)]
-    remarks += _others_in_words(test, found, rows) + _again_in_words(items, again) + _unshown(test, found)
+    under = test.circumstances
+    told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
+    if test.artefact.bidirectional(found.rows) is None:
+        told.append(say("Whether the lengths are bidirectional is not recorded."))
+    if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
+        told.append(
+            say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
+        )
+    remarks += _others_in_words(test, found, rows) + _again_in_words(items, again) + [text for text in told if text]
     degrees = temperatures(found, artefact)
     budget = length_budget(
         float(found.lengths[named]), float(found.u[named]),
@@ -234,15 +242,3 @@ def _again_in_words(items: Sequence[Decided], again: Remeasurement | None) -> li
         told.append(say("One of {repeats} values lay outside and was measured {readings} times more, all inside: {which}.",
                         repeats=again.repeats, readings=again.readings, which=which))  # fmt: skip
     return told
-
-
-def _unshown(test: Test, found: Indications) -> list[Text]:
-    under = test.circumstances
-    told = [unknown_expansion(test.artefact, under.cte_per_k), added_in_words(under.short_gauge, found)]
-    if test.artefact.bidirectional(found.rows) is None:
-        told.append(say("Whether the lengths are bidirectional is not recorded."))
-    if under.uncertainty.u_cte_per_k and temperatures(found, test.artefact) is None:
-        told.append(
-            say("Without temp_artefact_c the lengths are taken to be at 20 °C, where u_cte_per_k counts for nothing.")
-        )
-    return [text for text in told if text]

@@ -107,7 +107,9 @@ class Limits:
     def within(self, value: float) -> float:
         """Probability of the true value inside, with its digits where it is small."""
         if self.zone:
-            return self._within_zone(value)
+            if self.upper is None or self.lower is not None or value <= self.upper or self._scarce(value):
+                return 1.0 - self.beyond(value)
+            return max(0.0, self._above(value - self.upper) - self._above(value)) / self._possible(value)
         if self.inside(value):
             return 1.0 - self.beyond(value)
         if self.upper is None or self.lower is None:
@@ -116,11 +118,6 @@ class Limits:
         if value > self.upper:
             return max(0.0, self._above(value - self.upper) - self._above(value - self.lower))
         return max(0.0, self._below(value - self.lower) - self._below(value - self.upper))
-
-    def _within_zone(self, value: float) -> float:
-        if self.upper is None or self.lower is not None or value <= self.upper or self._scarce(value):
-            return 1.0 - self.beyond(value)
-        return max(0.0, self._above(value - self.upper) - self._above(value)) / self._possible(value)
 
     def _scarce(self, value: float) -> bool:
         return self.zone and self.lower is None and self._below(value) < SCARCE
@@ -153,20 +150,18 @@ class Limits:
             weight = np.where(true < 0, 0.0, weight)
         total = float(weight.sum())
         if total**2 < FEWEST * float(np.sum(weight**2)) or not total:
-            return self._knowing_normal(prior.after(value, self.u))
+            known = prior.after(value, self.u)
+            least = float(special.ndtr(-known.mean / known.sd)) if self.zone else 0.0
+            high = 1.0 if self.upper is None else float(special.ndtr((self.upper - known.mean) / known.sd))
+            low = least if self.lower is None else max(least, float(special.ndtr((self.lower - known.mean) / known.sd)))
+            inside = max(0.0, high - low) / max(1.0 - least, np.finfo(np.float64).tiny)
+            return min(1.0, inside), max(0.0, 1.0 - inside)
         outside = np.zeros(len(true), dtype=bool)
         if self.upper is not None:
             outside |= true > self.upper
         if self.lower is not None:
             outside |= true < self.lower
         return float(weight[~outside].sum()) / total, float(weight[outside].sum()) / total
-
-    def _knowing_normal(self, known: PriorKnowledge) -> tuple[float, float]:
-        least = float(special.ndtr(-known.mean / known.sd)) if self.zone else 0.0
-        high = 1.0 if self.upper is None else float(special.ndtr((self.upper - known.mean) / known.sd))
-        low = least if self.lower is None else max(least, float(special.ndtr((self.lower - known.mean) / known.sd)))
-        inside = max(0.0, high - low) / max(1.0 - least, np.finfo(np.float64).tiny)
-        return min(1.0, inside), max(0.0, 1.0 - inside)
 
     def wrongly_accepted(self, guard: float) -> float:
         """Share of all items that lie outside and are accepted, with acceptance so far inside the limits."""

@@ -27,8 +27,19 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
     travel = points.machine.travel_mm
     known = bool(np.all(np.isfinite(travel)))
     wanted = plan.positions_in(np.ptp(travel, axis=1)) if known else plan.positions
-    numbers, ends = _one_a_measurement(artefact)
-    same = _same_places(plan, points, numbers, ends, copies)
+    # Numbers of the measurements, and the ends (q, 2, 3) of the first bar of each
+    numbers, rows = np.unique(artefact.measurement, return_index=True)
+    numbers, ends = numbers.tolist(), np.asarray(artefact.points.xyz[artefact.rows[rows]], dtype=np.float64)
+    # Measurements that are no further position: within how many mm of which other, or a copy of it
+    found: dict[int, tuple[float | None, int]] = {}
+    for later, original in copies.items():
+        (one, _), (two, _) = points.run_of(original), points.run_of(later)
+        if one != two:
+            found[two] = None, one
+    left = [i for i, own in enumerate(numbers) if own not in found]
+    near = {i: {j for j in left if j != i and _apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
+    kept = most_apart(near)
+    same = found | {numbers[i]: (plan.apart_mm, numbers[min(near[i] & kept)]) for i in left if i not in kept}
     count = sum(number not in same for number in numbers)
     missing: list[Text] = []
     if count < wanted:
@@ -47,27 +58,6 @@ def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) 
                     missing=commas(lines))  # fmt: skip
     positions = say("at least {wanted} positions of the bar: {count}", wanted=wanted, count=count)
     return Condition(positions, tuple(missing)), Condition(asked, lines)
-
-
-def _one_a_measurement(artefact: Artefact) -> tuple[list[int], Floats]:
-    """Numbers of the measurements, and the ends (q, 2, 3) of the first bar of each."""
-    numbers, rows = np.unique(artefact.measurement, return_index=True)
-    return numbers.tolist(), np.asarray(artefact.points.xyz[artefact.rows[rows]], dtype=np.float64)
-
-
-def _same_places(
-    plan: BarPlan, points: Points, numbers: Sequence[int], ends: Floats, copies: Mapping[int, int]
-) -> dict[int, tuple[float | None, int]]:
-    """Measurements that are no further position: within how many mm of which other, or a copy of it."""
-    found: dict[int, tuple[float | None, int]] = {}
-    for later, original in copies.items():
-        (one, _), (two, _) = points.run_of(original), points.run_of(later)
-        if one != two:
-            found[two] = None, one
-    left = [i for i, own in enumerate(numbers) if own not in found]
-    near = {i: {j for j in left if j != i and _apart(ends[i], ends[j]) < plan.apart_mm} for i in left}
-    kept = most_apart(near)
-    return found | {numbers[i]: (plan.apart_mm, numbers[min(near[i] & kept)]) for i in left if i not in kept}
 
 
 def most_apart(near: Mapping[int, Collection[int]]) -> set[int]:

@@ -41,9 +41,20 @@ class Supplemented(Artefact):
         if found is None:
             return None
         beside = np.where(self._measured_by(found.rows) >= 0, self.gauge.u_mm, 0.0)
-        return Indications(
-            found.errors + self._added(found), found.lengths, np.hypot(found.u, beside), found.rows, beside
-        )
+        # Error of the short gauge that each length's is taken with, (m,) mm
+        gauge, first = self.gauge, found.rows[:, 0]
+        errors, number = gauge.errors_mm, gauge.points.measurement[gauge.rows[:, 0]]
+        measurement, repeat = self.points.measurement[first], self.points.repeat[first]
+        repeats_of = {m: np.unique(repeat[measurement == m]) for m in np.unique(measurement)}
+        added = np.zeros(len(first))
+        for i, serving in enumerate(self._measured_by(found.rows)):
+            if serving < 0:
+                continue
+            repeats = errors[(number == serving) & ~_copied(gauge)]
+            turn = int(np.searchsorted(repeats_of[measurement[i]], repeat[i]))
+            outwards = repeats[np.argmax(np.abs(found.errors[i] + repeats))]
+            added[i] = repeats[turn] if turn < len(repeats) else outwards
+        return Indications(found.errors + added, found.lengths, np.hypot(found.u, beside), found.rows, beside)
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
         own = self.own.bidirectional(rows)
@@ -85,28 +96,15 @@ class Supplemented(Artefact):
         for i, (first, last) in enumerate(points.xyz[rows]):
             if own is None or own[i]:
                 continue
-            fits = ~copied & _along(ways, last - first) & (_distance(middles, first, last) <= NEAR_MM)
+            # Which of some ways (q, 3) go along a line (3,), either way, within 10°
+            line = last - first
+            sine = np.linalg.norm(np.cross(ways, line), axis=1) / (np.linalg.norm(ways, axis=1) * np.linalg.norm(line))
+            fits = ~copied & np.asarray(sine <= ALIGNED) & (_distance(middles, first, last) <= NEAR_MM)
             fits &= np.linalg.norm(tips_of_gauge - tips[i], axis=1) <= OFFSET_TOLERANCE_MM
             if fits.any():
                 at = np.flatnonzero(fits)
                 found[i] = numbers[at[np.argmin(_distance(middles[at], first, last))]]
         return found
-
-    def _added(self, found: Indications) -> Floats:
-        """Error of the short gauge that each length's is taken with, (m,) mm."""
-        gauge, first = self.gauge, found.rows[:, 0]
-        errors, number = gauge.errors_mm, gauge.points.measurement[gauge.rows[:, 0]]
-        measurement, repeat = self.points.measurement[first], self.points.repeat[first]
-        repeats_of = {m: np.unique(repeat[measurement == m]) for m in np.unique(measurement)}
-        added = np.zeros(len(first))
-        for i, serving in enumerate(self._measured_by(found.rows)):
-            if serving < 0:
-                continue
-            repeats = errors[(number == serving) & ~_copied(gauge)]
-            turn = int(np.searchsorted(repeats_of[measurement[i]], repeat[i]))
-            outwards = repeats[np.argmax(np.abs(found.errors[i] + repeats))]
-            added[i] = repeats[turn] if turn < len(repeats) else outwards
-        return added
 
 
 def supplemented(artefact: Artefact, gauge: ShortGauge | None) -> Artefact:
@@ -159,12 +157,6 @@ def _copied(gauge: ShortGauge) -> NDArray[np.bool_]:
 def _tips(points: Points) -> Floats:
     tips = tip_offsets(points)
     return np.zeros((len(points), 3)) if tips is None else tips
-
-
-def _along(ways: Floats, line: Floats) -> NDArray[np.bool_]:
-    """Which of some ways (q, 3) go along a line (3,), either way, within 10°."""
-    sine = np.linalg.norm(np.cross(ways, line), axis=1) / (np.linalg.norm(ways, axis=1) * np.linalg.norm(line))
-    return np.asarray(sine <= ALIGNED)
 
 
 def _distance(middles: Floats, first: Floats, last: Floats) -> Floats:

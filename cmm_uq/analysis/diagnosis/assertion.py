@@ -9,7 +9,6 @@ periods. Any other effect less probable than one half is asserted as one of a gr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +22,6 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.least_squares import solve
-from cmm_uq.maths.inference.linear_model import LinearModel
 
 _COVERED = 0.95  # of the region of a size that must not hold zero, and of the phases that must lie within half a turn
 _BY_NOISE = 0.05  # probability, under noise, of taking as much of the misfit, from which on it is the noise's share
@@ -171,12 +169,8 @@ def _chance(result: SearchResult, joint: JointPosterior) -> dict[str, float]:
     chance = {}
     for name in result.effects:
         own = [i for i, unknown in enumerate(linear.unknowns) if unknown.key[0] == name]
-        more = _left_without(linear, own) - left
+        rest = solve(linear.only([i for i in range(len(linear.unknowns)) if i not in own])).residuals
+        more = float(rest @ rest) - left
         ratio = max(more, 0.0) / len(own) / max(left / dof, 1e-300)
         chance[name] = float(special.fdtrc(len(own), dof, ratio))
     return chance
-
-
-def _left_without(linear: LinearModel, own: Sequence[int]) -> float:
-    rest = solve(linear.only([i for i in range(len(linear.unknowns)) if i not in own])).residuals
-    return float(rest @ rest)

@@ -29,7 +29,6 @@ from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.machine.model.kind import Observed
 from cmm_uq.machine.model.recorded import of_last_digit
-from cmm_uq.machine.physics.effect import Effect
 from cmm_uq.maths.inference.ensembles import Progress
 from cmm_uq.maths.inference.least_squares import solve
 from cmm_uq.maths.inference.linear_model import LinearModel
@@ -127,7 +126,8 @@ def diagnose(
     observe: Observed | None = None,
 ) -> Diagnosis:
     stated = None if stated_um is None else stated_um * MICROMETRE
-    model = _with_last_digit(model)
+    least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
+    model = replace(model, least_noise=least) if least > model.least_noise else model
     some = model if observe is None else thin_out(model, observe, seed)
     found, joint, withheld = _asserted(search(some, stated, alpha=alpha, seed=seed), model, seed, progress, known)
     gain = improvement(model, found.model)
@@ -182,12 +182,6 @@ def _of_all(result: SearchResult, model: RecordingModel) -> SearchResult:
     return replace(result, model=replace(result.model, artefact=model.artefact, used=model.used))
 
 
-def _with_last_digit(model: RecordingModel) -> RecordingModel:
-    """The model whose noise is no less than the last digit of what was recorded: exact figures, and copies, have no other."""
-    least = of_last_digit(model.artefact.points.xyz, model.estimate().least_squares.sigma_of_residuals)
-    return replace(model, least_noise=least) if least > model.least_noise else model
-
-
 def _verdict(result: SearchResult, alpha: float) -> str:
     if result.first.p_value >= alpha:
         return "consistent"
@@ -218,7 +212,7 @@ def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingMode
         parameters = {
             name: Quantity.of_draws(_unwrapped(values) if name == "phase_rad" else values, units[name])
             for name, values in reported.items()
-            if known or name not in _of_a_period(effect)
+            if known or name not in frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
         }
         explained = max(share, 0.0) if total > 0 else 0.0
         item = OmittedEffect(
@@ -227,11 +221,6 @@ def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingMode
         )  # fmt: skip
         listed.append(item)
     return tuple(sorted(listed, key=lambda item: -item.probability))
-
-
-def _of_a_period(effect: Effect) -> frozenset[str]:
-    """What is reported of an effect with one period only: another has another phase."""
-    return frozenset({"phase_rad", *(shape.name for shape in effect.shape)})
 
 
 def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:

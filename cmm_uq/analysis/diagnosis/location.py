@@ -28,7 +28,6 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model import RecordingModel
-from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import Quantity
 
 _UNSEEN = 0.05  # part of a constant or a line that must show in the observations; with less, nothing is known of it
@@ -257,17 +256,22 @@ def residual_field(before: RecordingModel, after: RecordingModel) -> ResidualFie
     noise = artefact.noise_scale[used]
     readings = artefact.points.machine_xyz
     if rows.shape[1] == 1:
-        return _of_points(rows[:, 0], _directions(artefact, used), left, noise, readings)
+        # (m, 3) in which each observation sees its point move
+        points = artefact.points
+        every = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+        return _of_points(rows[:, 0], artefact.project(points.xyz, every)[used], left, noise, readings)
     if rows.shape[1] == 2:
-        return _of_lengths(rows, left, noise, readings)
+        ends = readings[rows]
+        along = ends[:, 1] - ends[:, 0]
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        half = 0.5 * left[:, :, None] * along[:, None, :]
+        both = np.stack([-half, half], axis=1)  # (m, end, model, 3)
+        count = 2 * len(rows)
+        return ResidualField(
+            ends.reshape(count, 3), both[:, :, 0].reshape(count, 3), both[:, :, 1].reshape(count, 3),
+            np.repeat(0.5 * noise, 2), np.ones(count, dtype=np.int64), True,
+        )  # fmt: skip
     return None
-
-
-def _directions(artefact: Artefact, used: NDArray[np.bool_]) -> Floats:
-    """(m, 3) in which each observation sees its point move."""
-    points = artefact.points
-    every = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-    return artefact.project(points.xyz, every)[used]
 
 
 def _of_points(point: Ints, directions: Floats, left: Floats, noise: Floats, readings: Floats) -> ResidualField:
@@ -283,17 +287,3 @@ def _of_points(point: Ints, directions: Floats, left: Floats, noise: Floats, rea
     return ResidualField(
         readings[owners], field[:, :, 0], field[:, :, 1], np.array(scale), np.array(dimensions, dtype=np.int64), False
     )
-
-
-def _of_lengths(rows: Ints, left: Floats, noise: Floats, readings: Floats) -> ResidualField:
-    """Half of what each length leaves at either end, away from the other one where it was found too long."""
-    ends = readings[rows]
-    along = ends[:, 1] - ends[:, 0]
-    along = along / np.linalg.norm(along, axis=1, keepdims=True)
-    half = 0.5 * left[:, :, None] * along[:, None, :]
-    both = np.stack([-half, half], axis=1)  # (m, end, model, 3)
-    count = 2 * len(rows)
-    return ResidualField(
-        ends.reshape(count, 3), both[:, :, 0].reshape(count, 3), both[:, :, 1].reshape(count, 3),
-        np.repeat(0.5 * noise, 2), np.ones(count, dtype=np.int64), True,
-    )  # fmt: skip

@@ -245,25 +245,21 @@ def noise_kinds(model: RecordingModel, candidates: Sequence[Explanation]) -> lis
     rivals = np.hstack(columns) if columns else np.zeros((len(estimate.linear.observed), 0))
     # without a degree of freedom the recording says nothing of its noise, and what is stated holds
     components = noise_of(replace(model, sigma=None) if estimate.least_squares.degrees_of_freedom else model)
-    jumps = _jumps(estimate.linear, estimate.least_squares.residuals, candidates)
-    return representative_kinds(
-        estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals, jumps
-    )
-
-
-def _jumps(linear: LinearModel, residuals: Floats, candidates: Sequence[Explanation]) -> Floats:
-    """Columns (m, j), mm: of each function of time with a jump, the one that takes most of the residuals (m,), mm."""
+    residuals = estimate.least_squares.residuals
     functions = [each for each in candidates if each.kind == UNKNOWN and each.covariate_name == "time_s"]
     found = [np.zeros((len(residuals), 0))]
-    left = linear.reduce(residuals[:, None])[:, 0]
+    left = estimate.linear.reduce(residuals[:, None])[:, 0]
     for function in functions:
         steps = [member.columns for member in function.members if member.columns.shape[1] == 1]
         if steps:
-            rest = unreached(linear, np.hstack(steps))
+            rest = unreached(estimate.linear, np.hstack(steps))
             squares = np.sum(rest**2, axis=0)
             taken = (left @ rest) ** 2 / np.where(squares > 0, squares, np.inf)
             found.append(steps[int(taken.argmax())])
-    return np.hstack(found)
+    jumps = np.hstack(found)
+    return representative_kinds(
+        estimate.linear, components, estimate.least_squares, rivals, estimate.least_squares.residuals, jumps
+    )
 
 
 def _doubled(explanation: Explanation) -> bool:

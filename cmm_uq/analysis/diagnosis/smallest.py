@@ -197,9 +197,15 @@ class _Signal:
         shape = self.effect.shape[0]
         order = np.argsort(self.values)
         values = self.values[order]
-        return PeriodRange(
-            shape.name, shape.unit, float(values[0]), float(values[-1]), worst, _ranges(values, ~shown[order])
-        )
+        # Runs of ascending values (p,) that are chosen
+        chosen = ~shown[order]
+        found: list[tuple[float, float]] = []
+        run = False
+        for value, one in zip(values.tolist(), chosen.tolist(), strict=True):
+            if one:
+                found.append((found.pop()[0], value) if run else (value, value))
+            run = bool(one)
+        return PeriodRange(shape.name, shape.unit, float(values[0]), float(values[-1]), worst, tuple(found))
 
 
 def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]) -> list[_Signal]:
@@ -221,14 +227,3 @@ def _signals(view: Visibility, listed: Sequence[tuple[int, Explanation, Effect]]
 
 def _amplitude(length: float, unit_length: float, unit: float) -> float | None:
     return length / unit_length * unit if np.isfinite(length) and unit_length > 0 else None
-
-
-def _ranges(values: Floats, chosen: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
-    """Runs of ascending values (p,) that are chosen."""
-    found: list[tuple[float, float]] = []
-    run = False
-    for value, one in zip(values.tolist(), chosen.tolist(), strict=True):
-        if one:
-            found.append((found.pop()[0], value) if run else (value, value))
-        run = bool(one)
-    return tuple(found)

@@ -229,7 +229,9 @@ def thresholds(view: Visibility, which: Sequence[int], columns: Floats, alpha: f
         return
     first = view.result.first
     comparison, explanations = first.comparison, first.explanations
-    gate = _gate(first.null, alpha)
+    null = first.null
+    low, high = float(null.min()) - 1.0, float(null.max()) + 50.0
+    gate = root(lambda value: float(np.log(tail_probability(null, value) / alpha)), low, high, 1e-6)
     prior = log_prior(explanations)
     sizes = np.array([[sqrt(max(2 * (gate - prior[i] + 1.0), 4.0)) * size for size in SIZES] for i in which])
     data = (sizes[:, :, None] * columns[:, None, :]).reshape(-1, columns.shape[1]).T
@@ -262,11 +264,6 @@ def _pair(explanations: Sequence[Explanation], visible: frozenset[int]) -> float
     if count < 2:
         return None
     return float(np.log(EFFECTS[2] / EFFECTS[0]) - np.log(comb(count, 2)) + np.log(NOTHING) + np.log(count - 1))
-
-
-def _gate(null: Floats, alpha: float) -> float:
-    low, high = float(null.min()) - 1.0, float(null.max()) + 50.0
-    return root(lambda value: float(np.log(tail_probability(null, value) / alpha)), low, high, 1e-6)
 
 
 def _passes(margins: Floats) -> Floats:

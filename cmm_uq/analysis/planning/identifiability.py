@@ -81,33 +81,40 @@ def identifiability(
     """
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear = model.linearised(values)
-    estimate = solve(_enough(linear))
+    k, free = len(linear.unknowns), linear.freedoms.dense()
+    whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
+    there = np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole
+    estimate = solve(
+        replace(
+            linear,
+            observed=np.concatenate([linear.observed, np.zeros(k + 1)]),
+            design=np.vstack([linear.design * there, np.zeros((k + 1, k))]),
+            placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
+            noise_scale=np.concatenate([linear.noise_scale, np.ones(k + 1)]),
+        )
+    )
     white = white_noise(model) if noise is None else noise.white
     under_white = expected_uncertainty(model, white)
     under_noise = under_white if noise is None else expected_uncertainty(model, noise)
     information = gram(model, values, noise) + certified(model.unknowns)
-    named = _named_pairs(information, [unknown.key[0] for unknown in model.unknowns])
+    names = [unknown.key[0] for unknown in model.unknowns]
+    found = []
+    effects = [i for i, name in enumerate(names) if name != ARTEFACT]
+    for i, j in combinations(effects, 2):
+        rest = [k for k in range(len(information)) if k not in (i, j)]
+        left, alone = left_of(information, [i, j], rest), np.diag(information)[[i, j]]
+        cosine = float(cosines(left, alone)[0, 1])
+        if names[i] != names[j] and np.all(visible(left, alone)) and cosine > NOT_TOLD_APART:
+            found.append((names[i], names[j], cosine))
+    named = found
     alike, absorbed, unseen = _among_rivals(model, rivals, noise) if rivals else ([], (), ())
     return Identifiability(
-        _parameters(linear, estimate, under_noise, under_white), _free(estimate),
+        _parameters(linear, estimate, under_noise, under_white), tuple(
+        {u.key: float(part) for u, part in zip(estimate.unknowns, column, strict=True) if part}
+        for column in estimate.null_space.T
+    ),
         _singular_values(uncorrelated(model, values, noise), white.coordinate),
         tuple(sorted([*named, *alike], key=lambda pair: -pair[2])), absorbed, unseen,
-    )  # fmt: skip
-
-
-def _enough(linear: LinearModel) -> LinearModel:
-    """The same with observations that say nothing, so that few set-ups are a finding and no error.
-
-    Columns of which the set-up leaves nothing but rounding become zero, lest they determine each other.
-    """
-    k, free = len(linear.unknowns), linear.freedoms.dense()
-    whole = np.linalg.norm(linear.design / linear.noise_scale[:, None], axis=0)
-    there = np.linalg.norm(linear.reduced.design, axis=0) > _ROUNDING * whole
-    return replace(
-        linear, observed=np.concatenate([linear.observed, np.zeros(k + 1)]),
-        design=np.vstack([linear.design * there, np.zeros((k + 1, k))]),
-        placing=np.vstack([free, np.zeros((k + 1, free.shape[1]))]),
-        noise_scale=np.concatenate([linear.noise_scale, np.ones(k + 1)]),
     )  # fmt: skip
 
 
@@ -129,13 +136,6 @@ def _parameters(
         status = "free" if u is None else "weak" if weak else "determined"
         found.append(Determination(unknown, u, float(noisy.with_prior[i]), u_white, status))
     return tuple(found)
-
-
-def _free(estimate: LeastSquares) -> tuple[Mapping[tuple[str, str], float], ...]:
-    return tuple(
-        {u.key: float(part) for u, part in zip(estimate.unknowns, column, strict=True) if part}
-        for column in estimate.null_space.T
-    )
 
 
 def _among_rivals(
@@ -166,15 +166,3 @@ def _among_rivals(
     }
     unseen = [names[i] for i in hidden if names[i] not in shown and names[i] not in absorbed]
     return found, tuple(absorbed.items()), tuple(dict.fromkeys(unseen))
-
-
-def _named_pairs(information: Floats, names: Sequence[str]) -> list[Pair]:
-    found = []
-    effects = [i for i, name in enumerate(names) if name != ARTEFACT]
-    for i, j in combinations(effects, 2):
-        rest = [k for k in range(len(information)) if k not in (i, j)]
-        left, alone = left_of(information, [i, j], rest), np.diag(information)[[i, j]]
-        cosine = float(cosines(left, alone)[0, 1])
-        if names[i] != names[j] and np.all(visible(left, alone)) and cosine > NOT_TOLD_APART:
-            found.append((names[i], names[j], cosine))
-    return found

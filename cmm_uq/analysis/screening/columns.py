@@ -154,7 +154,10 @@ def _stuck(points: Points) -> Iterator[Finding]:
     for column, values in _measured(points):
         firsts = _firsts(points.group) if _constant_in_groups(points.group, values) else np.arange(len(values))
         sequence = values[firsts]
-        start, length = _longest_run(sequence)
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(sequence)) + 1])
+        lengths = np.diff([*starts, len(sequence)])
+        longest = int(np.argmax(lengths))
+        start, length = int(starts[longest]), int(lengths[longest])
         outside = np.concatenate([np.diff(sequence[: start + 1]), np.diff(sequence[start + length - 1 :])])
         if length < max(_STUCK_ROWS, _STUCK_PART * len(sequence)) or len(outside) < _STUCK_ROWS:
             continue
@@ -245,14 +248,6 @@ def _in_blocks(group: Ints) -> bool:
 
 def _constant_in_groups(group: Ints, values: Floats) -> bool:
     return bool(np.all(np.diff(values)[np.diff(group) == 0] == 0))
-
-
-def _longest_run(values: Floats) -> tuple[int, int]:
-    """Start and length of the longest run of equal values."""
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(values)) + 1])
-    lengths = np.diff([*starts, len(values)])
-    longest = int(np.argmax(lengths))
-    return int(starts[longest]), int(lengths[longest])
 
 
 def about_whole_column(item: Finding, points: Points) -> bool:

@@ -68,7 +68,12 @@ class DamageSearch:
         found = []
         for causes in (self._copies(), self._swapped(_FEW), self._blocks(), self._swapped(_MANY), self._singles()):
             for cause in causes:
-                self._settle(cause)
+                self._settled[self._lost_with(cause.rows)] = True
+                if cause.mended is not None:
+                    self._xyz, self._reference = cause.mended
+                again = np.isin(self._placing, self._placing[cause.rows])
+                misfit = self.shape.misfit(self._xyz, self._reference, self._placings(cause.rows))
+                self._open[again] = (self._wrong(misfit) & ~self._settled)[again]
                 found.append(self._finding(cause))
         groups = self.points.group if self.shape.together else np.arange(len(self.points))
         unknown = [np.flatnonzero(self._open & (groups == group)) for group in np.unique(groups[self._open])]
@@ -87,15 +92,6 @@ class DamageSearch:
         astray = np.any(beyond > high - low, axis=1)
         missed = misfit > self.shape.tolerance
         return np.asarray(missed | astray if astray.mean() <= MOST else missed)
-
-    def _settle(self, cause: Damage) -> None:
-        """Take rows whose damage is known out of the search, and look again at those that stand in their set-ups."""
-        self._settled[self._lost_with(cause.rows)] = True
-        if cause.mended is not None:
-            self._xyz, self._reference = cause.mended
-        again = np.isin(self._placing, self._placing[cause.rows])
-        misfit = self.shape.misfit(self._xyz, self._reference, self._placings(cause.rows))
-        self._open[again] = (self._wrong(misfit) & ~self._settled)[again]
 
     def _finding(self, cause: Damage) -> Finding:
         rows = cause.rows
@@ -123,7 +119,8 @@ class DamageSearch:
         rows, originals = [], []
         for row in np.flatnonzero(self._open):
             others = np.flatnonzero(same.ravel() == same.ravel()[row])
-            others = others[self._other_place(others, np.full(len(others), row))]
+            keys = np.column_stack([self.points.measurement, self.points.point])
+            others = others[np.asarray(np.any(keys[others] != keys[np.full(len(others), row)], axis=1))]
             if len(others):
                 rows.append(row)
                 originals.append(others[0])
@@ -137,10 +134,6 @@ class DamageSearch:
                 many=say("they have the coordinates of {lines} to the last digit: copied, not measured", lines=lines),
             )
             yield Damage("duplicate" if end - start == 1 else "repeated block", block[start:end], why)
-
-    def _other_place(self, rows: Ints, others: Ints) -> NDArray[np.bool_]:
-        keys = np.column_stack([self.points.measurement, self.points.point])
-        return np.asarray(np.any(keys[rows] != keys[others], axis=1))
 
     def _swapped(self, most: int) -> Iterator[Damage]:
         rows = np.flatnonzero(self._open)
@@ -273,7 +266,10 @@ def coordinate_findings(
     if search.bad.sum() >= _SEVERAL:
         _refuse_whole(search, where)
     if 2 * int(search.bad[counted].sum()) > counted.sum():
-        _refuse_another(search, observe, where)
+        observe(search.points)
+        raise CmmUqError(
+            _missed(search), where=where, fix="Check [artefact] in job.toml, and the order of rows and columns"
+        )
     found = search.findings() if search.bad.any() else []
     lost = {row for f in found for row in f.rows if counted[row]}
     if len(lost) > max(MOST * len(points), 2):
@@ -305,7 +301,8 @@ def _refuse_whole(search: DamageSearch, where: str) -> None:
     best, fewest = None, min(max(2, int(_EDGES * len(points))), bad // _SEVERAL)
     strays = max(_EDGES, _astray(points))
     for change in (*row_mistakes(shape), *block_mistakes(shape)):
-        if _shrinks(change, shape):
+        free = np.isnan(shape.size) and not shape.reference.shape[1]
+        if bool(free and change.kind == "unit" and change.apply(np.ones((1, 3)), np.zeros((1, 0)))[0].min() < 1):
             continue
         xyz, reference = search.changed(change, np.arange(len(points)))
         left = int(np.sum(shape.misfit(xyz, reference) > shape.tolerance))
@@ -328,23 +325,9 @@ def _astray(points: Points) -> float:
     return float(np.any(outside_travel(points), axis=1).mean())
 
 
-def _refuse_another(search: DamageSearch, observe: Observed, where: str) -> None:
-    """Refuse a recording of another artefact, or of none: in the words of the artefact's own checks where these see it."""
-    observe(search.points)
-    raise CmmUqError(
-        _missed(search), where=where, fix="Check [artefact] in job.toml, and the order of rows and columns"
-    )
-
-
 def _missed(search: DamageSearch) -> str:
     bad = int(search.bad.sum())
     return f"{bad} of {len(search.points)} points miss the artefact by up to {search.misfit.max():.3g} mm"
-
-
-def _shrinks(change: Mistake, shape: ArtefactShape) -> bool:
-    """Whether a change makes everything fit by making everything small: no proof where the size is free."""
-    free = np.isnan(shape.size) and not shape.reference.shape[1]
-    return bool(free and change.kind == "unit" and change.apply(np.ones((1, 3)), np.zeros((1, 0)))[0].min() < 1)
 
 
 def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:

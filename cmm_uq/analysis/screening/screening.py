@@ -141,7 +141,13 @@ def repeated_figures(points: Points) -> list[Finding]:
     """Measurements whose coordinates repeat, digit for digit, those of another measurement; runs of them as one block."""
     copies = sorted((original, later) for later, original in copied_measurements(points).items())
     copies.sort(key=lambda pair: pair[1])
-    return [_copied(points, run) for run in _runs(copies)]
+    runs: list[list[tuple[int, int]]] = []
+    for a, b in copies:
+        if runs and runs[-1][-1] == (a - 1, b - 1):
+            runs[-1].append((a, b))
+        else:
+            runs.append([(a, b)])
+    return [_copied(points, run) for run in runs]
 
 
 def gross_outliers(linear: LinearModel, measurement: NDArray[np.int64], least: float = 0.0) -> list[tuple[int, float]]:
@@ -202,17 +208,6 @@ def _copied(points: Points, run: Sequence[tuple[int, int]]) -> Finding:
     )
     rows = tuple(np.flatnonzero(np.isin(points.group, later)).tolist())
     return replace(finding("repeated block", points, both, block), rows=rows)
-
-
-def _runs(copies: Sequence[tuple[int, int]]) -> list[list[tuple[int, int]]]:
-    """Copies in runs whose originals and copies both follow each other."""
-    runs: list[list[tuple[int, int]]] = []
-    for a, b in copies:
-        if runs and runs[-1][-1] == (a - 1, b - 1):
-            runs[-1].append((a, b))
-        else:
-            runs.append([(a, b)])
-    return runs
 
 
 def _measurement(points: Points, group: int) -> int:

@@ -99,8 +99,31 @@ KEYS: Mapping[str, str] = {
 
 
 def proof_outcome(proof: DiagnosisProof) -> Outcome:
+    judgement = proof.judgement
+    words: dict[str, tuple[str, Standing]] = {MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad")}
+    verdicts = tuple(
+        Headline(
+            *words[one.standing],
+            one.what,
+            (in_words(one.rate), say("asked for: {limits}", limits=limits(one)), standing(one)),
+        )
+        for one in proof.accepted
+    )
+    figures = (
+        (say("Hidden effects found"), in_words(judgement.found), NOTHING),
+        (say("Cases with a wrong name"), in_words(judgement.wrong_names), NOTHING),
+        (say("Right verdicts"), in_words(judgement.right), NOTHING),
+    )
+    remarks = [
+        conclusion_of(proof),
+        often_words(proof),
+        say("Truth sealed by SHA-256 {sha256}.", sha256=Verbatim(proof.sha256)),
+    ]
     return Outcome(
-        proof, lambda: proof_document(proof), proof_results(proof), proof_summary(proof), warnings_of(proof),
+        proof, lambda: proof_document(proof), proof_results(proof), Summary(
+        say("{count} sealed cases", count=len(judgement.cases)), verdicts=verdicts, figures=figures,
+        remarks=tuple(text for text in remarks if text), warnings=warnings_of(proof),
+    ), warnings_of(proof),
         {TRUTH: proof.truth, RECORDS: proof.answers}, in_order=proof.conforming,
     )  # fmt: skip
 
@@ -184,30 +207,3 @@ def _rate(rate: Rate) -> dict[str, Any]:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def proof_summary(proof: DiagnosisProof) -> Summary:
-    judgement = proof.judgement
-    words: dict[str, tuple[str, Standing]] = {MET: ("SHOWN", "good"), OPEN: ("OPEN", "open"), MISSED: ("MISSED", "bad")}
-    verdicts = tuple(
-        Headline(
-            *words[one.standing],
-            one.what,
-            (in_words(one.rate), say("asked for: {limits}", limits=limits(one)), standing(one)),
-        )
-        for one in proof.accepted
-    )
-    figures = (
-        (say("Hidden effects found"), in_words(judgement.found), NOTHING),
-        (say("Cases with a wrong name"), in_words(judgement.wrong_names), NOTHING),
-        (say("Right verdicts"), in_words(judgement.right), NOTHING),
-    )
-    remarks = [
-        conclusion_of(proof),
-        often_words(proof),
-        say("Truth sealed by SHA-256 {sha256}.", sha256=Verbatim(proof.sha256)),
-    ]
-    return Summary(
-        say("{count} sealed cases", count=len(judgement.cases)), verdicts=verdicts, figures=figures,
-        remarks=tuple(text for text in remarks if text), warnings=warnings_of(proof),
-    )  # fmt: skip

@@ -66,7 +66,16 @@ def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
 
 def unseen_section(proof: DiagnosisProof) -> Section:
     found: list[Block] = [Paragraph(text) for text in (*_unseen(proof.reaches), *_faults(proof))]
-    return Section(say("What these set-ups cannot see"), (*found, *_unrecorded(proof.reaches)))
+    by_columns: dict[tuple[str, ...], list[Text]] = {}
+    for reach in proof.reaches:
+        if reach.standing == UNRECORDED:
+            by_columns.setdefault(reach.columns, []).append(reach.title)
+    rows = tuple((semicolons(titles), commas(names(columns))) for columns, titles in by_columns.items())
+    heads = (Column(say("Effects"), numeric=False), Column(say("Columns that they go by"), numeric=False))
+    return Section(
+        say("What these set-ups cannot see"),
+        (*found, *((Table(say("Not considered, because it is not recorded"), heads, rows),) if rows else ())),
+    )
 
 
 def _unseen(reaches: tuple[Reach, ...]) -> list[Text]:
@@ -84,17 +93,6 @@ def _unseen(reaches: tuple[Reach, ...]) -> list[Text]:
         if titles:
             found.append(say("{what} {effects}.", what=what, effects=semicolons(titles)))
     return found
-
-
-def _unrecorded(reaches: tuple[Reach, ...]) -> tuple[Block, ...]:
-    """Effects that go by what was not recorded."""
-    by_columns: dict[tuple[str, ...], list[Text]] = {}
-    for reach in reaches:
-        if reach.standing == UNRECORDED:
-            by_columns.setdefault(reach.columns, []).append(reach.title)
-    rows = tuple((semicolons(titles), commas(names(columns))) for columns, titles in by_columns.items())
-    heads = (Column(say("Effects"), numeric=False), Column(say("Columns that they go by"), numeric=False))
-    return (Table(say("Not considered, because it is not recorded"), heads, rows),) if rows else ()
 
 
 def _faults(proof: DiagnosisProof) -> list[Text]:

@@ -61,7 +61,16 @@ class AnswersFolder:
             part.replace(sealed)
         path = self.folder / RECORDS
         content = path.read_bytes() if path.exists() else b""
-        records, whole = _whole_lines(content)
+        found: dict[int, Record] = {}
+        end = 0
+        for line in content.splitlines(keepends=True):
+            try:
+                record: Record = json.loads(line) if line.endswith(b"\n") else {}
+                found[int(record["number"])] = record
+            except (ValueError, TypeError, KeyError):
+                break
+            end += len(line)
+        records, whole = found, end
         if whole < len(content):
             with path.open("rb+") as file:
                 file.truncate(whole)
@@ -83,20 +92,6 @@ class AnswersFolder:
         """What was kept is in place elsewhere."""
         self.close()
         shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def _whole_lines(content: bytes) -> tuple[dict[int, Record], int]:
-    """Answers in the whole lines, and how many bytes these are."""
-    found: dict[int, Record] = {}
-    end = 0
-    for line in content.splitlines(keepends=True):
-        try:
-            record: Record = json.loads(line) if line.endswith(b"\n") else {}
-            found[int(record["number"])] = record
-        except (ValueError, TypeError, KeyError):
-            break
-        end += len(line)
-    return found, end
 
 
 def answer_tasks(

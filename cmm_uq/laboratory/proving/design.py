@@ -135,7 +135,11 @@ class Design:
         rank = cycle * cases.CYCLE.count(kind) + cases.CYCLE[:place].count(kind)
         noise_kind = self.noises[rank % len(self.noises)]
         noise = self.noise_of_kind(noise_kind, random)
-        case = Case(number, kind, noise_kind, noise, self._sizes(random))
+        sizes = self.model.artefact.sizes
+        own = self.values[len(self.values) - len(sizes) :]
+        draws = random.standard_normal(len(sizes))
+        drawn = [s.nominal + s.sd * z if s.certified else value for s, value, z in zip(sizes, own, draws, strict=True)]
+        case = Case(number, kind, noise_kind, noise, tuple(float(size) for size in drawn))
         sight = self.sight(noise)
         if kind in (cases.OUTSIDE, cases.ARTEFACT):
             stranger = self._stranger(sight, kind, random)
@@ -144,14 +148,6 @@ class Design:
             kind = cases.ONE
         hidden = self._hidden(sight, 2 if kind == cases.TWO else 1, seed, rank, random) if kind != cases.NOTHING else ()
         return replace(case, kind=(cases.NOTHING, cases.ONE, cases.TWO)[len(hidden)], hidden=hidden)
-
-    def _sizes(self, random: np.random.Generator) -> tuple[float, ...]:
-        """True sizes: within the uncertainty of their certificate, or as estimated."""
-        sizes = self.model.artefact.sizes
-        own = self.values[len(self.values) - len(sizes) :]
-        draws = random.standard_normal(len(sizes))
-        drawn = [s.nominal + s.sd * z if s.certified else value for s, value, z in zip(sizes, own, draws, strict=True)]
-        return tuple(float(size) for size in drawn)
 
     def _hidden(
         self, sight: Sensitivity, count: int, seed: int, rank: int, random: np.random.Generator
@@ -243,16 +239,6 @@ class Design:
         )
         if not np.all(np.isfinite(drawn)):
             raise CmmUqError(f"case {case.number} has no finite coordinates", where="the recording drawn")
-        return self._as_read(drawn)
-
-    def _of_all_dates(self, noise: Noise) -> Noise:
-        times = float(np.sqrt(self.dates))
-        x, y, z = (times * float(each) for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
-        return replace(noise, coordinate=(x, y, z), placing=times * noise.placing, growth=times * noise.growth,
-                       slow=times * noise.slow)  # fmt: skip
-
-    def _as_read(self, drawn: Floats) -> Points:
-        """The points, with coordinates that nobody read as they stood."""
         artefact = self.model.artefact
         points, xyz = artefact.points, drawn.copy()
         rows = np.unique(artefact.rows[artefact.unread()])
@@ -261,6 +247,12 @@ class Design:
             still = np.ptp(points.xyz[own], axis=0) <= LAST_DIGIT
             xyz[np.ix_(own, np.flatnonzero(still))] = points.xyz[np.ix_(own, np.flatnonzero(still))]
         return points.at(xyz)
+
+    def _of_all_dates(self, noise: Noise) -> Noise:
+        times = float(np.sqrt(self.dates))
+        x, y, z = (times * float(each) for each in np.broadcast_to(np.asarray(noise.coordinate), 3))
+        return replace(noise, coordinate=(x, y, z), placing=times * noise.placing, growth=times * noise.growth,
+                       slow=times * noise.slow)  # fmt: skip
 
 
 def _drawn(between: list[tuple[float, float]], random: np.random.Generator) -> tuple[float, ...]:

@@ -19,7 +19,7 @@ from cmm_uq.machine.model import Noise, RecordingModel
 from cmm_uq.machine.model.noise import noise_of
 from cmm_uq.machine.physics.catalogue import every
 from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.maths.inference.noise import FASTEST, Components, Sizes
+from cmm_uq.maths.inference.noise import FASTEST, Sizes
 
 ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned with, as a plan does
 _RANK = 1e-9  # part of the largest singular value from which on a direction counts as taken by what the job names
@@ -44,7 +44,14 @@ class Sensitivity:
     @classmethod
     def of(cls, model: RecordingModel, values: Floats, noise: Noise) -> Sensitivity:
         components, linear = noise_of(model, values=values), model.linearised(values)
-        sizes = _sizes(components, model, noise)
+        reading = np.hypot(
+            np.broadcast_to(np.asarray(noise.coordinate, dtype=np.float64), 3), noise.resolution / np.sqrt(12)
+        )
+        time = model.artefact.points.columns.get("time_s")
+        slow = noise.slow if components.slow.shape[1] else 0.0
+        duration = 0.0 if time is None else float(np.ptp(time))
+        rate = min(FASTEST, max(duration / noise.slow_time_s, 1e-3)) if np.isfinite(noise.slow_time_s) else 0.0
+        sizes = Sizes(reading[None, :], *(np.array([size]) for size in (noise.placing, noise.growth, slow, rate)))
         white, sigma = components.white(sizes), float(sizes.coordinate[0])
         open_ = ~np.array([unknown.known for unknown in model.unknowns], dtype=bool)
         named = white(np.hstack([linear.design[:, open_], linear.freedoms.dense()]))
@@ -110,18 +117,6 @@ def some_shapes(effect: Effect) -> list[tuple[float, ...]]:
     """A few values of an effect's nonlinear parameter, over all its range; one empty tuple without one."""
     trials = list(effect.trials())
     return trials[:: max(1, len(trials) // _SHAPES)]
-
-
-def _sizes(components: Components, model: RecordingModel, noise: Noise) -> Sizes:
-    """The sizes of a drawn noise as those of the components that observations could show."""
-    reading = np.hypot(
-        np.broadcast_to(np.asarray(noise.coordinate, dtype=np.float64), 3), noise.resolution / np.sqrt(12)
-    )
-    time = model.artefact.points.columns.get("time_s")
-    slow = noise.slow if components.slow.shape[1] else 0.0
-    duration = 0.0 if time is None else float(np.ptp(time))
-    rate = min(FASTEST, max(duration / noise.slow_time_s, 1e-3)) if np.isfinite(noise.slow_time_s) else 0.0
-    return Sizes(reading[None, :], *(np.array([size]) for size in (noise.placing, noise.growth, slow, rate)))
 
 
 def white_of(noise: Noise) -> Noise:

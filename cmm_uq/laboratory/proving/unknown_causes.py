@@ -150,19 +150,18 @@ def artefact_fault(
         number, frames = nodes(xyz, points)
         moved = MICROMETRE * np.einsum("nij,nj->ni", frames, np.asarray(errors, dtype=np.float64)[number])
     else:
-        moved = _expansion(xyz, points, cte_per_k or _NO_RATE, growing=what == "warming")
+        _, index = np.unique(points.measurement, return_inverse=True)
+        index = index.ravel()
+        sums = np.zeros((int(index.max()) + 1, 3))
+        np.add.at(sums, index, xyz)
+        from_middle = xyz - np.asarray((sums / np.bincount(index)[:, None])[index])
+        warm = np.ones(len(xyz))
+        if what == "warming":
+            _, order = np.unique(points.measurement, return_inverse=True)
+            warm = order.ravel() / max(int(order.max()), 1)
+        moved = (cte_per_k or _NO_RATE) * warm[:, None] * from_middle
+        moved = np.asarray(MICROMETRE * moved / max(float(np.linalg.norm(moved, axis=1).max()), 1e-12))
     return UnknownArtefactFault(f"artefact: {what}", -moved[:, :, None])
-
-
-def _expansion(xyz: Floats, points: Points, rate: float, *, growing: bool) -> Floats:
-    """Displacement (n, 3) by an artefact that is warmer, throughout or more and more, 1 µm at its farthest point."""
-    from_middle = xyz - _means(xyz, points.measurement)
-    warm = np.ones(len(xyz))
-    if growing:
-        _, order = np.unique(points.measurement, return_inverse=True)
-        warm = order.ravel() / max(int(order.max()), 1)
-    moved = rate * warm[:, None] * from_middle
-    return np.asarray(MICROMETRE * moved / max(float(np.linalg.norm(moved, axis=1).max()), 1e-12))
 
 
 def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
@@ -214,11 +213,3 @@ def _turned(xyz: Floats, numbers: Ints, first: tuple[Ints, Floats] | None) -> tu
     U, _, Vt = np.linalg.svd((here - middle).T @ (there - other))
     turn = U @ np.diag([1.0, 1.0, float(np.sign(np.linalg.det(U @ Vt)))]) @ Vt  # Kabsch 1976
     return turn, (xyz - middle) @ turn + other
-
-
-def _means(xyz: Floats, measurement: Ints) -> Floats:
-    _, index = np.unique(measurement, return_inverse=True)
-    index = index.ravel()
-    sums = np.zeros((int(index.max()) + 1, 3))
-    np.add.at(sums, index, xyz)
-    return np.asarray((sums / np.bincount(index)[:, None])[index])

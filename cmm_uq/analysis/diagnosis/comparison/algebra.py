@@ -58,12 +58,8 @@ def log_sum_of_powers(base: Floats, degrees: int, axis: int | tuple[int, ...]) -
     if least.min() < _LEAST_BASE:
         np.maximum(base, _LEAST_BASE, out=base)
         np.maximum(least, _LEAST_BASE, out=least)
-    total = _raised(np.divide(least, base, out=base), degrees).sum(axis=axis)
-    return np.asarray(np.log(total) - 0.5 * degrees * np.log(least.squeeze(axis)), dtype=np.float64)
-
-
-def _raised(parts: Floats, degrees: int) -> Floats:
-    """Numbers from nought to one, which are overwritten, to the power of degrees/2, by multiplications."""
+    # Numbers from nought to one, which are overwritten, to the power of degrees/2, by multiplications
+    parts = np.divide(least, base, out=base)
     power, found = degrees // 2, np.sqrt(parts) if degrees % 2 else None
     while power:
         if power % 2:
@@ -71,7 +67,8 @@ def _raised(parts: Floats, degrees: int) -> Floats:
         power //= 2
         if power:
             parts *= parts
-    return np.ones_like(parts) if found is None else found
+    total = (np.ones_like(parts) if found is None else found).sum(axis=axis)
+    return np.asarray(np.log(total) - 0.5 * degrees * np.log(least.squeeze(axis)), dtype=np.float64)
 
 
 def eigen(blocks: Floats) -> tuple[Floats, Floats]:

@@ -234,28 +234,23 @@ class CandidateComparison:
         """Log evidence of each explanation beside what is given, at least of those wanted, and its best version."""
         known = self._best.setdefault(frozenset(conditions), {})
         if among is None or not known.keys() >= set(among):
-            found = self._beside_each(conditions, among)
+            total = np.full(len(self.explanations), -np.inf)
+            most, best = total.copy(), {}
+            for group, cube in self.each(None, conditions, among):
+                each = cube[:, :, 0]
+                gains = algebra.log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
+                chosen = group.explanation[group.first]
+                total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
+                largest = each.max(axis=1) + group.weight
+                better = np.maximum.reduceat(largest, group.first) > most[chosen]
+                order = np.lexsort((-largest, group.explanation))[group.first[better]]
+                for m, a in zip(order.tolist(), each[order].argmax(axis=1).tolist(), strict=True):
+                    i = int(group.explanation[m])
+                    most[i] = largest[m]
+                    best[i] = Version(i, int(group.member[m]), float(group.amplitudes[m, a]))
+            found = {i: (float(total[i]), version) for i, version in best.items()}
             known.update(found if among is None else {i: found[i] for i in found.keys() & set(among)})
         return known
-
-    def _beside_each(
-        self, conditions: Sequence[Version], among: Collection[int] | None
-    ) -> dict[int, tuple[float, Version]]:
-        total = np.full(len(self.explanations), -np.inf)
-        most, best = total.copy(), {}
-        for group, cube in self.each(None, conditions, among):
-            each = cube[:, :, 0]
-            gains = algebra.log_sum_in(each.copy(), 1) - np.log(AMPLITUDES) + group.weight
-            chosen = group.explanation[group.first]
-            total[chosen] = np.logaddexp(total[chosen], np.logaddexp.reduceat(gains, group.first))
-            largest = each.max(axis=1) + group.weight
-            better = np.maximum.reduceat(largest, group.first) > most[chosen]
-            order = np.lexsort((-largest, group.explanation))[group.first[better]]
-            for m, a in zip(order.tolist(), each[order].argmax(axis=1).tolist(), strict=True):
-                i = int(group.explanation[m])
-                most[i] = largest[m]
-                best[i] = Version(i, int(group.member[m]), float(group.amplitudes[m, a]))
-        return {i: (float(total[i]), version) for i, version in best.items()}
 
     def left_of(self, version: Version, conditions: Sequence[Version]) -> float:
         """Part of the squared visible length of a version that is left beside what is given."""
@@ -297,7 +292,18 @@ class CandidateComparison:
         for part, some, blocks in zip(parts, chosen, self._blocks, strict=True):
             if not len(some.start):
                 continue
-            seen = self._seen(known, some, kept=kept)
+            kinds = len(known.squares)
+            if kept:
+                columns = some.where
+                shape = kinds, columns.stop - columns.start, known.width
+                found = np.zeros(shape)
+                found[:, :, :1] = self._left_with_all[:, columns]
+                for basis, factor in known.made_of or ():
+                    found += self._given.products(basis)[:, columns] @ factor
+            else:
+                found = (some.columns(self._stack[0]).T @ known.seen_by).reshape(some.r * len(some.start), kinds, -1)
+                found = found.transpose(1, 0, 2)
+            seen = found.reshape(kinds, len(some.start), some.r, -1)
             if sizes and (each := self._of_wide(known, some, blocks, part, seen)) is not None:
                 yield some, each
                 continue
@@ -308,21 +314,6 @@ class CandidateComparison:
                     known, some.amplitudes[these], blocks[:, part][:, these], seen[:, these], sizes
                 )
             yield some, total
-
-    def _seen(self, known: ConditionedData, group: MemberGroup, *, kept: bool) -> Floats:
-        """Inner products (k, M, r, b + g) of members with data and what is given; ``kept``: of those that are kept."""
-        kinds = len(known.squares)
-        if kept:
-            columns = group.where
-            shape = kinds, columns.stop - columns.start, known.width
-            found = np.zeros(shape)
-            found[:, :, :1] = self._left_with_all[:, columns]
-            for basis, factor in known.made_of or ():
-                found += self._given.products(basis)[:, columns] @ factor
-        else:
-            found = (group.columns(self._stack[0]).T @ known.seen_by).reshape(group.r * len(group.start), kinds, -1)
-            found = found.transpose(1, 0, 2)
-        return found.reshape(kinds, len(group.start), group.r, -1)
 
     def _of_wide(
         self, known: ConditionedData, group: MemberGroup, blocks: Floats, part: slice, seen: Floats

@@ -38,30 +38,22 @@ def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tup
     likeliest, total = evidence.argmax(axis=0), np.logaddexp.reduce(evidence, axis=0)
     for g in np.unique(likeliest):
         columns, kind = np.flatnonzero(likeliest == g), normal.kinds[g]
-        residuals = _residuals(normal, int(g), data[:, columns])
+        noise, count = normal.precisions[int(g)], max(normal.degrees_of_freedom, 1)
+        white = noise.whitening @ data[:, columns]
+        fit, most = noise.explained(white), float(tail_precision(np.zeros(1))[0])
+        size = np.sqrt(np.sum((white - fit) ** 2, axis=0) / count)
+        for _ in range(_STEPS):
+            rest = white - fit
+            precision = tail_precision(rest / np.maximum(size, _TINY))
+            size = np.sqrt(np.sum(precision * rest**2, axis=0) / count)
+            fit = noise.explained(fit + precision / most * rest)
+        residuals = np.asarray((white - fit) / np.maximum(size, _TINY), dtype=np.float64)
         for j, residual in zip(columns.tolist(), residuals.T, strict=True):
             # as probable as tails on all kinds: those on the others stand to the others as these do to this one
             share = kind.probability * float(np.exp(total[j] - evidence[g, j]))
             own = normal.under([with_tails(kind, residual, often * share)], data[:, j])
             if own.log_evidence_of(())[0] > total[j] + np.log(_LEAST * (1 - often)):
                 yield j, own
-
-
-def _residuals(normal: CandidateComparison, g: int, data: Floats) -> Floats:
-    """Residuals (m, b) of Student's t over its standard deviation, under one kind of noise, its size as fits best.
-
-    Each step is least squares of pseudo-values, which never overshoots (Huber 1981, Robust Statistics, section 7.8).
-    """
-    noise, count = normal.precisions[g], max(normal.degrees_of_freedom, 1)
-    white = noise.whitening @ data
-    fit, most = noise.explained(white), float(tail_precision(np.zeros(1))[0])
-    size = np.sqrt(np.sum((white - fit) ** 2, axis=0) / count)
-    for _ in range(_STEPS):
-        rest = white - fit
-        precision = tail_precision(rest / np.maximum(size, _TINY))
-        size = np.sqrt(np.sum(precision * rest**2, axis=0) / count)
-        fit = noise.explained(fit + precision / most * rest)
-    return np.asarray((white - fit) / np.maximum(size, _TINY), dtype=np.float64)
 
 
 SHARES = {EFFECT: 0.3, SEVERAL: 0.06, UNKNOWN: 0.08}

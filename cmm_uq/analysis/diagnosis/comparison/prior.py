@@ -59,7 +59,9 @@ class CombinationPrior:
         shown = range(len(explanations)) if visible is None else visible
         self.machine = _everywhere(explanations, shown, of_artefact=False)
         self._artefact = _everywhere(explanations, shown, of_artefact=True)
-        if len(_everywhere(explanations, range(len(explanations)), of_artefact=False)) < _in_catalogue():
+        if len(_everywhere(explanations, range(len(explanations)), of_artefact=False)) < sum(
+            effect.everywhere and not effect.of_artefact for effect in every().values()
+        ):
             self.machine = self._artefact = frozenset()  # the job says what the machine is like
         together = self.machine | self._artefact
         effects = [i for i, e in enumerate(explanations) if e.kind == EFFECT]
@@ -100,11 +102,6 @@ class CombinationPrior:
         together += max(machine - 1, 0) * _NARROWER * alike
         either = np.logaddexp(np.log(1 - OUT_OF_ADJUSTMENT) + alone, np.log(OUT_OF_ADJUSTMENT) + together)
         return of_functions + float(either)
-
-
-def _in_catalogue() -> int:
-    """How many scales and squarenesses a machine has."""
-    return sum(effect.everywhere and not effect.of_artefact for effect in every().values())
 
 
 def _everywhere(explanations: Sequence[Explanation], shown: Iterable[int], *, of_artefact: bool) -> frozenset[int]:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from cmm_uq.analysis.diagnosis.comparison.combinations import Combinations, Key, explore
@@ -161,7 +160,10 @@ def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated:
     found = first.model if not chosen else with_effects(first, versions, chosen)
     last = comparison_of(found, stated, ())
     rough = frozenset(
-        i for i in chosen if _rough(first.comparison, versions, i) > ASSERTED or _less_than_function(combinations, i)
+        i
+        for i in chosen
+        if _rough(first.comparison, versions, i) > ASSERTED
+        or any(combinations.of(j) > combinations.of(i) for j in combinations.imitating(i))
     )
     beside = combinations.unknown_beside(chosen)
     return SearchResult(first, last, combinations, chosen, versions, found, beside, rough, stated)
@@ -255,31 +257,22 @@ def effects_to_assert(combinations: Combinations) -> Key:
     """The most probable set of known effects, without those that something else could well be instead."""
     chosen = combinations.most_probable
     if not chosen:
-        return _in_place_of_functions(combinations)
+        known = {key: p for key, p in combinations.of_effects.items() if key}
+        best = max(known, key=lambda key: known[key]) if known else frozenset()
+        found: Key = frozenset()
+        for i in sorted(best, key=lambda i: -combinations.of(i)):
+            alike = rivals_of(combinations, best, i) | {i}
+            beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
+            own = sum(p for key, p in known.items() if found <= key and alike & key)
+            if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
+                found |= {i}
+        return found
     doubtful = [
         i
         for i in chosen
         if combinations.of(i) < ASSERTED and probability_with_rivals(combinations, chosen, i) < ASSERTED
     ]
     return (chosen - frozenset(doubtful)) | _of_any_form(combinations, chosen)
-
-
-def _in_place_of_functions(combinations: Combinations) -> Key:
-    """Effects to which nothing is more probable than one or two nonparametric terms that could pass for all of them.
-
-    They are the most probable set of known effects. Each is asserted as one of a group, to which the terms belong, if it or an
-    effect that cannot be told from it is probable enough to be named at all, where those before it are taken as found.
-    """
-    known = {key: p for key, p in combinations.of_effects.items() if key}
-    best = max(known, key=lambda key: known[key]) if known else frozenset()
-    found: Key = frozenset()
-    for i in sorted(best, key=lambda i: -combinations.of(i)):
-        alike = rivals_of(combinations, best, i) | {i}
-        beside = sum(p for key, p in known.items() if found <= key) if found else 1.0
-        own = sum(p for key, p in known.items() if found <= key and alike & key)
-        if own >= _MECHANISM * beside and combinations.of_any(alike | combinations.imitating(i)) >= ASSERTED:
-            found |= {i}
-    return found
 
 
 def _imitated(comparison: CandidateComparison, combinations: Combinations) -> dict[int, Key]:
@@ -312,11 +305,6 @@ def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
         if any(combinations.of_any(frozenset((i, j))) >= ASSERTED for j in combinations.imitating(i)):
             found.add(i)
     return frozenset(found)
-
-
-def _less_than_function(combinations: Combinations, index: int) -> bool:
-    """Whether an effect is less probable than a nonparametric term that could be it: its form is not the effect's own."""
-    return any(combinations.of(j) > combinations.of(index) for j in combinations.imitating(index))
 
 
 def probability_with_rivals(combinations: Combinations, chosen: Key, index: int) -> float:
@@ -355,7 +343,7 @@ def comparison_of(
     linear = estimate.linear
     sigma_left = max(estimate.least_squares.sigma_of_residuals, 1e-6)
     sigma, log_sigma = sigma_grid(stated, sigma_left, model.least_noise)
-    held = _held(model)
+    held = np.array([unknown.known for unknown in model.unknowns], dtype=bool)
     rest = linear.observed - linear.design[:, held] @ linear.prior_mean[held]
     return CandidateComparison(
         rest / linear.noise_scale, np.hstack([linear.design[:, ~held], linear.freedoms.dense()]) / linear.noise_scale[:, None],
@@ -386,8 +374,3 @@ def _certified(model: RecordingModel, sigma: float) -> Floats:
     sds = np.array([size.sd for size in artefact.sizes])[certified]
     change = artefact.size_change()[model.used][:, certified] * sds
     return np.asarray(change / artefact.noise_scale[model.used, None] / sigma, dtype=np.float64)
-
-
-def _held(model: RecordingModel) -> NDArray[np.bool_]:
-    """Which parameters of the linear model are sizes with a certificate; all others may take any value."""
-    return np.array([unknown.known for unknown in model.unknowns], dtype=bool)
