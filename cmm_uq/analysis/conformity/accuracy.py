@@ -26,14 +26,12 @@ TITLES: Mapping[str, Text] = {
 UNITS: Mapping[str, Unit] = {name: PRINTED[name.rpartition("_")[2]] for name in TITLES}
 
 _DRAWS = 1000
-_NUMBERS = 3_000_000
-"""Random numbers to spend on repetitions."""
+_NUMBERS = 3_000_000  # Random numbers to spend on repetitions
 
 _LEAST, _LEAST_DRAWS, _MOST_NUMBERS = 10, 200, 10_000_000
 """Repetitions of each draw at least; where so many take more random numbers, fewer of the draws are repeated."""
 
-_AT_ONCE = 300_000
-"""Random numbers that are held at once: no more than a processor's cache holds."""
+_AT_ONCE = 300_000  # Random numbers that are held at once: no more than a processor's cache holds
 
 
 def figures(lengths: Floats) -> dict[str, Floats]:

@@ -23,25 +23,20 @@ from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.machine.model.artefact import Artefact, Forms, Indications
 from cmm_uq.machine.model.kind import Observed
 
-_NAMED = 5
-"""Findings, or gaps of a numbering, that are named one by one."""
+_NAMED = 5  # Findings, or gaps of a numbering, that are named one by one
 
 
 @dataclass(frozen=True, eq=False)
 class OutsideReadings:
-    """What of a recording the estimates do not hold.
-
-    ``recording``: all its rows, copies too; ``artefact``: made of all but copies, or with their places in other repeats
-    for points that no artefact can be made with, ``None`` where that cannot be either, or nothing was left out; ``xyz``:
-    (n, 3) the points of ``artefact`` as they were recorded, mm; ``kept``: (n,) rows of ``artefact.points`` that the
-    estimates hold; ``outside``: (n,) those that they do not, because they miss the artefact; ``findings``: that say why.
-    """
+    """What of a recording the estimates do not hold."""
 
     recording: Points
+    # made of all but copies, or with their places in other repeats for points that no artefact can be made with, None
+    # where that cannot be either, or nothing was left out
     artefact: Artefact | None
-    xyz: Floats
-    kept: NDArray[np.bool_]
-    outside: NDArray[np.bool_]
+    xyz: Floats  # (n, 3) the points of artefact as they were recorded, mm
+    kept: NDArray[np.bool_]  # (n,) rows of artefact.points that the estimates hold
+    outside: NDArray[np.bool_]  # (n,) those that they do not, because they miss the artefact
     findings: tuple[Finding, ...]
 
     @classmethod
@@ -84,10 +79,7 @@ class OutsideReadings:
 
 
 class AsRecorded(Artefact):
-    """An artefact with the readings that were left out of it: what rests on others is as these alone have it.
-
-    ``own``: the artefact without them; ``raw``: with them; ``left_out``: what it is without.
-    """
+    """An artefact with the readings that were left out of it: what rests on others is as these alone have it."""
 
     def __init__(self, own: Artefact, raw: Artefact, left_out: OutsideReadings) -> None:
         self.own, self._raw, self._kept, self._xyz = own, raw, left_out.kept, left_out.xyz

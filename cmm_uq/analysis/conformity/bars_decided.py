@@ -24,11 +24,8 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.budget import CERTIFICATE, JUDGEMENT, Budget, BudgetLine
 from cmm_uq.maths.uncertainty.quantity import nominal
 
-_OPPOSITE = -0.9
-"""Cosine of the angle between two tips from which on they look away from each other."""
-
-_RIGHT_ANGLE = 0.1
-"""Of a bar's direction, the part along a tip below which it is square to it."""
+_OPPOSITE = -0.9  # Cosine of the angle between two tips from which on they look away from each other
+_RIGHT_ANGLE = 0.1  # Of a bar's direction, the part along a tip below which it is square to it
 
 
 def volumetric_performance(test: Test) -> Statement:
@@ -46,7 +43,6 @@ def volumetric_performance(test: Test) -> Statement:
 
 
 def _budget(test: Test) -> tuple[Budget, Text]:
-    """Of the difference of two lengths of the bar, and what it says in words."""
     stated, size = test.circumstances.uncertainty, test.artefact.sizes[0]
     two = partial(BudgetLine, origin=JUDGEMENT, unit=unit("µm"), sensitivity=float(np.sqrt(2.0)))
     expansion = abs(test.circumstances.cte_per_k or 0.0) * size.nominal / MICROMETRE

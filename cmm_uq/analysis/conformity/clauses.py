@@ -20,19 +20,16 @@ CHOSEN = "this project"
 
 @dataclass(frozen=True)
 class Clause:
-    """One clause.
-
-    ``name``: in a form; ``title``: in words; ``does``: what this program does; ``source``: where that comes from;
-    ``read``: whether the words of the standard were read for it, in its text or as its publisher quotes them; ``of``:
-    characteristics that it is for; all of the standard's by default.
-    """
+    """One clause."""
 
     name: str
     title: Text
     does: str
-    source: str
-    read: bool = False
-    of: tuple[str, ...] = ()
+    source: str  # where that comes from
+    read: bool = (
+        False  # whether the words of the standard were read for it, in its text or as its publisher quotes them
+    )
+    of: tuple[str, ...] = ()  # characteristics that it is for; all of the standard's by default
 
 
 _LENGTHS = ("E0", "E150")
@@ -179,10 +176,7 @@ CLAUSES: Mapping[str, tuple[Clause, ...]] = MappingProxyType({
 
 
 def in_words(standard: str, asked: Sequence[Clause], form: ClausesForm | None) -> tuple[list[Text], tuple[Text, ...]]:
-    """What a certificate says of the clauses that a statement goes by, and what the test lacks by the laboratory's own copy.
-
-    ``asked``: its clauses that the statement goes by.
-    """
+    """What a certificate says of the clauses that a statement goes by, and what the test lacks by the laboratory's copy."""
     held = {} if form is None else {one.name: given for one in asked if (given := _held(one, form)) is not None}
     said: list[Text] = []
     who: dict[tuple[str, dt.date, str], list[Text]] = {}

@@ -25,27 +25,20 @@ from cmm_uq.maths.inference.linear_model import LinearModel
 from cmm_uq.maths.inference.noise import Components, Sizes
 from cmm_uq.maths.uncertainty.quantity import Quantity, averaged
 
-_FEW = 400
-"""Draws of each explanation that remains: enough for two digits of U."""
+_FEW = 400  # Draws of each explanation that remains: enough for two digits of U
 
 
 @dataclass(frozen=True, eq=False)
 class Consequences:
-    """Figures and statements of a recording, as it stands and corrected for what was left out.
-
-    ``figures``: by name, before and after; ``statements``: as the job asks for, before and after.
-    """
+    """Figures and statements of a recording, as it stands and corrected for what was left out."""
 
     figures: Mapping[str, tuple[Quantity, Quantity]]
-    statements: tuple[tuple[Statement, Statement], ...]
+    statements: tuple[tuple[Statement, Statement], ...]  # as the job asks for, before and after
 
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """What the recording comes to if one explanation that remains is the right one, and is corrected for.
-
-    ``probability``: of the explanation; ``figures``: by name; ``statements``: as the job asks for.
-    """
+    """What the recording comes to if one explanation that remains is the right one, and is corrected for."""
 
     probability: float
     figures: Mapping[str, Quantity]
@@ -54,25 +47,18 @@ class Cost:
 
 @dataclass(frozen=True, eq=False)
 class Costs:
-    """Of every explanation that remains, the most probable first, and of all together.
+    """Of every explanation that remains, the most probable first, and of all together."""
 
-    ``each``: in the order of the explanations; ``figures``: averaged, by name; ``decisions``: of each statement, the
-    probability of every outcome.
-    """
-
-    each: tuple[Cost, ...]
+    each: tuple[Cost, ...]  # in the order of the explanations
     figures: Mapping[str, Quantity]
-    decisions: tuple[Mapping[str, float], ...]
+    decisions: tuple[Mapping[str, float], ...]  # of each statement, the probability of every outcome
 
 
 def consequences(
     job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int,
     left_out: OutsideReadings | None = None,
 ) -> Consequences | None:  # fmt: skip
-    """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements.
-
-    The uncertainty of a corrected figure is that of repeated recordings with this correction.
-    """
+    """Of a diagnosis that asserts effects; ``None`` for others, and for artefacts without lengths and statements."""
     found = {item.effect for item in diagnosis.effects}
     if not found or not _depends(job, diagnosis):
         return None
@@ -89,10 +75,7 @@ def costs(
     job: Job, diagnosis: Diagnosis, observe: Observed, tested: Collection[str], seed: int,
     left_out: OutsideReadings | None = None
 ) -> Costs | None:  # fmt: skip
-    """Of the explanations that remain; ``None`` where none do, and for artefacts without lengths and statements.
-
-    What is unknown, or nothing, is not corrected for. Parameters as those of :func:`consequences`.
-    """
+    """Of the explanations that remain; ``None`` where none do. What is unknown, or nothing, is not corrected for."""
     rivals = diagnosis.remaining.rivals
     if not rivals or not _depends(job, diagnosis):
         return None
@@ -132,15 +115,11 @@ class _Drawn:
 
 @dataclass(frozen=True, eq=False)
 class _Correction:
-    """A recording, whole, and the same corrected for some effects of a model that was fitted to it.
-
-    ``model``: with all observations; ``ours``: (k,) which of its unknowns are corrected for; ``value``: (k,) by which
-    values; ``drawn``: from its posterior; ``corrected``: the artefact.
-    """
+    """A recording, whole, and the same corrected for some effects of a model that was fitted to it."""
 
     model: RecordingModel
-    ours: NDArray[np.bool_]
-    value: Floats
+    ours: NDArray[np.bool_]  # (k,) which of its unknowns are corrected for
+    value: Floats  # (k,) by which values
     drawn: _Drawn
     corrected: Artefact
 

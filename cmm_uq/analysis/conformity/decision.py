@@ -33,18 +33,14 @@ from cmm_uq.jobs.tables.conformity import (
 from cmm_uq.maths.inference.slow import root
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_REACH = 9.0
-"""Standard deviations beyond which a normal distribution is nothing: 1e-19."""
+_REACH = 9.0  # Standard deviations beyond which a normal distribution is nothing: 1e-19
 
 
 @dataclass(frozen=True)
 class PriorKnowledge:
-    """A quantity before it is measured.
+    """A quantity before it is measured."""
 
-    ``mean, sd``: of the normal distribution.
-    """
-
-    mean: float
+    mean: float  # mean, sd: of the normal distribution
     sd: float
 
     def after(self, value: float, u: float) -> PriorKnowledge:
@@ -70,22 +66,15 @@ class PriorKnowledge:
 
 @dataclass(frozen=True)
 class Risks:
-    """Of all items that are tested alike.
+    """Of all items that are tested alike."""
 
-    ``consumer``: that an item does not conform and is accepted; ``producer``: that an item conforms and is not
-    accepted.
-    """
-
-    consumer: float
-    producer: float
+    consumer: float  # that an item does not conform and is accepted
+    producer: float  # that an item conforms and is not accepted
 
 
 @lru_cache(maxsize=4096)
 def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledge, *, signed: bool) -> Risks:
-    """Global risks of accepting values up to an acceptance limit (JCGM 106:2012, 9.5.3 and 9.5.4).
-
-    ``acceptance``: largest accepted size of a measured value; negative where none is accepted.
-    """
+    """Of accepting values up to ``acceptance``, negative where none is accepted (JCGM 106:2012, 9.5.3 and 9.5.4)."""
     low = max(prior.mean - _REACH * prior.sd, -np.inf if signed else 0.0)
     high = max(prior.mean, 0.0) + _REACH * prior.sd
     total = 1.0 if signed else float(special.ndtr(prior.mean / prior.sd))
@@ -103,10 +92,7 @@ def global_risks(acceptance: float, limit: float, u: float, prior: PriorKnowledg
 
 @lru_cache(maxsize=4096)
 def acceptance_limit(risk: float, limit: float, u: float, prior: PriorKnowledge, *, signed: bool) -> float | None:
-    """The largest acceptance limit, not beyond the limit itself, that keeps the consumer's global risk at most ``risk``.
-
-    ``None`` where accepting any value at all would exceed it.
-    """
+    """Largest acceptance limit with a consumer's global risk at most ``risk``; ``None`` where any value would exceed it."""
 
     def excess(acceptance: float) -> float:
         return global_risks(acceptance, limit, u, prior, signed=signed).consumer - risk
@@ -119,7 +105,6 @@ def acceptance_limit(risk: float, limit: float, u: float, prior: PriorKnowledge,
 
 
 def _accepted(values: Floats, acceptance: float, u: float, *, signed: bool) -> Floats:
-    """Probability that a measurement of each of some true values is accepted."""
     upper = special.ndtr((acceptance - values) / u)
     if not signed:
         return np.asarray(upper)
@@ -133,32 +118,21 @@ def _panels(edges: Floats) -> tuple[Floats, Floats]:
 
 Outcome = Literal["pass", "conditional pass", "undecided", "conditional fail", "fail"]
 
-CONFORMANCE_PROBABILITY = 0.95
-"""Default of ISO 14253-1:2017, 5.2: conformity or nonconformity is proved with 95 %."""
-
-COVERAGE_FACTOR = 2.0
-"""k of the expanded uncertainty that a guard band is a multiple of (ILAC-G8:09/2019, 4.2.2)."""
-
-RATIO = 4.0
-"""Zone of the specification over the uncertainty interval, where ASME B89.7.3.1 is named without another."""
-
-UNCONDITIONAL = 0.02
-"""Largest share of wrongly accepted items (ANSI/NCSL Z540.3-2006, 5.3 b)."""
+CONFORMANCE_PROBABILITY = 0.95  # Default of ISO 14253-1:2017, 5.2: conformity or nonconformity is proved with 95 %
+COVERAGE_FACTOR = 2.0  # k of the expanded uncertainty that a guard band is a multiple of (ILAC-G8:09/2019, 4.2.2)
+RATIO = 4.0  # Zone of the specification over the uncertainty interval, where ASME B89.7.3.1 is named without another
+UNCONDITIONAL = 0.02  # Largest share of wrongly accepted items (ANSI/NCSL Z540.3-2006, 5.3 b)
 
 
 @dataclass(frozen=True)
 class Decision:
-    """What follows from a value and a limit under a rule.
+    """What follows from a value and a limit under a rule."""
 
-    ``outcome``: ``undecided`` when neither conformity nor nonconformity is proved; ``probability_conforming``: that the
-    quantity is within its limits; ``None`` without an uncertainty; ``probability_beyond``: the rest of it, kept apart
-    since 1 − P loses what is small; ``guard_band``: how far the acceptance limit lies inside the limit, same unit;
-    ``None`` when the uncertainty is too large for; any value to be accepted.; ``rule``: in words.
-    """
-
-    outcome: Outcome
-    probability_conforming: float | None
-    probability_beyond: float | None
+    outcome: Outcome  # undecided when neither conformity nor nonconformity is proved
+    probability_conforming: float | None  # that the quantity is within its limits; None without an uncertainty
+    probability_beyond: float | None  # the rest of it, kept apart since 1 − P loses what is small
+    # how far the acceptance limit lies inside the limit, same unit; None when the uncertainty is too large for; any
+    # value to be accepted
     guard_band: float | None
     rule: Text
 
@@ -232,11 +206,7 @@ def _decided(
 def _decided_knowing(
     value: float, u: float, limit: float, rule: Rule, signed: bool, prior: PriorKnowledge, unstated: float
 ) -> tuple[Outcome, float | None]:
-    """The same with a prior, of which rules that need none take no account.
-
-    A prior that leans to one side makes a small error of the other sign less likely to conform than a large one: the outcome
-    is that of the less favourable sign.
-    """
+    """The same with a prior, of which rules that need none take no account."""
     size = abs(value) if signed else value
     if (share := largest_share(rule)) is not None:
         accepted = acceptance_limit(share, limit, u, prior, signed=signed)
@@ -295,7 +265,6 @@ def rule_name(rule: Rule) -> str:
 
 
 def _within(size: float, u: float, limit: float, signed: bool, beyond: float) -> float:
-    """Probability of the quantity within its limits, without loss of digits where it is small."""
     nearer = float(special.ndtr((limit - size) / u))
     if not signed:
         return nearer
@@ -303,7 +272,6 @@ def _within(size: float, u: float, limit: float, signed: bool, beyond: float) ->
 
 
 def _beyond(size: float, u: float, limit: float, signed: bool) -> float:
-    """Probability of the quantity outside its limits: beyond the nearer one, and with a sign also beyond the other."""
     nearer = float(special.ndtr((size - limit) / u))
     return nearer + float(special.ndtr((-limit - size) / u)) if signed else nearer
 

@@ -23,8 +23,7 @@ from cmm_uq.base.points import AXES, Floats, Ints, Machine, Points
 from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.maths.uncertainty.quantity import nominal
 
-SAME_LENGTH_MM = 1.0
-"""Lengths no farther from each other than this are one nominal length."""
+SAME_LENGTH_MM = 1.0  # Lengths no farther from each other than this are one nominal length
 
 SPACING = 0.75
 """Of the distance between equally spaced lengths, how far each may lie from its place: gauges have the lengths that they have.
@@ -60,10 +59,7 @@ def lengths_measured(plan: LengthPlan, artefact: Artefact, copies: Mapping[int, 
 
 
 def with_offset(points: Points, rows: Ints, offset_mm: float | None) -> NDArray[np.bool_]:
-    """Lengths between two points each, (m,), measured with the stylus tip so far across the ram at both ends.
-
-    Without recorded tips they count as measured with none; ``None`` asks for no particular offset.
-    """
+    """Lengths (m,) with the tip so far across the ram at both ends; none recorded is none, ``None`` asks for no offset."""
     tips = tip_offsets(points)
     if offset_mm is None:
         return np.ones(len(rows), dtype=bool)
@@ -93,7 +89,6 @@ def _offset(plan: LengthPlan, artefact: Artefact) -> tuple[Condition, ...]:
 
 
 def _both_sides(plan: LengthPlan, artefact: Artefact, places: _Places) -> tuple[Condition, ...]:
-    """Whether the lengths are bidirectional, where that is asked and known."""
     if not plan.bidirectional or not places:
         return ()
     known = [one for found in places.values() for one in found if one.bidirectional is not None]
@@ -193,7 +188,6 @@ def _spread(plan: LengthPlan, places: _Places) -> Condition:
 
 
 def _any_spread(plan: LengthPlan, found: Sequence[_Measured]) -> bool:
-    """Whether any choice of so many lengths is: more of them never hinder."""
     lengths = np.sort([one.length for one in found])
     starts = lengths[lengths <= plan.shortest_mm]
     ends = np.array([one.length for one in found if one.share is not None and one.share >= plan.least_share])

@@ -108,10 +108,7 @@ def errors_of_indication(test: Test, *, chosen: Chosen | None = None, again: Rem
 
 
 def repeatability_range(test: Test, *, repeats: int, chosen: Chosen | None = None) -> Statement:
-    """Range of the first repeats of each length in each place, against the limit of repeatability.
-
-    What the artefact's certificate leaves uncertain is common to the repeats and cancels: u is what of it changes between.
-    """
+    """Range of the first repeats of each length in each place, against the limit of repeatability."""
     found = test.indications()
     rows = _of_this_test(test, found, chosen)
     least = u_of_repeats(float(found.lengths[rows].min()), test.circumstances)
@@ -179,7 +176,6 @@ def unknown_expansion(artefact: Artefact, cte_per_k: float | None) -> Text:
 
 
 def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> Ints:
-    """Rows of the lengths that are decided: of this test, and no copies."""
     copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
     own = ~copied & (True if chosen is None else chosen(test.artefact, found))
     test.refuse_nothing_measured(bool(own.any()), "lengths of its own positions, tips and sizes")
@@ -187,7 +183,6 @@ def _of_this_test(test: Test, found: Indications, chosen: Chosen | None) -> Ints
 
 
 def _others_in_words(test: Test, found: Indications, rows: Ints) -> list[Text]:
-    """How many lengths of the recording are not decided for they belong to another test."""
     copied = np.isin(test.recorded.points.group[found.rows[:, 0]], list(test.recorded.points.copies))
     count = int((~copied).sum()) - len(rows)
     one = say("{count} length recorded beside them has another position, stylus tip or size, and is not decided.",

@@ -29,11 +29,8 @@ from cmm_uq.base.messages import Text
 from cmm_uq.base.points import Floats
 from cmm_uq.jobs.tables.conformity import Rule
 
-RARE = 50
-"""Draws beyond a limit, from which on their share is taken for the probability."""
-
-FEWEST = 500
-"""Effective draws of a weighted sample; with fewer the posterior is that of normal distributions."""
+RARE = 50  # Draws beyond a limit, from which on their share is taken for the probability
+FEWEST = 500  # Effective draws of a weighted sample; with fewer the posterior is that of normal distributions
 
 SCARCE = 0.05
 """Share of draws, below which those that are possible say nothing of a zone: it is then taken to be as large as its error."""
@@ -46,38 +43,31 @@ _REACH = 8.0
 
 @dataclass(frozen=True)
 class LimitDecision:
-    """What follows from a value between limits.
-
-    ``outcome``: ``None`` where nothing was measured; ``probability, beyond``: that the true value conforms, and the rest of
-    it, which keeps its digits; ``accepted``: smallest and largest value that the rule accepts, ``None`` of a side without a
-    limit, and as a whole where it accepts none, or where a zone was measured so much better than its errors that even this
-    value proves nothing.
-    """
+    """What follows from a value between limits."""
 
     lower: float | None
     upper: float | None
-    outcome: Outcome | None
+    outcome: Outcome | None  # None where nothing was measured
+    # probability, beyond: that the true value conforms, and the rest of it, which keeps its digits
     probability: float | None
     beyond: float | None
+    # smallest and largest value that the rule accepts, None of a side without a limit, and as a whole where it accepts
+    # none, or where a zone was measured so much better than its errors that even this value proves nothing
     accepted: tuple[float | None, float | None] | None
     rule: Text
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Limits of a drawing, and what is known of errors of measurement.
+    """Limits of a drawing, and what is known of errors of measurement."""
 
-    ``lower, upper``: limits, one at least; ``errors``: (N,) draws of the error of a value, less their mean, ascending;
-    ``zone``: whether the value is a width that is never negative: probabilities are those given that it is not, or,
-    where; fewer than one draw in twenty leaves it so, those of a width as large as the error.; ``prior``: what is known
-    of the true value beforehand; of a zone the part above zero.
-    """
-
-    lower: float | None
+    lower: float | None  # lower, upper: limits, one at least
     upper: float | None
-    errors: Floats
+    errors: Floats  # (N,) draws of the error of a value, less their mean, ascending
+    # whether the value is a width that is never negative: probabilities are those given that it is not, or, where;
+    # fewer than one draw in twenty leaves it so, those of a width as large as the error
     zone: bool = False
-    prior: PriorKnowledge | None = None
+    prior: PriorKnowledge | None = None  # what is known of the true value beforehand; of a zone the part above zero
     u: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -184,11 +174,7 @@ class Limits:
 
 
 def judge(limits: Limits, rule: Rule, value: float | None) -> LimitDecision:
-    """Decide whether a value conforms.
-
-    ``value``: as it is stated, less the mean error; ``None`` where nothing was measured: then what would be accepted is
-    all.
-    """
+    """Decide whether a value, less the mean error, conforms; ``None`` where nothing was measured."""
     accepted = accepted_by(limits, rule)
     if value is None:
         return LimitDecision(limits.lower, limits.upper, None, None, None, accepted, rule_words(rule))
@@ -225,11 +211,7 @@ def _accepted_near_zero(
 
 
 def _safe(limits: Limits, rule: Rule, value: float) -> bool:
-    """Whether a value below the acceptance limit conforms as probably as the rule asks.
-
-    A zone that is measured better than its errors leaves few true values that are possible, and these may be larger than
-    those of a wider one. A guard band stands for the probability that it leaves of a normal distribution.
-    """
+    """Whether a value below the acceptance limit conforms as probably as the rule asks."""
     if not limits.zone:
         return True
     if (least := least_probability(rule)) is not None:
@@ -296,7 +278,6 @@ def _smallest_guard(limits: Limits, share: float) -> float | None:
 
 
 def _where(limits: Limits, holds: Callable[[float], bool]) -> tuple[float | None, float | None] | None:
-    """The interval of values inside the limits for which something holds, as it does in its middle if anywhere."""
     span = _REACH * max(limits.u, float(np.ptp(limits.errors)))
     low = limits.lower if limits.lower is not None else (limits.upper or 0.0) - span
     high = limits.upper if limits.upper is not None else (limits.lower or 0.0) + span
@@ -315,7 +296,6 @@ def _where(limits: Limits, holds: Callable[[float], bool]) -> tuple[float | None
 
 
 def _edge(holds: Callable[[float], bool], good: float, bad: float) -> float:
-    """Where it ceases to hold between two values, on the side where it does."""
     for _ in range(_HALVINGS):
         middle = 0.5 * (good + bad)
         if middle in (good, bad):

@@ -17,8 +17,7 @@ from cmm_uq.base.messages import Text, at_key, commas, number, plural, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.machine.model.artefact import Artefact
 
-_SEARCHED = 60
-"""Bars that hang together, each near another of them."""
+_SEARCHED = 60  # Bars that hang together, each near another of them
 
 
 def bar_positions(plan: BarPlan, artefact: Artefact, copies: Mapping[int, int]) -> tuple[Condition, ...]:
@@ -129,17 +128,13 @@ def _apart(one: Floats, two: Floats) -> float:
     return float(min(np.linalg.norm(one - turned, axis=1).max() for turned in (two, two[::-1])))
 
 
-_DIRECTIONS = 400
-"""On a hemisphere, at which the reach of its points is looked at."""
+_DIRECTIONS = 400  # On a hemisphere, at which the reach of its points is looked at
 
 
 def sphere_points(
     plan: SpherePlan, points: Points, directions: Floats, copies: Mapping[int, int]
 ) -> tuple[Condition, ...]:
-    """How many points on each sphere, and whether they cover it.
-
-    ``directions``: outward direction (n, 3) of each point from the middle of its sphere.
-    """
+    """How many points on each sphere, and whether they cover it; ``directions`` (n, 3) outward from its middle."""
     wanted, reach, lacking, bare = plan.points, plan.reach_deg, [], []
     for group, rows in enumerate(points.rows_of_groups):
         if group in copies:

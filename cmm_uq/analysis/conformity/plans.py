@@ -24,9 +24,7 @@ CORNER_TO_CORNER = 0.75
 """Part of every axis' travel that a line, produced to the ends of travel, crosses on a space diagonal; this project's figure,
 which leaves room for the fixture."""
 
-_ROUNDING = 1e-6
-"""mm; a line as near as this to the end of an axis' travel lies in it."""
-
+_ROUNDING = 1e-6  # mm; a line as near as this to the end of an axis' travel lies in it
 PARALLELS = tuple(say("parallel to {axis}", axis=Verbatim(a.upper())) for a in AXES)
 SPACE_DIAGONALS = tuple(say("space diagonal {axes}", axes=Verbatim(f"{x}X {y}Y +Z")) for x in "+−" for y in "+−")
 FACE_DIAGONALS = tuple(
@@ -46,11 +44,7 @@ def position_of(direction: Floats) -> Text:
 
 
 def position_on(machine: Machine, middle: Floats, direction: Floats) -> Text:
-    """Position of a line through ``middle`` (3,), mm in the recorded frame, where the travel is known: by what it crosses.
-
-    A space diagonal goes from corner to corner: by its direction alone a line across a corner, or one that hardly leaves the
-    floor, would pass for one, and that of a long machine would not. Without travel the direction decides.
-    """
+    """Position of a line through ``middle`` (3,), mm in the recorded frame, where the travel is known: by what it crosses."""
     travel, place = machine.travel_mm, middle + machine.origin_mm
     return _position_on(tuple(travel.ravel().tolist()), tuple(place.tolist()), tuple(direction.tolist()))
 
@@ -104,21 +98,15 @@ def _signed(u: Floats, counts: NDArray[np.bool_]) -> Text:
 
 @dataclass(frozen=True)
 class LengthPlan:
-    """Calibrated lengths along lines through the volume.
-
-    ``positions``: of the lines, by name; ``lengths``: different ones in each position; ``repeats``: of each length in
-    each position; ``least_share``: the longest length in a position over the travel along it; ``shortest_mm``: largest
-    that the shortest length may be; ``bidirectional``: whether each length's ends are to be reached from opposite
-    sides; ``offset_mm``: of the stylus tip across the ram; lengths measured with another do not count.
-    """
+    """Calibrated lengths along lines through the volume."""
 
     positions: tuple[Text, ...]
-    lengths: int
-    repeats: int
-    least_share: float
-    shortest_mm: float
-    bidirectional: bool = False
-    offset_mm: float | None = None
+    lengths: int  # different ones in each position
+    repeats: int  # of each length in each position
+    least_share: float  # the longest length in a position over the travel along it
+    shortest_mm: float  # largest that the shortest length may be
+    bidirectional: bool = False  # whether each length's ends are to be reached from opposite sides
+    offset_mm: float | None = None  # of the stylus tip across the ram; lengths measured with another do not count
 
     @property
     def total(self) -> int:
@@ -127,19 +115,13 @@ class LengthPlan:
 
 @dataclass(frozen=True)
 class BarPlan:
-    """A ballbar in many positions.
+    """A ballbar in many positions."""
 
-    ``positions``: how many in a nearly cubic volume; ``directions``: each of which some position has; ``further``:
-    positions more for each further cube of a longer volume; ``nearly_cubic``: longest over shortest axis up to which a
-    volume is taken as nearly cubic; ``apart_mm``: bars of which both ends are nearer than this to those of another are
-    in the same place.
-    """
-
-    positions: int
-    directions: tuple[Text, ...]
-    further: int
-    nearly_cubic: float
-    apart_mm: float
+    positions: int  # how many in a nearly cubic volume
+    directions: tuple[Text, ...]  # each of which some position has
+    further: int  # positions more for each further cube of a longer volume
+    nearly_cubic: float  # longest over shortest axis up to which a volume is taken as nearly cubic
+    apart_mm: float  # bars of which both ends are nearer than this to those of another are in the same place
 
     def positions_in(self, size_mm: Floats) -> int:
         """How many positions a volume of this size (3,) has."""
@@ -153,45 +135,32 @@ class BarPlan:
 
 @dataclass(frozen=True)
 class SpherePlan:
-    """Points on a test sphere.
+    """Points on a test sphere."""
 
-    ``points``: different ones on each sphere, or more; ``reach_deg``: no direction of the hemisphere is farther than
-    this from the nearest point; ``diameter_mm``: least and largest of the sphere.
-    """
-
-    points: int
-    reach_deg: float
-    diameter_mm: tuple[float, float] = (0.0, np.inf)
+    points: int  # different ones on each sphere, or more
+    reach_deg: float  # no direction of the hemisphere is farther than this from the nearest point
+    diameter_mm: tuple[float, float] = (0.0, np.inf)  # least and largest of the sphere
 
 
 @dataclass(frozen=True)
 class RepeatPlan:
-    """A sphere probed again and again in one place.
-
-    ``repeats``: of the same measurement.
-    """
+    """A sphere probed again and again in one place."""
 
     repeats: int
 
 
 @dataclass(frozen=True)
 class OffsetPlan:
-    """A ballbar measured with the stylus tip to either side of the ram.
-
-    ``positions``: of the bar, by name.
-    """
+    """A ballbar measured with the stylus tip to either side of the ram."""
 
     positions: tuple[Text, ...]
 
 
 @dataclass(frozen=True)
 class ShortLengthPlan:
-    """A short gauge in several orientations.
+    """A short gauge in several orientations."""
 
-    ``orientations``: that differ by more than ``apart_deg``; ``repeats``: in each; ``longest_mm``: that is still short.
-    """
-
-    orientations: int
+    orientations: int  # that differ by more than apart_deg
     apart_deg: float
     repeats: int
     longest_mm: float
@@ -220,8 +189,7 @@ class Condition:
         return not self.missing
 
 
-OFFSET_TOLERANCE_MM = 10.0
-"""Within which a stylus tip has an offset; this project's figure."""
+OFFSET_TOLERANCE_MM = 10.0  # Within which a stylus tip has an offset; this project's figure
 
 ISO_10360_2 = LengthPlan((*SPACE_DIAGONALS, *PARALLELS), 5, 3, 0.66, 30.0, bidirectional=True, offset_mm=0.0)
 """E0 and R0. Seven positions, five lengths, three repeats: Harris 2004, 2.6.3, of the edition of 2000, who has 66 % and 30 mm
@@ -246,8 +214,7 @@ how long and how short: those of ISO 10360-2, this project's choice."""
 B89_LINEAR = LengthPlan(PARALLELS, 10, 3, 0.66, np.inf)
 """A step gauge or laser along each axis: Harris 2004, 2.6.1. Ten lengths, three repeats, 66 %: this project's choice."""
 
-B89_REPEATABILITY = RepeatPlan(10)
-"""Positions of a fixed ball: Harris 2004, 2.6.1. Ten: this project's choice."""
+B89_REPEATABILITY = RepeatPlan(10)  # Positions of a fixed ball: Harris 2004, 2.6.1. Ten: this project's choice
 
 B89_OFFSET = OffsetPlan(tuple(
     say("face diagonal {axes}", axes=Verbatim(f"{s}{plane[0]} +{plane[1]}")) for plane in ("YZ", "XZ") for s in "+−"
@@ -266,8 +233,7 @@ ISO_10360_5 = SpherePlan(25, 45.0, (10.0, 50.0))
 """Twenty-five points (Renishaw's summary of ISO 10360), spread over a hemisphere; the reach is this project's figure. A sphere
 of 10 to 50 mm: Harris 2004, 2.6.3, of ISO 10360-2:2000; not less than 10 mm by clause 6.2.1 of the edition of 2020 too."""
 
-ISO_10360_8 = SpherePlan(25, 45.0)
-"""The 25 are in the names of the characteristics; the reach is this project's figure."""
+ISO_10360_8 = SpherePlan(25, 45.0)  # The 25 are in the names of the characteristics; the reach is this project's figure
 
 READY: Mapping[str, Plan] = MappingProxyType(
     {"ASME B89.4.1": B89, "ISO 10360-2": ISO_10360_2, "ISO 10360-5": ISO_10360_5}

@@ -11,8 +11,7 @@ from cmm_uq.jobs.tables.circumstances import Circumstances, RatedConditions
 
 SECONDS_PER_HOUR = 3600.0
 
-_ROUNDING = 1e-9
-"""K."""
+_ROUNDING = 1e-9  # K
 
 
 def rated_conditions(circumstances: Circumstances, points: Points) -> tuple[Condition, ...]:
@@ -88,8 +87,7 @@ def _difference(points: Points, most: float) -> Condition:
     return Condition(what, () if largest <= most + _ROUNDING else (told,))
 
 
-_NAMED = 5
-"""Copies that are named one by one."""
+_NAMED = 5  # Copies that are named one by one
 
 
 def copies_in_words(points: Points) -> Text:

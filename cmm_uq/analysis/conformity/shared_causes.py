@@ -20,25 +20,18 @@ from cmm_uq.jobs.tables.circumstances import Circumstances
 from cmm_uq.machine.model.artefact import Artefact, Indications
 from cmm_uq.maths.uncertainty.budget import Budget
 
-_SETTINGS = 4096
-"""Of the shared causes, over which is averaged: the joint probability of 105 lengths is good to 0.001."""
-
-_AT_ONCE = 2_000_000
-"""Numbers that are held at once."""
+_SETTINGS = 4096  # Of the shared causes, over which is averaged: the joint probability of 105 lengths is good to 0.001
+_AT_ONCE = 2_000_000  # Numbers that are held at once
 
 
 @dataclass(frozen=True, eq=False)
 class Causes:
-    """What makes m test values uncertain.
+    """What makes m test values uncertain."""
 
-    ``shared``: (m, s) by how much one standard uncertainty of each cause that all values share changes each value, µm,
-    with sign; ``own``: (m,) standard uncertainty that values of one set-up share, µm; ``set_up``: (m,) number of the
-    set-up.
-    """
-
+    # (m, s) by how much one standard uncertainty of each cause that all values share changes each value, µm, with sign
     shared: Floats
-    own: Floats
-    set_up: Ints
+    own: Floats  # (m,) standard uncertainty that values of one set-up share, µm
+    set_up: Ints  # (m,) number of the set-up
 
     @property
     def u(self) -> Floats:
@@ -64,10 +57,7 @@ def temperatures(found: Indications, artefact: Artefact) -> Floats | None:
 def length_budget(
     length_mm: float, u_mm: float, temperature_c: float, circumstances: Circumstances, u_beside_mm: float = 0.0
 ) -> Budget:
-    """Test uncertainty of one length (ISO/TS 23165:2006).
-
-    ``u_mm``: of all calibration, that of a short gauge beside it (``u_beside_mm``) included.
-    """
+    """Test uncertainty of one length (ISO/TS 23165:2006); ``u_mm`` includes ``u_beside_mm`` of a short gauge beside it."""
     from cmm_uq.maths.uncertainty.budgets.machine import length_test_uncertainty
 
     stated = circumstances.uncertainty
@@ -104,7 +94,6 @@ def causes_of_lengths(found: Indications, artefact: Artefact, circumstances: Cir
 
 
 def _own(u: Floats, beside: Floats | float) -> Floats:
-    """What of a calibration is left without that of a gauge beside it."""
     return np.asarray(np.where(np.asarray(beside) > 0, np.sqrt(np.maximum(u**2 - np.asarray(beside) ** 2, 0.0)), u))
 
 
@@ -129,7 +118,6 @@ def probability_of_all(values: Sequence[float] | Floats, limits: Sequence[float]
 
 
 def _averaged(value: Floats, limit: Floats, shared: Floats, slope: Floats, group: Ints, signed: bool) -> float:
-    """Mean over settings of the shared causes of the product over groups, each integrated over its own cause."""
     order = np.argsort(group, kind="stable")
     starts = np.flatnonzero(np.diff(group[order], prepend=group[order][0] - 1))
     settings = _normal(_SETTINGS if shared.shape[1] else 1, shared.shape[1])

@@ -24,10 +24,7 @@ NEAR_MM = 100.0
 
 
 class Supplemented(Artefact):
-    """An artefact of which the errors of lengths that are not bidirectional have those of a short gauge added.
-
-    ``own``: the artefact; ``gauge``: measured beside it.
-    """
+    """An artefact whose errors of lengths that are not bidirectional have those of a short gauge beside it added."""
 
     def __init__(self, own: Artefact, gauge: ShortGauge) -> None:
         self.own, self.gauge = own, gauge

@@ -155,7 +155,6 @@ def _items(test: Test, probed: Forms, values: np.ndarray, u: float, *, signed: b
 
 
 def _shared(u_um: float, count: int) -> Causes:
-    """One cause that all values share."""
     return Causes(np.full((count, 1), u_um), np.zeros(count), np.arange(count))
 
 

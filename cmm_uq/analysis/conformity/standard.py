@@ -246,10 +246,7 @@ class Test:
         )
 
     def least_u(self, lengths_mm: Floats) -> Floats:
-        """Standard uncertainty, µm, that each of some lengths (m,) is said to have at least: half the laboratory's capability.
-
-        The capability has k = 2 (ILAC-P14:09/2020); 0 where none is given.
-        """
+        """(m,) µm: half the laboratory's capability, k = 2 (ILAC-P14:09/2020), at lengths (m,); 0 where none is given."""
         cmc = self.circumstances.cmc
         return np.array([0.5 * cmc.least(unit("µm"), float(each)) if cmc else 0.0 for each in lengths_mm])
 
@@ -341,7 +338,6 @@ class Test:
         )  # fmt: skip
 
     def _gaps_of_short_gauge(self) -> tuple[Condition, ...]:
-        """What is missing from the numbering of a short gauge that lengths of this test rest on."""
         gauge, found = self.circumstances.short_gauge, self.artefact.indications()
         if gauge is None or found is None or found.u_beside is None or not found.u_beside.any():
             return ()
@@ -349,7 +345,6 @@ class Test:
         return tuple(Condition(text, (say("short gauge, {gap}", gap=text),)) for text in gaps)
 
     def _raised(self, items: Sequence[Decided]) -> bool:
-        """Whether any was decided with the capability's uncertainty in place of a smaller one."""
         if self.circumstances.cmc is None:
             return False
         nominal = self.artefact.sizes[0].nominal
@@ -357,7 +352,6 @@ class Test:
         return any(0 < item.u_um <= floor * (1 + 1e-9) for item, floor in zip(items, least, strict=True))
 
     def _risks(self, worst: Decided, signed: bool) -> Risks | None:
-        """Of all machines alike, where such a length is decided by this rule."""
         prior = self.prior(worst.limit_um)
         if prior is None or worst.u_um <= 0:
             return None

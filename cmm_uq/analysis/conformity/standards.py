@@ -96,8 +96,7 @@ def orientations(plan: ShortLengthPlan, artefact: Artefact, *, recorded: bool) -
     return (Condition(what, told), Condition(repeats, lacks), sides)
 
 
-AGAIN = Remeasurement(repeats=3, outside=1, lengths=5, readings=10)
-"""Of ISO 10360-2:2009; see docs/standards.md."""
+AGAIN = Remeasurement(repeats=3, outside=1, lengths=5, readings=10)  # Of ISO 10360-2:2009; see docs/standards.md
 
 
 def _short_gauge_repeated(test: Test) -> tuple[Condition, ...]:
@@ -187,11 +186,7 @@ def statement(
     recorded: Artefact | None = None, circumstances: Circumstances | None = None,
     left_out: OutsideReadings | None = None,
 ) -> Statement:  # fmt: skip
-    """Compare what the standard asks for with its limit, and decide.
-
-    ``recorded``: the artefact as it was recorded, where ``artefact`` has been corrected: that makes no copy a
-    measurement.
-    """
+    """Compare what the standard asks for with its limit, and decide; ``recorded`` is the artefact before a correction."""
     under = circumstances or Circumstances()
     standard, characteristic = decidable(facts, artefact.kind, key, tested, under)
     whole, beside = recorded or artefact, characteristic.beside

@@ -192,8 +192,7 @@ def by_tolerance(name: str, title: Text, quantity: Quantity, tolerance: float, *
     return Verdict(name, outcome, quantity.value, quantity.expanded, tolerance, quantity.unit, title=title)
 
 
-OUTSIDE = ("fail", "conditional fail")
-"""Outcomes of a value that lies outside."""
+OUTSIDE = ("fail", "conditional fail")  # Outcomes of a value that lies outside
 
 NOT_INSIDE = (*OUTSIDE, "undecided", "conditional pass")
 """Outcomes of one that lies outside the zone of conformance: further readings stand for it, too, where they were made, or a
@@ -202,24 +201,16 @@ larger error would pass where a smaller one does not."""
 
 @dataclass(frozen=True)
 class Remeasurement:
-    """What a standard lets be measured again.
+    """What a standard lets be measured again."""
 
-    ``repeats``: of each length in the test itself; ``outside``: of these may lie outside; ``lengths``: may have as many
-    outside; ``readings``: more of each, all of which must lie inside.
-    """
-
-    repeats: int
+    repeats: int  # of each length in the test itself
     outside: int
     lengths: int
-    readings: int
+    readings: int  # more of each, all of which must lie inside
 
 
 def with_standing(items: Sequence[Decided], nominal: Ints, again: Remeasurement) -> tuple[Decided, ...]:
-    """The same, each with what it counts for.
-
-    ``items``: decided lengths; a length met twice in a repeat is outside there where either is; ``nominal``: (m,) which
-    nominal length each is of.
-    """
+    """The same, each with what it counts for; ``nominal`` (m,) says which nominal length each is of."""
     sets: dict[tuple[int | None, int], list[int]] = {}
     for i, item in enumerate(items):
         sets.setdefault((item.measurement, int(nominal[i])), []).append(i)

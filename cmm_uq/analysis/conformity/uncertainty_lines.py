@@ -22,9 +22,7 @@ from cmm_uq.maths.uncertainty.budget import Budget
 LENGTH_LINES = ("calibration", "expansion", "temperature", "alignment", "fixturing")
 """Of a calibrated length, in the order of its budget."""
 
-WARM = 0.5
-"""K from 20 °C from which on an unknown expansion matters."""
-
+WARM = 0.5  # K from 20 °C from which on an unknown expansion matters
 SIZE_LINES = LENGTH_LINES[:3]
 FORM_LINES = ("form",)
 REPEAT_LINES = ("repeat",)
@@ -32,8 +30,7 @@ REPEAT_LINES = ("repeat",)
 UNSTATED_K, UNSTATED_EXPANSION, UNSTATED_UM = 0.3, 1e-6, 1.0
 """What a line that is not stated may well be: of the temperature, of the coefficient (1/K), of all others."""
 
-STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6
-"""1/K; of what gauges are made of, aluminium expands most."""
+STEEL, LARGEST_EXPANSION = 11.5e-6, 25e-6  # 1/K; of what gauges are made of, aluminium expands most
 
 _NAMES = {
     "calibration": say("calibration of the artefact"),
@@ -81,10 +78,7 @@ def _met(line: str, artefact: Artefact, under: Circumstances) -> bool:
 
 
 def u_of_repeats(length_mm: float, under: Circumstances) -> float:
-    """Standard uncertainty, µm, of a difference of two readings of one length, by what of it changes between them.
-
-    As ``u_repeat_um`` says, or from temperature and fixturing of each reading; where both are stated whole, the lesser.
-    """
+    """Of a difference of two readings of one length, µm: ``u_repeat_um`` or temperature and fixturing, the lesser if both."""
     by_lines, direct = _two_readings(length_mm, under), under.uncertainty.u_repeat_um
     if not direct:
         return 0.0 if under.uncertainty.declared("repeat") else by_lines
@@ -98,7 +92,6 @@ def _two_readings(length_mm: float, under: Circumstances) -> float:
 
 
 def _both_lines(under: Circumstances) -> bool:
-    """Whether temperature and fixturing say all that changes between readings."""
     stated = under.uncertainty
     known = bool(under.cte_per_k or stated.declared("expansion"))
     warm = bool(stated.declared("temperature")) or (known and stated.u_temperature_k > 0)
@@ -114,14 +107,12 @@ def _stated(line: str, artefact: Artefact, under: Circumstances) -> bool:
 
 
 def _calibrated(line: str, artefact: Artefact, under: Circumstances) -> bool:
-    """Whether each calibrated length, or the size where there are none, has an uncertainty above zero."""
     found = artefact.indications()
     u = np.array([artefact.sizes[0].sd]) if found is None else found.u
     return under.uncertainty.declared(line) is not None or bool(np.all(u > 0))
 
 
 def _thermal(artefact: Artefact, under: Circumstances) -> Iterator[Condition]:
-    """Expansion coefficient and temperature, without which errors are neither corrected nor uncertain as they are."""
     stated = under.uncertainty
     if not under.cte_per_k and not stated.declared("expansion"):
         yield _lacks(
@@ -186,15 +177,11 @@ def declared_in_words(lines: Collection[str], stated: TestUncertainty) -> list[T
 
 
 def _answer(declared: Declared) -> tuple[Text, Text]:
-    """Name and reason, without the full stop that a sentence sets."""
     return Verbatim(declared.by), Verbatim(declared.reason.rstrip(". "))
 
 
 def with_declared(budget: Budget, lines: Sequence[str], stated: TestUncertainty) -> Budget:
-    """The budget of which each declared line says so: those of a length are its first, in their order.
-
-    That of a form begins with the form deviation itself, of which nothing is declared; that of repeats has lines of its own.
-    """
+    """The budget of which each declared line says so: those of a length are its first; a form's own deviation never."""
     own = () if lines == REPEAT_LINES else ("", *lines) if lines == FORM_LINES else lines
     named = list(budget.lines)
     for i, (line, name) in enumerate(zip(budget.lines, own, strict=False)):

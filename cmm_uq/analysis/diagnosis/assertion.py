@@ -35,17 +35,13 @@ WITHIN_NOISE = say("it explains no more of the misfit than noise alone would giv
 
 @dataclass(frozen=True)
 class WithheldEffect:
-    """An effect that is probable, or one of a probable group, and yet is not asserted.
+    """An effect that is probable, or one of a probable group, and yet is not asserted."""
 
-    ``effect``, ``title`` its name, and in words; ``probability`` as that of an effect that is asserted; ``why`` in
-    words, to follow a colon; ``modes`` periods that fit, where it has one.
-    """
-
-    effect: str
+    effect: str  # effect, title: its name, and in words
     title: Text
-    probability: float
+    probability: float  # as that of an effect that is asserted
     why: Text
-    modes: tuple[Mode, ...] = ()
+    modes: tuple[Mode, ...] = ()  # periods that fit, where it has one
 
 
 def withhold_unresolved(result: SearchResult) -> tuple[SearchResult, tuple[WithheldEffect, ...]]:
@@ -68,7 +64,6 @@ def period_settled(result: SearchResult, index: int, modes: tuple[Mode, ...]) ->
 
 
 def _too_little(result: SearchResult, index: int, modes: tuple[Mode, ...]) -> Text | None:
-    """Why neither an error with a period nor one without is asserted."""
     combinations = result.combinations
     if combinations is None or not holds_whole_period(result, index, modes[0]):
         return NOT_WHOLE
@@ -117,16 +112,12 @@ def _withheld(result: SearchResult, index: int, why: Text) -> WithheldEffect:
 
 
 def _tried(result: SearchResult, index: int) -> float:
-    """How many periods of an effect the search tried: of noise, the best of many takes more than one."""
     explanation = result.first.explanations[index]
     return float(sum(member.weight for member in explanation.members)) if explanation.shaped else 1.0
 
 
 def _sizes(result: SearchResult, joint: JointPosterior, effect: Effect, modes: tuple[Mode, ...]) -> Floats:
-    """Draws (N, k) of an effect's coefficients; of a period those of its sine and cosine about the middle of the readings.
-
-    They are of the most probable of its periods: those of several have phases that say nothing together.
-    """
+    """Draws (N, k) of an effect's coefficients; of a period those of its sine and cosine about the middle of the readings."""
     column = {unknown.key: i for i, unknown in enumerate(joint.posterior.unknowns)}
     draws = joint.posterior.draws[:, [column[effect.name, c.name] for c in effect.coefficients]]
     axis = effect.shape[0].period_along if effect.shape else None

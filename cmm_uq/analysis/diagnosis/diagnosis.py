@@ -48,27 +48,20 @@ _NOISE_KIND = 0.9
 
 @dataclass(frozen=True)
 class OmittedEffect:
-    """An effect that the model left out.
+    """An effect that the model left out."""
 
-    ``effect``, ``title`` its name, and in words; ``probability`` among all candidates that could stand in its place,
-    nothing and nonparametric terms included; ``parameters`` reported parameters, from the joint posterior;
-    ``explained`` part of the misfit's sum of squares that it takes away; ``together`` probability of it or one that
-    these data cannot tell from it; ``points_to`` what a technician should look at; ``group`` what these data cannot
-    tell from it; with a probability below one half it is asserted as one of these; ``modes`` other periods that fit,
-    where it has one; all that fit, where none of them is settled; ``settled`` whether its period, where it has one, is
-    among the parameters.
-    """
-
-    effect: str
+    effect: str  # effect, title: its name, and in words
     title: Text
-    probability: float
-    parameters: Mapping[str, Quantity]
-    explained: float
-    together: float
-    points_to: Text
+    probability: float  # among all candidates that could stand in its place, nothing and nonparametric terms included
+    parameters: Mapping[str, Quantity]  # reported parameters, from the joint posterior
+    explained: float  # part of the misfit's sum of squares that it takes away
+    together: float  # probability of it or one that these data cannot tell from it
+    points_to: Text  # what a technician should look at
+    # what these data cannot tell from it; with a probability below one half it is asserted as one of these
     group: tuple[Text, ...] = ()
+    # other periods that fit, where it has one; all that fit, where none of them is settled
     modes: tuple[Mode, ...] = ()
-    settled: bool = True
+    settled: bool = True  # whether its period, where it has one, is among the parameters
 
 
 @dataclass(frozen=True)
@@ -84,34 +77,25 @@ class NoiseDiagnosis:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """See the module's docstring.
+    """See the module's docstring."""
 
-    ``verdict`` ``consistent``, ``explained``, ``partial`` or ``unexplained``; ``p_value`` of "nothing is missing";
-    ``alpha`` false-alarm rate asked for; ``where`` most significant first; ``effects`` what is asserted, most probable
-    first; ``indistinguishable`` groups of effects that this recording cannot tell apart; ``rivals`` every candidate by
-    itself with its probability, most probable first; ``noise``, ``improvement`` see their classes; ``before``,
-    ``after`` the job's model, and with what was left out; ``components`` of the noise, for the model after;
-    ``posterior`` joint, of the model after; ``compared`` observations that the candidates were compared on; what was
-    found is estimated from all; ``search`` the search that it rests on; ``withheld`` effects that are probable, and yet
-    not asserted; ``remaining`` combinations of explanations that remain, and what they make of the named effects.
-    """
-
-    verdict: str
+    verdict: str  # consistent, explained, partial or unexplained
     p_value: float
     alpha: float
     where: tuple[Place, ...]
-    effects: tuple[OmittedEffect, ...]
-    indistinguishable: tuple[tuple[str, ...], ...]
-    rivals: tuple[tuple[Text, float], ...]
-    noise: NoiseDiagnosis
+    effects: tuple[OmittedEffect, ...]  # what is asserted, most probable first
+    indistinguishable: tuple[tuple[str, ...], ...]  # groups of effects that this recording cannot tell apart
+    rivals: tuple[tuple[Text, float], ...]  # every candidate by itself with its probability, most probable first
+    noise: NoiseDiagnosis  # noise, improvement: see their classes
     improvement: Improvement
-    before: RecordingModel
+    before: RecordingModel  # before, after: the job's model, and with what was left out
     after: RecordingModel
-    components: Components
+    components: Components  # of the noise, for the model after
     posterior: NoisyPosterior
-    compared: int
+    compared: int  # observations that the candidates were compared on; what was found is estimated from all
     search: SearchResult
-    withheld: tuple[WithheldEffect, ...] = ()
+    withheld: tuple[WithheldEffect, ...] = ()  # effects that are probable, and yet not asserted
+    # combinations of explanations that remain, and what they make of the named effects
     remaining: ModelAverage = field(default_factory=ModelAverage)
 
 
@@ -148,11 +132,7 @@ def diagnose(
 def _asserted(
     result: SearchResult, model: RecordingModel, seed: int, progress: Progress | None, known: NoisyPosterior | None
 ) -> tuple[SearchResult, JointPosterior, tuple[WithheldEffect, ...]]:
-    """What of a search may be asserted, estimated from all observations, and what is withheld.
-
-    Where the size of an effect is open, the next most probable that cannot be told from it is tried in its place. Where there
-    is none, the least probable of those whose size is open goes first: without it that of the others may be known.
-    """
+    """What of a search may be asserted; where an effect's size is open its next probable is tried, else the least goes."""
     result, gone = withhold_unresolved(result)
     places: dict[int, WithheldEffect] = {}  # of each effect that was tried in the place of others, the first of these
     tried: frozenset[int] = frozenset()
@@ -176,7 +156,6 @@ def _asserted(
 
 
 def _of_all(result: SearchResult, model: RecordingModel) -> SearchResult:
-    """The same, its model that of all observations."""
     if not result.chosen or result.model.artefact is model.artefact:
         return result if result.chosen else replace(result, model=model)
     return replace(result, model=replace(result.model, artefact=model.artefact, used=model.used))
@@ -224,10 +203,7 @@ def _left_out(result: SearchResult, joint: JointPosterior, before: RecordingMode
 
 
 def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[float, float, tuple[Text, ...]]:
-    """Of an effect by itself, and with all that could stand in its place; and the names of those.
-
-    Without a known period these are the functions of the reading, too.
-    """
+    """Of an effect by itself, and with all that could stand in its place; and the names of those."""
     combinations = result.combinations
     if combinations is None:
         return 0.0, 0.0, ()
@@ -242,13 +218,11 @@ def _probability(result: SearchResult, index: int, *, known: bool) -> tuple[floa
 
 
 def _unwrapped(phase: Floats) -> Floats:
-    """Phases within half a turn of their circular mean, so that they have a mean and an interval."""
     middle = float(np.angle(np.mean(np.exp(1j * phase))))
     return np.asarray(middle + np.angle(np.exp(1j * (phase - middle))), dtype=np.float64)
 
 
 def _squares(linear: LinearModel, without: Sequence[int]) -> float:
-    """Sum of squared residuals, in units of the noise scale, when some parameters are left out."""
     kept = [i for i in range(len(linear.unknowns)) if i not in without]
     return float(np.sum(solve(linear.only(kept)).residuals ** 2))
 

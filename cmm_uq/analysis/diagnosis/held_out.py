@@ -22,27 +22,21 @@ _SINGULAR = 1e-9  # part of the largest singular value below which another count
 
 @dataclass(frozen=True)
 class Improvement:
-    """Before and after, on the recording itself and on held-out set-ups.
+    """Before and after, on the recording itself and on held-out set-ups."""
 
-    ``rms_before_um``, ``rms_after_um`` residual rms of the observations; ``heldout_rms_before_um``,
-    ``heldout_rms_after_um`` of predictions of what was left out of the fit; ``elpd_gain``, ``elpd_gain_se`` gain in
-    expected log predictive density, and its standard error over what was held out; ``unseen`` what was held out.
-    """
-
-    rms_before_um: float
+    rms_before_um: float  # rms_before_um, rms_after_um: residual rms of the observations
     rms_after_um: float
+    # heldout_rms_before_um, heldout_rms_after_um: of predictions of what was left out of the fit
     heldout_rms_before_um: float
     heldout_rms_after_um: float
+    # elpd_gain, elpd_gain_se: gain in expected log predictive density, and its standard error over what was held out
     elpd_gain: float
     elpd_gain_se: float
     unseen: Text = say("set-ups")
 
 
 def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
-    """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups.
-
-    Repeats are left out together. The predictive density is normal, with the noise of each model's own fit.
-    """
+    """Compare two models of one recording by cross-validation over its set-ups, or the points of few set-ups."""
     groups, unseen = _groups(before)
     rms = [_rms(model.estimate().least_squares.residuals) for model in (before, after)]
     if before.effects == after.effects:
@@ -55,10 +49,7 @@ def improvement(before: RecordingModel, after: RecordingModel) -> Improvement:
 
 
 def _held_out(model: RecordingModel, groups: NDArray[np.int64]) -> tuple[float, Floats]:
-    """Rms of predictions, µm, and log predictive density of each fold.
-
-    What a set-up leaves open is taken from its other points, where there are some, and else is no part of the prediction.
-    """
+    """Rms of predictions, µm, and log predictive density of each fold; what a set-up leaves open is no part of it."""
     estimate = model.estimate()
     linear = estimate.linear
     sigma = max(estimate.least_squares.sigma_of_residuals, model.least_noise, 1e-7)
@@ -93,11 +84,7 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _groups(model: RecordingModel) -> tuple[NDArray[np.int64], Text]:
-    """What is left out together, and what it is: set-ups; of few set-ups their points. Each with its repeats.
-
-    Without one of a few set-ups the rest would often determine nothing: a gauge on seven lines has one along Y.
-    Which of them are in one fold follows from where they are, not from their numbers.
-    """
+    """What is left out together, by its place: set-ups, or of few set-ups, which might leave too much open, their points."""
     artefact, used = model.artefact, model.used
     placing = artefact.measurement[used]
     if len(np.unique(placing)) >= FOLDS:
@@ -114,11 +101,7 @@ def _folds(group: NDArray[np.int64]) -> Iterator[NDArray[np.bool_]]:
 
 
 def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tuple[Floats, Floats, int]:
-    """What is held out of columns (m, b), less what the set-ups' other observations tell of it.
-
-    Gives (o, b) without what no observation tells of the set-ups; (o, r) whose products are the covariance of what was
-    told, in units of the noise; and how many of the o dimensions are lost with what is left open.
-    """
+    """Columns (o, b) held out less what other observations tell; (o, r) factor of its covariance; dimensions lost."""
     left, known, open_ = every.copy(), np.zeros((len(every), 0)), 0
     for rows in placing.rows:
         own = out[rows]
@@ -136,11 +119,7 @@ def _predicted(placing: Freedoms, every: Floats, out: NDArray[np.bool_]) -> tupl
 
 
 def _told(columns: Floats) -> tuple[Floats, Floats, Floats]:
-    """What columns (m, q) tell of their coefficients.
-
-    Gives orthonormal basis (m, r) of what they reach, what (q, r) turns observations along it into coefficients, and an
-    orthonormal basis (q, q − r) of the coefficients that they leave open.
-    """
+    """Basis (m, r) that columns (m, q) reach, (q, r) coefficients of it, and basis (q, q − r) of what they leave open."""
     if not columns.size:
         return np.zeros((len(columns), 0)), np.zeros((columns.shape[1], 0)), np.eye(columns.shape[1])
     U, s, V = np.linalg.svd(columns, full_matrices=len(columns) < columns.shape[1])

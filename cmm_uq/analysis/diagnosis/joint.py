@@ -33,14 +33,11 @@ _TOLD = 1e-3  # probability from which a mode is told
 
 @dataclass(frozen=True)
 class Mode:
-    """A period, its interval within this mode, and how probable the mode is among all.
-
-    ``ends`` are the lowest and the highest value that belong to it.
-    """
+    """A period, its interval within this mode, and how probable the mode is among all."""
 
     period: Quantity
     probability: float
-    ends: tuple[float, float]
+    ends: tuple[float, float]  # are the lowest and the highest value that belong to it
 
     def holds(self, shape: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Which values (N,) belong to it."""
@@ -48,10 +45,7 @@ class Mode:
 
 
 def period_modes(result: SearchResult, index: int) -> tuple[Mode, ...]:
-    """All modes of the period of an effect that was found, the most probable first; none of one without a period.
-
-    Periods shorter than those that are searched count too: where positions repeat at equal distances, they fit as well.
-    """
+    """All modes of an effect's period, shorter than searched too, the most probable first; none of one without a period."""
     explanation = result.first.explanations[index]
     effect = effect_of(explanation)
     if not (effect.shape and effect.shape[0].period_along):
@@ -83,7 +77,6 @@ def holds_whole_period(result: SearchResult, index: int, mode: Mode) -> bool:
 
 
 def _peaks(trials: Ints, evidence: Floats) -> Iterator[Ints]:
-    """Trials in order of frequency, parted at the deepest valley between two peaks, and so on."""
     log = evidence[trials]
     lower = np.minimum(np.maximum.accumulate(log), np.maximum.accumulate(log[::-1])[::-1])
     valley = int(np.argmin(log - lower))
@@ -123,10 +116,7 @@ class JointPosterior:
 def joint_posterior(
     result: SearchResult, seed: int, progress: Progress | None = None, known: NoisyPosterior | None = None
 ) -> JointPosterior:
-    """Sample everything at once.
-
-    ``known`` posterior of the job's own model, which it stays where nothing is found.
-    """
+    """Sample everything at once. ``known`` posterior of the job's own model, which it stays where nothing is found."""
     model = result.model
     components = replace(noise_of(model), known=model.least_noise)
     if known is not None and not result.effects:
@@ -150,7 +140,6 @@ def joint_posterior(
 
 
 def _shaped(result: SearchResult, model: RecordingModel, effect: Effect, values: Floats) -> Shaped:
-    """An effect's columns on a fine grid of its shape, wherever the search found some probability."""
     nodes = _nodes(result, effect)
     table = np.stack([model.seen(model.columns(effect, (float(shape),), values), values) for shape in nodes])
     keys = [unknown.key for unknown in model.unknowns]

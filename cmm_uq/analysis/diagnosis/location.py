@@ -37,28 +37,24 @@ _MOST = 4  # places that are told
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where a mismatch lives.
-
-    ``covariate`` column that it depends on; ``region`` of that covariate, where the function is larger than half its
-    maximum and its band does not hold zero, or between which values it jumps; ``p_value`` corrected for having looked
-    at every covariate; of a further place, beside those before it; ``amplitude_um`` largest value of the function in
-    the region; ``what`` the function, in words; ``curve`` covariate, function and its standard uncertainty in µm, each
-    (p,); ``k`` coverage factor of its band for 95 %; ``along`` axis along which it displaces points; ``None`` where it
-    is told by the observations themselves; ``scale`` whether it is a scale of that axis; ``also`` other functions that
-    fit as well and show the same; ``data`` lowest and highest of the covariate among the points of each observation,
-    and what the job's model leaves of it in µm, each (m,).
-    """
+    """Where a mismatch lives."""
 
     covariate: str
+    # of that covariate, where the function is larger than half its maximum and its band does not hold zero, or between
+    # which values it jumps
     region: tuple[float, float]
-    p_value: float
-    amplitude_um: float
+    p_value: float  # corrected for having looked at every covariate; of a further place, beside those before it
+    amplitude_um: float  # largest value of the function in the region
     what: Text
-    curve: tuple[Floats, Floats, Floats]
-    k: float = 2.0
-    along: str | None = None
-    scale: bool = False
-    also: tuple[Text, ...] = ()
+    curve: tuple[Floats, Floats, Floats]  # covariate, function and its standard uncertainty in µm, each (p,)
+    k: float = 2.0  # coverage factor of its band for 95 %
+    along: str | None = (
+        None  # axis along which it displaces points; None where it is told by the observations themselves
+    )
+    scale: bool = False  # whether it is a scale of that axis
+    also: tuple[Text, ...] = ()  # other functions that fit as well and show the same
+    # lowest and highest of the covariate among the points of each observation, and what the job's model leaves of it in
+    # µm, each (m,)
     data: tuple[Floats, Floats, Floats] = field(default_factory=lambda: (np.zeros(0), np.zeros(0), np.zeros(0)))
 
 
@@ -93,7 +89,6 @@ def locate(compared: ModelComparison, alpha: float, effects: Collection[int] = (
 def _beside(
     compared: ModelComparison, conditions: Sequence[Version], functions: Collection[int]
 ) -> dict[int, tuple[float, Version]]:
-    """Log odds of each function beside those given, and its best version."""
     comparison = compared.comparison
     alone = float(comparison.log_evidence_of(conditions)[0]) if conditions else 0.0
     found = comparison.beside(conditions, functions)
@@ -109,13 +104,11 @@ def _p_value(compared: ModelComparison, log_odds: float) -> float:
 
 
 def _has_form(compared: ModelComparison, function: int, effects: Collection[int]) -> bool:
-    """Whether one of the effects found could be this function."""
     own = compared.explanations[function]
     return any(own.could_be(effect) for i, effect in enumerate(compared.explanations) if i in effects)
 
 
 def _places(compared: ModelComparison, chosen: Sequence[tuple[Version, float, tuple[Text, ...]]]) -> Iterable[Place]:
-    """Those whose band does not hold zero everywhere, their functions estimated together."""
     fit = _Fit.of(compared, [version for version, *_ in chosen])
     for number, (version, p_value, also) in enumerate(chosen):
         explanation = compared.explanations[version.explanation]
@@ -138,17 +131,13 @@ def _places(compared: ModelComparison, chosen: Sequence[tuple[Version, float, tu
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Unknown functions fitted together to what the baseline leaves.
+    """Unknown functions fitted together to what the baseline leaves."""
 
-    ``mean``, ``covariance`` of their coefficients, (r,) and (r, r), for functions in mm; ``parts`` coefficients of each
-    function; ``left`` (m, r) what the baseline leaves of their columns; ``k`` coverage factor for 95 %.
-    """
-
-    mean: Floats
+    mean: Floats  # mean, covariance: of their coefficients, (r,) and (r, r), for functions in mm
     covariance: Floats
-    parts: Sequence[slice]
-    left: Floats
-    k: float
+    parts: Sequence[slice]  # coefficients of each function
+    left: Floats  # (m, r) what the baseline leaves of their columns
+    k: float  # coverage factor for 95 %
 
     @classmethod
     def of(cls, compared: ModelComparison, versions: Sequence[Version]) -> _Fit:
@@ -171,10 +160,7 @@ class _Fit:
         return cls(mean, covariance, parts, left, float(special.stdtrit(degrees, 0.975)))
 
     def function(self, number: int, x: Floats, values: Floats) -> tuple[Floats, Floats]:
-        """One function and its standard uncertainty, mm, each (p,), from its values (p, r) for unit coefficients.
-
-        A constant or a line that no observation shows, or that the baseline absorbs, is no part of the function.
-        """
+        """One function and its standard uncertainty, mm, each (p,), from its values (p, r) for unit coefficients."""
         own = self.parts[number]
         left = self.left[:, own]
         lines = np.column_stack([np.ones_like(x), (x - x.mean()) / np.ptp(x)])
@@ -224,20 +210,15 @@ _SEEN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ResidualField:
-    """Residuals where they lie.
+    """Residuals where they lie."""
 
-    ``place`` (q, 3) readings of the scales, mm; ``before``, ``after`` (q, 3) µm, indicated minus modelled, by the job's
-    model and by that with what was left out; ``scale`` (q,) standard uncertainty of each vector's length, per unit of
-    that of one coordinate; ``dimensions`` (q,) in how many directions it is seen; ``lengths`` whether they are the two
-    ends of lengths, one after the other.
-    """
-
-    place: Floats
+    place: Floats  # (q, 3) readings of the scales, mm
+    # before, after: (q, 3) µm, indicated minus modelled, by the job's model and by that with what was left out
     before: Floats
     after: Floats
-    scale: Floats
-    dimensions: Ints
-    lengths: bool
+    scale: Floats  # (q,) standard uncertainty of each vector's length, per unit of that of one coordinate
+    dimensions: Ints  # (q,) in how many directions it is seen
+    lengths: bool  # whether they are the two ends of lengths, one after the other
 
     def expanded(self, noise: Quantity) -> Floats:
         """(q,) length that noise of this standard deviation of a coordinate exceeds in 5 % of cases, in its unit."""
@@ -275,7 +256,6 @@ def residual_field(before: RecordingModel, after: RecordingModel) -> ResidualFie
 
 
 def _of_points(point: Ints, directions: Floats, left: Floats, noise: Floats, readings: Floats) -> ResidualField:
-    """Shortest vectors that show, along the directions of each point's observations, what these leave."""
     vectors, scale, dimensions, owners = [], [], [], np.unique(point)
     order = np.argsort(point, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(point[order])) + 1):

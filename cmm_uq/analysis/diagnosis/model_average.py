@@ -40,32 +40,20 @@ EffectParameters = Mapping[str, Mapping[str, Quantity]]
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A combination of explanations that remains.
+    """A combination of explanations that remains."""
 
-    ``probability`` among all combinations, with what adds nothing to it; ``effects`` names of the effects that it adds
-    to the model; ``functions`` what is unknown besides; ``named`` parameters of the effects that the job names, under
-    it; ``added`` parameters of its own effects; ``model`` the job's, with its effects; ``draws`` (N, k) of that model's
-    unknowns.
-    """
-
-    probability: float
-    effects: tuple[str, ...]
+    probability: float  # among all combinations, with what adds nothing to it
+    effects: tuple[str, ...]  # names of the effects that it adds to the model
     functions: tuple[Text, ...]
-    named: EffectParameters
-    added: EffectParameters
+    named: EffectParameters  # parameters of the effects that the job names, under it
+    added: EffectParameters  # parameters of its own effects
     model: RecordingModel
-    draws: Floats
+    draws: Floats  # (N, k) of that model's unknowns
 
 
 @dataclass(frozen=True, eq=False)
 class ModelAverage:
-    """All combinations that remain, the most probable first, and what they make of the named effects on average.
-
-    Empty where one is settled, or nothing is missing.
-
-    ``rivals`` each; ``averaged`` parameters of the effects that the job names, over all of them; ``draws`` (N, k) of
-    the unknowns of the job's model, over all of them; ``None`` where there are none.
-    """
+    """All combinations that remain, most probable first, and their averages; empty where one is settled or none missing."""
 
     rivals: tuple[Rival, ...] = ()
     averaged: EffectParameters = field(default_factory=dict)
@@ -78,10 +66,7 @@ class ModelAverage:
 
 
 def average_models(result: SearchResult, joint: JointPosterior, before: RecordingModel, seed: int) -> ModelAverage:
-    """What remains of a search.
-
-    ``before`` the job's model.
-    """
+    """What remains of a search. ``before`` the job's model."""
     combinations = result.combinations
     if combinations is None:
         return ModelAverage()
@@ -112,11 +97,7 @@ def _over_all(rivals: Sequence[Rival], before: RecordingModel, seed: int) -> Flo
 
 
 def needed_combinations(combinations: Combinations) -> dict[Key, float]:
-    """Probability of every combination of which each member explains something.
-
-    One whose evidence is not three times that without a member is no other explanation than that without it: its probability
-    goes there. (A recording that is consistent leaves open as well what it does not show.)
-    """
+    """Probability of every combination; one with less than three times the evidence without a member gives it to that."""
     evidence = {key: one.log_posterior - one.log_prior for key, one in combinations.by_key.items()}
     total = dict(combinations.probability)
     for key in sorted(total, key=lambda key: -len(key)):
@@ -161,10 +142,7 @@ def _rival(
 
 
 def _about(model: RecordingModel, *estimated: RecordingModel) -> Floats:
-    """Parameters (k,) that a model is linear about: as the last of others estimates them, else as they are known beforehand.
-
-    It is not estimated by itself: what it cannot tell apart is held by what physics allows alone.
-    """
+    """Parameters (k,) that a model is linear about: as the last of others estimates them, else as known beforehand."""
     values = {unknown.key: unknown.prior_mean for unknown in model.unknowns}
     for other in estimated:
         values |= dict(zip((unknown.key for unknown in other.unknowns), other.estimate().about, strict=True))

@@ -38,23 +38,18 @@ _POINTS = 400
 
 @dataclass(frozen=True, eq=False)
 class NoiseKind:
-    """One shape of the noise.
-
-    ``name`` ``components`` or ``tails``; ``whitening`` (m, m) sparse W; W times the part of such noise that is
-    independent, over that of a reading, is white; ``log_whitening`` logarithm of its determinant; ``probability``
-    beforehand; ``slow`` (m, c) columns with standard normal coefficients that it has besides; ``log_factor`` logarithm
-    by which its density exceeds that of a normal distribution with this covariance; ``unrounded`` the same without the
-    display's steps, where there are any; ``scatter`` standard deviation of neighbouring readings about each other, over
-    √2, over that of a reading alone.
-    """
+    """One shape of the noise."""
 
     name: str
+    # (m, m) sparse W; W times the part of such noise that is independent, over that of a reading, is white
     whitening: sparse.csr_array
-    log_whitening: float
+    log_whitening: float  # logarithm of its determinant
     probability: float
+    # (m, c) columns with standard normal coefficients that it has besides
     slow: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    log_factor: float = 0.0
-    unrounded: NoiseKind | None = None
+    log_factor: float = 0.0  # logarithm by which its density exceeds that of a normal distribution with this covariance
+    unrounded: NoiseKind | None = None  # the same without the display's steps, where there are any
+    # standard deviation of neighbouring readings about each other, over √2, over that of a reading alone
     scatter: float = 1.0
 
     def white(self, columns: Floats) -> Floats:
@@ -72,10 +67,7 @@ class NoiseKind:
 
 
 def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probability: float) -> NoiseKind:
-    """A single draw of sizes as a kind of noise, over the noise scale (m,), for a reading noise of one.
-
-    Slow noise that is too quick for the cosines has its covariance in full: what they leave out would look like physics.
-    """
+    """A single draw of sizes as a kind of noise, over the noise scale (m,), for a reading noise of one."""
     variances, slow = components.variances(sizes)
     columns = components.waves(sizes) if np.any(slow) else np.zeros((0, 0))
     if components.time.size and components.quick(sizes)[0] > NEGLIGIBLE:
@@ -91,11 +83,7 @@ def shape_of(components: Components, sizes: Sizes, noise_scale: Floats, probabil
 
 
 def heavy_tails(residual: Floats) -> NoiseKind:
-    """Student's t with four degrees of freedom, by its tangent at residuals (m,) over the noise scale.
-
-    ln t is convex in the square of its argument, so that the tangent is a normal density below it, wherever it touches: the
-    evidence of this kind is never overstated. (σ stays the standard deviation of a reading.)
-    """
+    """Student's t, four degrees, by its tangent at residuals (m,): a normal density below it, so never overstated."""
     scale = 1.4826 * float(np.median(np.abs(residual)))
     precision, log_factor = _tangent(residual / max(scale, _NANOMETRE))
     whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)))
@@ -103,10 +91,7 @@ def heavy_tails(residual: Floats) -> NoiseKind:
 
 
 def with_tails(kind: NoiseKind, residual: Floats, probability: float) -> NoiseKind:
-    """A kind of noise whose independent part is of Student's t, by its tangent at residuals; see :func:`heavy_tails`.
-
-    ``residual`` (m,) of the whitened observations, over their standard deviation.
-    """
+    """A kind of noise whose independent part is of Student's t, by its tangent at whitened residuals."""
     precision, log_factor = _tangent(residual)
     whitening = sparse.csr_array(sparse.diags_array(np.sqrt(precision)) @ kind.whitening)
     log = kind.log_whitening + 0.5 * float(np.log(precision).sum())
@@ -142,7 +127,6 @@ def probable_tails(residuals: Floats, often: float = OFTEN) -> float:
 
 
 def _tails_over_normal(residuals: Floats) -> float:
-    """Logarithm of the ratio of likelihoods of Student's t and of a normal distribution, each with its best size."""
     if not np.any(residuals):
         return 0.0
     z = residuals / np.sqrt(np.mean(residuals**2))
@@ -153,10 +137,7 @@ def _tails_over_normal(residuals: Floats) -> float:
 
 
 def sigma_grid(stated: float | None, residual: float, least: float = 0.0) -> tuple[Floats, Floats]:
-    """Values (s,) of the noise, mm, and their log probabilities beforehand.
-
-    A stated value is mostly good to a fifth, and now and then simply wrong; without one, the logarithm is uniform.
-    """
+    """Noise (s,), mm, and log probabilities beforehand: a stated one mostly good to a fifth, else ln σ uniform."""
     centre = np.log(max(residual, least))
     grid = np.linspace(centre - 4.0, centre + 1.5, _POINTS)
     grid, log_weight = _grid(stated, grid)

@@ -52,12 +52,7 @@ def representative_kinds(
     residuals: Floats,
     jumps: Floats | None = None,
 ) -> list[NoiseKind]:
-    """Shapes of the noise that a recording could show.
-
-    ``rivals`` (m, r) columns, mm, of what could be missing, for coefficients of standard deviation one; ``residuals``
-    (m,) of the estimate, mm; ``jumps`` (m, j) columns, mm, of what may jump with time: slow noise looks like it, and is
-    not needed beside it.
-    """
+    """Noise that a recording could show, from residuals (m,), mm, what could be missing and what may jump with time."""
     components = _for_a_unit(Marginal(linear, components, estimate))
     either = (
         Marginal(linear, components, estimate),
@@ -92,7 +87,6 @@ def representative_kinds(
 
 
 def _for_a_unit(marginal: Marginal) -> Components:
-    """The components with the display's step over the reading noise that is most probable beside it."""
     components = marginal.noise
     if not components.display:
         return components
@@ -120,15 +114,11 @@ def drawn_shapes(components: Components) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Density:
-    """Of shapes, the reading noise integrated out.
+    """Of shapes, the reading noise integrated out."""
 
-    ``marginal`` with the noise in its own size, not that for a unit; ``sigma`` mm, near which the reading noise is;
-    ``count`` observations that are left for the noise.
-    """
-
-    marginal: Marginal
-    sigma: float
-    count: float
+    marginal: Marginal  # with the noise in its own size, not that for a unit
+    sigma: float  # mm, near which the reading noise is
+    count: float  # observations that are left for the noise
 
     @classmethod
     def of(cls, marginal: Marginal, taken: float, components: Components) -> _Density:
@@ -137,11 +127,7 @@ class _Density:
         return cls(replace(marginal, noise=replace(components, display=sigma * components.display)), sigma, count)
 
     def log_probability(self, shapes: Floats) -> Floats:
-        """Of each shape (n,): the sum of squares has a gamma distribution given the shape.
-
-        Its degrees of freedom are those of the noise alone: what any noise leaves of the coefficients' prior goes with its
-        size, to the power of how many the recording determines.
-        """
+        """Of each shape (n,): the sum of squares has a gamma distribution given the shape."""
         at = shapes.copy()
         at[:, 0] += np.log(self.sigma)
         log, squares = self.marginal.log_likelihood(self.marginal.noise.sizes(at))
@@ -186,11 +172,7 @@ def _more(shapes: Shapes, few: Sequence[_Density], densities: Sequence[_Density]
 
 
 def _representative(sizes: Sizes, prior: Floats, share: Floats) -> tuple[list[int], Floats]:
-    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling).
-
-    They are taken in an order in which neighbours are alike, by slow noise first, so that each kind of it has its places:
-    whether there is any is what the evidence of an effect depends on most.
-    """
+    """Shapes that stand for all, and their weights: those of what each stands for (systematic resampling)."""
     table = np.column_stack(
         [np.where(sizes.slow > 0, sizes.rate, -1), sizes.slow, sizes.placing, sizes.growth, sizes.reading]
     )
@@ -263,6 +245,5 @@ def noise_kinds(model: RecordingModel, candidates: Sequence[Explanation]) -> lis
 
 
 def _doubled(explanation: Explanation) -> bool:
-    """Whether it is a fault of the artefact that an error of the machine, or a pattern of the artefact, can be as well."""
     effect = explanation.effect
     return effect is not None and effect.of_artefact and len(effect.coefficients) <= _FEW

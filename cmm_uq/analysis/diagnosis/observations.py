@@ -19,12 +19,7 @@ from cmm_uq.machine.model.kind import Observed
 
 
 def numbered_by_place(model: RecordingModel, group: Ints) -> Ints:
-    """Numbers (m,) of groups of used observations, from that nearest to the middle of the recording.
-
-    No order of rows, numbering or frame changes how far the groups are from it.
-
-    ``group`` (m,) or (m, j), equal for the observations of one group.
-    """
+    """Numbers (m,) of groups of observations, from that nearest to the middle: no order, numbering or frame changes them."""
     xyz, rows = model.artefact.points.xyz, model.artefact.rows[model.used]
     away = np.sum((xyz - xyz.mean(axis=0)) ** 2, axis=1)[rows].mean(axis=1)
     _, index = np.unique(group, axis=0, return_inverse=True)
@@ -39,11 +34,7 @@ LEAST_OF_SET_UP = 30  # observations that a set-up keeps where it has as many: i
 
 
 def thin_out(model: RecordingModel, observe: Observed, seed: int, most: int = MOST) -> RecordingModel:
-    """The model of at most ``most`` observations, or a few more; as it is with no more than these.
-
-    Whole quantities are drawn, with their repeats, evenly from every set-up, and where there are many set-ups, from some
-    of them: at random, so that no pattern of the recording is hidden.
-    """
+    """The model of some ``most`` observations: whole quantities, evenly from every set-up, or from some at random."""
     artefact, used = model.artefact, np.flatnonzero(model.used)
     if len(used) <= most:
         return model

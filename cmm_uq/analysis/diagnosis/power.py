@@ -47,19 +47,14 @@ ALLOWED = 3.0  # prior standard deviations up to which an effect is reckoned wit
 
 @dataclass(frozen=True, eq=False)
 class Power:
-    """How an effect would be found.
-
-    ``effect`` its name; ``parameter``, ``unit`` its (first) parameter; ``allowed`` largest amplitude that physics
-    allows, in its unit; ``per_unit`` size, as in :data:`SIZES`, of an effect of one unit; 0 where nothing of it shows;
-    ``detected_at``, ``named_at`` (d,) size from which on each drawn recording is alarmed, and named rightly; may be
-    infinite.
-    """
+    """How an effect would be found."""
 
     effect: str
-    parameter: str
+    parameter: str  # parameter, unit: its (first) parameter
     unit: Unit
-    allowed: float
-    per_unit: float
+    allowed: float  # largest amplitude that physics allows, in its unit
+    per_unit: float  # size, as in SIZES, of an effect of one unit; 0 where nothing of it shows
+    # detected_at, named_at: (d,) size from which on each drawn recording is alarmed, and named rightly; may be infinite
     detected_at: Floats
     named_at: Floats
 
@@ -87,14 +82,11 @@ class Power:
 
 @dataclass(frozen=True, eq=False)
 class DrawnNoise:
-    """Noise of the observations of a recording, m of them, in one set of sizes.
+    """Noise of the observations of a recording, m of them, in one set of sizes."""
 
-    ``components``, ``sizes`` of the noise; ``noise_scale`` (m,).
-    """
-
-    components: Components
+    components: Components  # components, sizes: of the noise
     sizes: Sizes
-    noise_scale: Floats
+    noise_scale: Floats  # (m,)
 
     def draws(self, random: np.random.Generator, count: int) -> Floats:
         """(m, count) over the noise scale and the noise of a reading."""
@@ -122,10 +114,7 @@ def powers(
     model: RecordingModel, effects: Sequence[Effect], *, stated: float | None, sigma: float, alpha: float, seed: int,
     draws: int = 20, noise: DrawnNoise | None = None,
 ) -> Iterator[Power]:  # fmt: skip
-    """Power of the diagnosis of a model's recording, for effects that the model does not name.
-
-    ``stated`` standard uncertainty of a coordinate that the job would state, mm; ``sigma`` that it truly has, mm.
-    """
+    """Of the diagnosis for effects that the model does not name; ``stated``, ``sigma`` of a coordinate, claimed, true, mm."""
     compared = model_comparison(model, stated, 0)
     rule = _Rule(compared.comparison, sigma, alpha, noise)
     for effect in effects:
@@ -183,10 +172,7 @@ class Naming:
         return np.array([prior.log([i]) for i in range(len(self.explanations))])
 
     def __call__(self, odds: Floats, true: int) -> Floats:
-        """By how much (b,) the true effect passes what would let others stand beside it.
-
-        ``odds`` (c, b) log evidence of each explanation over nothing.
-        """
+        """By how much (b,) the true effect passes what would let others stand beside it; ``odds`` (c, b) log evidence."""
         weight = odds + self.priors[:, None]
         kinds = np.array([explanation.kind for explanation in self.explanations])
         nothing = np.full((1, odds.shape[1]), CombinationPrior(self.explanations).log([]))
@@ -210,11 +196,7 @@ class _Rule:
 
     @cached_property
     def _thresholds(self) -> Floats:
-        """(t,) statistic at which the test rejects when the noise looks :data:`_LARGER` times what it is.
-
-        The test draws "nothing is missing" at the noise that fits the recording best, and a fault makes that larger. Its tail
-        is that of :func:`~cmm_uq.analysis.diagnosis.comparison.search.tail_probability`.
-        """
+        """(t,) statistic at which the test rejects when the noise, which a fault enlarges, looks :data:`_LARGER` times it."""
         comparison = self.comparison
         random = np.random.default_rng(np.random.SeedSequence(0, spawn_key=(2,)))
         draws = draw_nothing(comparison, random, DRAWS)
@@ -236,10 +218,7 @@ class _Rule:
         return np.asarray(np.interp(ratio, _LARGER, self._thresholds), dtype=np.float64)
 
     def noise(self, direction: Floats, seed: int, draws: int) -> Floats:
-        """Noise (m, draws) and what certificates leave open, in units of a reading's, less what the baseline takes.
-
-        Its part along ``direction`` (m, 1) is spread evenly over its distribution, which leaves less to chance.
-        """
+        """(m, draws) less what the baseline takes, in units of a reading's; along ``direction`` (m, 1) spread evenly."""
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
         drawn, along = random.standard_normal((len(direction), draws)), direction
         if self.coloured is not None:

@@ -38,46 +38,35 @@ ABSORBED = 1e-5  # part of its length below which a column is the baseline's own
 
 @dataclass(frozen=True)
 class PeriodRange:
-    """Of an effect with a nonlinear parameter, for which values of it the figures hold.
+    """Of an effect with a nonlinear parameter, for which values of it the figures hold."""
 
-    ``parameter``, ``unit`` its name and unit; ``low``, ``high`` range of what is tried; ``worst`` largest of the
-    smallest amplitudes that are detected, over all resolved values and any phase; ``unresolved`` ranges of values that
-    the positions do not resolve: nothing of them is left, or another looks the same.
-    """
-
-    parameter: str
+    parameter: str  # parameter, unit: its name and unit
     unit: Unit
-    low: float
+    low: float  # low, high: range of what is tried
     high: float
-    worst: float | None
+    worst: float | None  # largest of the smallest amplitudes that are detected, over all resolved values and any phase
+    # ranges of values that the positions do not resolve: nothing of them is left, or another looks the same
     unresolved: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class SmallestEffect:
-    """How large one effect must have been for the recording to show it.
+    """How large one effect must have been for the recording to show it."""
 
-    ``effect``, ``title`` its name, and in words; ``parameter``, ``unit`` its (first) parameter; ``allowed`` largest
-    amplitude that physics allows; ``detected`` amplitude detected with a probability of 90 %, though beyond what is
-    allowed; ``None`` where hardly any is; ``named`` amplitude named rightly with this probability; ``None`` where none
-    that is allowed is; ``share`` part of the effect's length in the observations that what is fitted leaves;
-    ``taken_up`` names of what is fitted that takes up the rest, where that is most of it; ``common`` whether it is one
-    of the common effects; ``periods`` where it has a nonlinear parameter, of which the figures are then the typical
-    ones; ``length`` of what is left of it over the noise, from which on it is detected; ``None`` where it was not
-    computed.
-    """
-
-    effect: str
+    effect: str  # effect, title: its name, and in words
     title: Text
-    parameter: str
+    parameter: str  # parameter, unit: its (first) parameter
     unit: Unit
-    allowed: float
+    allowed: float  # largest amplitude that physics allows
+    # amplitude detected with a probability of 90 %, though beyond what is allowed; None where hardly any is
     detected: float | None
-    named: float | None
-    share: float
-    taken_up: tuple[str, ...]
-    common: bool
+    named: float | None  # amplitude named rightly with this probability; None where none that is allowed is
+    share: float  # part of the effect's length in the observations that what is fitted leaves
+    taken_up: tuple[str, ...]  # names of what is fitted that takes up the rest, where that is most of it
+    common: bool  # whether it is one of the common effects
+    # where it has a nonlinear parameter, of which the figures are then the typical ones
     periods: PeriodRange | None = None
+    # of what is left of it over the noise, from which on it is detected; None where it was not computed
     length: float | None = None
 
     @property
@@ -93,10 +82,7 @@ class SmallestEffect:
 
 
 def smallest_effects(result: SearchResult, alpha: float, model: RecordingModel) -> tuple[SmallestEffect, ...]:
-    """The smallest amplitude of each effect that a recording would have shown; those that it could least come first.
-
-    Of effects of machine and surroundings: faults of the artefact are parted from them by further set-ups.
-    """
+    """The smallest amplitude of each effect that a recording would have shown; those that it could least come first."""
     view = Visibility.of(result)
     named = {effect.name for effect in model.effects}
     listed = [
@@ -126,7 +112,6 @@ def _never(effect: Effect) -> SmallestEffect:
 
 
 def _motionless(model: RecordingModel, known: set[str]) -> Iterator[Effect]:
-    """Common effects of which nothing shows in such observations, though they could act and all that they need is recorded."""
     points = model.artefact.points
     for effect in every().values():
         if effect.name in known or effect.tier != CONTRACT or effect.shape:
@@ -142,19 +127,15 @@ def _motionless(model: RecordingModel, known: set[str]) -> Iterator[Effect]:
 
 @dataclass(frozen=True, eq=False)
 class _Signal:
-    """What an effect shows, for a coefficient as large as its prior standard deviation.
-
-    ``column`` (m,) is what is left of it, ``unit_length`` its visible length; ``raw`` (m,) the whole. Of an effect with a
-    nonlinear parameter it is the typical one; ``worst`` and ``typical`` (p,) are then the lengths at each value of ``values``.
-    """
+    """What an effect shows, for a coefficient as large as its prior standard deviation."""
 
     index: int
     effect: Effect
-    raw: Floats
-    column: Floats
+    raw: Floats  # (m,) the whole. Of an effect with a nonlinear parameter it is the typical one
+    column: Floats  # (m,) is what is left of it, unit_length its visible length
     unit_length: float
     values: Floats
-    worst: Floats
+    worst: Floats  # worst, typical: (p,) are then the lengths at each value of values
     typical: Floats
     resolved: NDArray[np.bool_]
 

@@ -37,18 +37,14 @@ _RIDGE = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Visibility:
-    """A comparison, the noise in it once what was asserted is taken away, and what is fitted.
-
-    ``fitted`` (m, f) are columns of what was asserted, orthonormal; ``noise`` (m,) what they leave; ``weight`` (k,) the
-    probability of each kind of noise and ``squares`` (k,) its mean σ², mm²; ``known`` degrees of freedom of σ beforehand.
-    """
+    """A comparison, the noise in it once what was asserted is taken away, and what is fitted."""
 
     result: SearchResult
-    fitted: Floats
-    noise: Floats
-    weight: Floats
+    fitted: Floats  # (m, f) are columns of what was asserted, orthonormal
+    noise: Floats  # (m,) what they leave
+    weight: Floats  # (k,) the probability of each kind of noise and squares (k,) its mean σ², mm²
     squares: Floats
-    known: float
+    known: float  # degrees of freedom of σ beforehand
     left: int
 
     @classmethod
@@ -126,10 +122,7 @@ def aliased(view: Visibility, lefts: Floats, values: Floats) -> NDArray[np.bool_
 
 
 def _imitators(model: RecordingModel, raw: Floats) -> tuple[str, ...]:
-    """Names of what is fitted that together looks like a column (m,): those with a share of it that counts.
-
-    What the free places of the artefact take up is theirs; for the rest, of many solutions the smallest counts.
-    """
+    """What is fitted that together looks like a column (m,); the artefact's free places first, of the rest the smallest."""
     linear = model.estimate().linear
     places = linear.freedoms.over(linear.noise_scale)
     left = places.without(raw[:, None])[:, 0]
@@ -153,18 +146,13 @@ _Z = np.linspace(-5.0, 5.0, 101)
 
 @dataclass(frozen=True, eq=False)
 class Thresholds:
-    """What an effect must pass, in terms of z; see the module's docstring.
+    """What an effect must pass, in terms of z; see the module's docstring."""
 
-    ``detected`` z from which on the test rejects; ``named`` z (r,) from which on it exceeds each of its closest rivals,
-    on average; infinite where never; ``cosines`` (r,) with these; ``known`` degrees of freedom of what was known of σ
-    beforehand; ``left`` degrees of freedom of the residuals.
-    """
-
-    detected: float
-    named: Floats
-    cosines: Floats
-    known: float
-    left: int
+    detected: float  # z from which on the test rejects
+    named: Floats  # z (r,) from which on it exceeds each of its closest rivals, on average; infinite where never
+    cosines: Floats  # (r,) with these
+    known: float  # degrees of freedom of what was known of σ beforehand
+    left: int  # degrees of freedom of the residuals
 
     @property
     def noises(self) -> Floats:
@@ -220,11 +208,7 @@ _RIVALS = 4
 
 
 def thresholds(view: Visibility, which: Sequence[int], columns: Floats, alpha: float) -> Iterator[Thresholds]:
-    """Of each effect, from the statistic on the bare effect at :data:`SIZES`.
-
-    ``which`` (n,) place of each effect among the explanations; ``columns`` (n, m) what is left of each, of visible
-    length one.
-    """
+    """Of each effect, from the statistic on the bare effect at :data:`SIZES`; ``columns`` (n, m) of visible length one."""
     if not which:
         return
     first = view.result.first
@@ -257,7 +241,6 @@ def _between(v: Floats, odds: Floats, at: Floats) -> Floats:
 
 
 def _pair(explanations: Sequence[Explanation], visible: frozenset[int]) -> float | None:
-    """Logarithm of what a second effect adds to the statistic beside the first: nothing but its prior, on average."""
     count = sum(
         e.kind == EFFECT and e.weight == 1 and not e.shaped and i in visible for i, e in enumerate(explanations)
     )
@@ -280,12 +263,7 @@ def _passes(margins: Floats) -> Floats:
 
 
 def _rivals(naming: Naming, odds: Floats, true: int) -> tuple[Floats, Floats]:
-    """Length (r,) from which on the true effect exceeds each of its closest rivals, and the cosines (r,) with them.
-
-    A cosine follows from how fast the two gain evidence.
-
-    ``odds`` (c, d) log odds of each explanation at :data:`LENGTHS`.
-    """
+    """Length (r,) from which on the true effect exceeds each closest rival, and cosines (r,) by how fast both gain."""
     kinds = np.array([explanation.kind for explanation in naming.explanations])
     weight = odds + naming.priors[:, None]
     known = (kinds == EFFECT) & (np.arange(len(kinds)) != true)

@@ -19,60 +19,43 @@ _OF_FITS = ("radius_mm", "fit_rms_um", "n_points")  # columns of a recording tha
 
 @dataclass(frozen=True)
 class Separation:
-    """Two effects that the recording cannot tell apart.
-
-    ``effects`` their names; ``before`` odds of the first over the second, by the recording; ``after`` odds of the true
-    one over the other that are to be expected, the worse of the two cases.
-    """
+    """Two effects that the recording cannot tell apart."""
 
     effects: tuple[str, str]
-    before: float
-    after: float
+    before: float  # odds of the first over the second, by the recording
+    after: float  # odds of the true one over the other that are to be expected, the worse of the two cases
 
 
 @dataclass(frozen=True)
 class DetectionGoal:
-    """An effect that is to be shown.
-
-    ``effect`` its name; ``amplitude`` that is to be detected, over its prior standard deviation; ``length`` visible
-    length from which on it is detected.
-    """
+    """An effect that is to be shown."""
 
     effect: str
-    amplitude: float
-    length: float
+    amplitude: float  # that is to be detected, over its prior standard deviation
+    length: float  # visible length from which on it is detected
 
 
 @dataclass(frozen=True)
 class DetectionChange:
-    """How well an effect that was not seen will show.
-
-    ``effect`` its name; ``before``, ``after`` smallest amplitude that is detected, over its prior standard deviation;
-    infinite where none is.
-    """
+    """How well an effect that was not seen will show."""
 
     effect: str
+    # before, after: smallest amplitude that is detected, over its prior standard deviation; infinite where none is
     before: float
     after: float
 
 
 @dataclass(frozen=True, eq=False)
 class NextPlan:
-    """What to measure next.
-
-    ``placings`` set-ups, in this order; ``repeats`` how often each is measured; ``first`` number of the first as a
-    measurement; ``partings`` pairs, with the odds before and after; ``shown`` effects that were asked for; ``reached``
-    whether every pair reaches :data:`ODDS` and every effect shows as asked for; ``box`` (3, 2) the room for the
-    artefact, scale readings, mm.
-    """
+    """What to measure next."""
 
     placings: tuple[SetUp, ...]
     repeats: int
-    first: int
-    partings: tuple[Separation, ...]
+    first: int  # number of the first as a measurement
+    partings: tuple[Separation, ...]  # pairs, with the odds before and after
     shown: tuple[DetectionChange, ...]
-    reached: bool
-    box: Floats
+    reached: bool  # whether every pair reaches ODDS and every effect shows as asked for
+    box: Floats  # (3, 2) the room for the artefact, scale readings, mm
 
     @property
     def points(self) -> Points:
@@ -85,16 +68,12 @@ class NextPlan:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """What parts two effects.
-
-    ``separates`` names of the two effects; ``what`` in words; ``repetitions`` how often to measure each set-up;
-    ``odds`` of the true one of the two over the other that are then to be expected.
-    """
+    """What parts two effects."""
 
     separates: tuple[str, str]
     what: Text
-    repetitions: int
-    odds: float
+    repetitions: int  # how often to measure each set-up
+    odds: float  # of the true one of the two over the other that are then to be expected
 
 
 def suggestions(plan: NextPlan | None, title: Text) -> tuple[Suggestion, ...]:

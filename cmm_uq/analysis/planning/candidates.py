@@ -34,7 +34,6 @@ class RelocatedCandidates:
     attitudes: Attitudes
 
     def __call__(self, artefact: Artefact, volume: Volume, count: int) -> tuple[SetUp, ...]:
-        """The first recorded set-up, once, in many places and attitudes."""
         first = artefact.points.select(artefact.points.measurement == artefact.measurement[0])
         pattern, attitude, _ = Pattern.of_recording(first.select(first.repeat == first.repeat.min()))
         return self.like(pattern, attitude, volume, count)

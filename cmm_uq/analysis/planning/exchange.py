@@ -27,14 +27,10 @@ Score = Callable[[Floats], Floats]  # what is to become small, (c,), of informat
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """What a search ends with.
+    """What a search ends with."""
 
-    ``indices`` of the candidates taken, in ascending order; ``after``, ``before`` score with and without them; smaller
-    is better.
-    """
-
-    indices: tuple[int, ...]
-    after: float
+    indices: tuple[int, ...]  # of the candidates taken, in ascending order
+    after: float  # after, before: score with and without them; smaller is better
     before: float
 
 
@@ -81,13 +77,7 @@ def step(score: Score, start: Floats, each: Floats) -> Floats:
 def choose(
     placings_information: Information, start: Floats, score: Score, count: int, *, again: bool = False
 ) -> Selection:
-    """Take ``count`` candidates, greedily, then exchange them one for one until nothing gains.
-
-    Where no single candidate improves the score (nothing is told apart by one set-up alone), the one is taken that shrinks
-    the uncertainty ellipsoid of all effects together most.
-
-    ``start`` (k, k) information of what is there already, certificates included.
-    """
+    """Take ``count`` candidates, greedily, then exchange them one for one; ``start`` (k, k) information already there."""
     again = again or count > len(placings_information.each)
     everything = score_of(
         "D",
@@ -108,7 +98,6 @@ def choose(
 
 
 def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
-    """Scores, infinite for candidates that must not be taken a second time."""
     if not again:
         scores = scores.copy()
         scores[list(taken)] = np.inf
@@ -118,7 +107,6 @@ def _free(scores: Floats, taken: Sequence[int], again: bool) -> Floats:
 def _exchanged(
     placings_information: Information, information: Floats, score: Score, taken: list[int], again: bool
 ) -> tuple[tuple[int, ...], float]:
-    """Exchange one for one, in turn, until a whole round gains nothing."""
     now = float(score(information[None])[0])
     at, unchanged, tries = 0, 0, 0
     while unchanged < len(taken) and tries < _MOST_TRIES:

@@ -31,14 +31,10 @@ _ZERO = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class ExpectedUncertainty:
-    """Standard uncertainties (k,) of each parameter, in its unit.
+    """Standard uncertainties (k,) of each parameter, in its unit."""
 
-    ``u`` of the least-squares estimate, infinite where the set-ups leave it free; as :meth:`PlannedNoise.spread`
-    averages; ``with_prior`` the same when what physics allows is used too.
-    """
-
-    u: Floats
-    with_prior: Floats
+    u: Floats  # of the least-squares estimate, infinite where the set-ups leave it free; as spread averages
+    with_prior: Floats  # the same when what physics allows is used too
 
 
 def expected_uncertainty(model: RecordingModel, noise: PlannedNoise) -> ExpectedUncertainty:
@@ -102,17 +98,13 @@ COMPARED = 10  # repeats that are compared, or one more than the plan has
 
 @dataclass(frozen=True, eq=False)
 class RepeatsRow:
-    """What set-ups tell with a number of repeats.
+    """What set-ups tell with a number of repeats."""
 
-    ``repeats``, ``readings``, ``minutes`` of every point; of all set-ups together; ``u`` (p,) expected of each
-    parameter, in its unit, infinite where it stays free; ``readings_more``, ``minutes_more``, ``u_more`` with one more
-    set-up, which tells as much as they do on average.
-    """
-
-    repeats: int
+    repeats: int  # repeats, readings, minutes: of every point; of all set-ups together
     readings: int
     minutes: float
-    u: Floats
+    u: Floats  # (p,) expected of each parameter, in its unit, infinite where it stays free
+    # readings_more, minutes_more, u_more: with one more set-up, which tells as much as they do on average
     readings_more: float
     minutes_more: float
     u_more: Floats
@@ -120,29 +112,21 @@ class RepeatsRow:
 
 @dataclass(frozen=True, eq=False)
 class RepeatsComparison:
-    """Repeats against set-ups.
+    """Repeats against set-ups."""
 
-    ``unknowns`` p parameters, those without a certificate; ``placings`` how many there are; ``rows`` for 1, 2, …
-    repeats.
-    """
-
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[Unknown, ...]  # p parameters, those without a certificate
     placings: int
-    rows: tuple[RepeatsRow, ...]
+    rows: tuple[RepeatsRow, ...]  # for 1, 2, … repeats
 
     @property
     def enough(self) -> int | None:
-        """Repeats from which on a minute of one more set-up lowers every uncertainty more than one of one more repeat.
-
-        ``None`` where that is so for no number of them in the table.
-        """
+        """Repeats from which on a minute of one more set-up lowers every uncertainty more than one of a repeat."""
         better = [_placing_is_better(one, following) for one, following in pairwise(self.rows)]
         first = len(better) + 1 - [*reversed(better), False].index(False)
         return first if first <= len(better) else None
 
 
 def _placing_is_better(row: RepeatsRow, following: RepeatsRow) -> bool:
-    """Whether the logarithm of every uncertainty falls more in a minute of one more set-up than of the following repeat."""
     there = np.isfinite(row.u)
     by_placing = np.log(row.u[there] / row.u_more[there]) * (following.minutes - row.minutes)
     by_repeat = np.log(row.u[there] / following.u[there]) * (row.minutes_more - row.minutes)

@@ -34,38 +34,30 @@ WEAK = 0.1  # part of the prior variance from which on a parameter counts as wea
 
 @dataclass(frozen=True)
 class Determination:
-    """What to expect of one parameter.
-
-    ``unknown`` the parameter; ``u`` standard uncertainty of its least-squares estimate, in its unit; ``None`` where the
-    set-ups leave it free; ``u_with_prior`` the same when what physics allows is used too; ``u_white`` like ``u``, if
-    the noise were white; ``status`` ``determined``, ``weak`` (the prior says almost as much) or ``free``.
-    """
+    """What to expect of one parameter."""
 
     unknown: Unknown
+    # standard uncertainty of its least-squares estimate, in its unit; None where the set-ups leave it free
     u: float | None
-    u_with_prior: float
-    u_white: float | None
-    status: str
+    u_with_prior: float  # the same when what physics allows is used too
+    u_white: float | None  # like u, if the noise were white
+    status: str  # determined, weak (the prior says almost as much) or free
 
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """What set-ups determine.
+    """What set-ups determine."""
 
-    ``parameters`` of the effects named, and the sizes of the artefact that no certificate gives; ``free`` combinations,
-    each by the keys of its parameters and their parts, that leave every observation as it is; ``singular_values`` of
-    the design whitened by the noise and scaled by the prior standard deviations, largest first; ``alike`` pairs of
-    effects, and their cosine, that could not be told apart; ``absorbed`` effects, not named by the job, that would be
-    taken for some that it names; with the names of these; ``unseen`` effects, not named by the job, of which nothing
-    would show at all.
-    """
-
+    # of the effects named, and the sizes of the artefact that no certificate gives
     parameters: tuple[Determination, ...]
+    # combinations, each by the keys of its parameters and their parts, that leave every observation as it is
     free: tuple[Mapping[tuple[str, str], float], ...]
+    # of the design whitened by the noise and scaled by the prior standard deviations, largest first
     singular_values: Floats
-    alike: tuple[Pair, ...]
+    alike: tuple[Pair, ...]  # pairs of effects, and their cosine, that could not be told apart
+    # effects, not named by the job, that would be taken for some that it names; with the names of these
     absorbed: tuple[tuple[str, tuple[str, ...]], ...]
-    unseen: tuple[str, ...]
+    unseen: tuple[str, ...]  # effects, not named by the job, of which nothing would show at all
 
     @property
     def complete(self) -> bool:
@@ -75,10 +67,7 @@ class Identifiability:
 def identifiability(
     model: RecordingModel, rivals: Sequence[Effect] = (), noise: PlannedNoise | None = None
 ) -> Identifiability:
-    """What the set-ups of a model's artefact determine of its effects, and how rivals would show besides.
-
-    ``noise`` of the recording to be; ``None`` for the white noise that the model states.
-    """
+    """What the set-ups determine of effects, and how rivals would show; ``noise`` ``None``: the model's white noise."""
     values = np.array([unknown.prior_mean for unknown in model.unknowns])
     linear = model.linearised(values)
     k, free = len(linear.unknowns), linear.freedoms.dense()

@@ -32,15 +32,11 @@ _HELD = 1e12
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """Information of set-ups, one matrix each.
-
-    ``unknowns`` k of them, effects first; ``each`` (c, k, k) of every set-up; there may be more rows than unknowns, of
-    freedoms that all set-ups share; ``prior`` (k, k) of the certificates, without that of the effects.
-    """
+    """Information of set-ups, one matrix each."""
 
     unknowns: tuple[Unknown, ...]
-    each: Floats
-    prior: Floats
+    each: Floats  # (c, k, k) of every set-up; there may be more rows than unknowns, of freedoms that all set-ups share
+    prior: Floats  # (k, k) of the certificates, without that of the effects
 
     def where(self, effects: Sequence[Effect]) -> list[int]:
         names = {effect.name for effect in effects}
@@ -77,10 +73,7 @@ def recording_information(setting: Setting, points: Points, also: tuple[Effect, 
 
 
 def gram(model: RecordingModel, values: Floats, noise: PlannedNoise | None = None) -> Floats:
-    """Information (k, k) of all that a model's recording says about the parameters (k,), without any prior.
-
-    ``noise`` in its typical sizes; ``None`` for the white noise that the model states.
-    """
+    """Information (k, k) of a recording about the parameters, without a prior; ``noise`` ``None``: the model's white noise."""
     white = _white(model, values, noise)
     return np.asarray(white.T @ white, dtype=np.float64)
 
@@ -134,18 +127,15 @@ def _sigma(model: RecordingModel, noise: PlannedNoise | None) -> float:
 SEEN = 1e-6
 """Part of an effect's information, of what it would be if nothing else were fitted, below which rounding hides it."""
 
-FAINT = 1.0
-"""Information, for an effect of its prior standard deviation, below which it does not stand out of the noise."""
-
+FAINT = (
+    1.0  # Information, for an effect of its prior standard deviation, below which it does not stand out of the noise
+)
 _RIDGE = 1e-13
 _PART = 0.1  # share from which on a column counts as part of what looks like another
 
 
 def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> Floats:
-    """Information (..., r, r) on rivals once the base (rows) is fitted: the Schur complement.
-
-    ``information`` (..., k, k).
-    """
+    """Information (..., r, r) on rivals once the base (rows) is fitted: the Schur complement. ``information`` (..., k, k)."""
     rival, fitted = list(rivals), list(base)
     own = information[..., rival, :][..., :, rival]
     if not fitted:
@@ -160,11 +150,7 @@ def left_of(information: Floats, rivals: Sequence[int], base: Sequence[int]) -> 
 
 
 def cosines(left: Floats, alone: Floats) -> Floats:
-    """Absolute cosines (..., r, r) between effects; 1 on the diagonal, and with an effect that is not seen.
-
-    ``left`` (..., r, r) information on them, see :func:`left_of`; ``alone`` (..., r) information on each if nothing
-    else were fitted.
-    """
+    """Absolute cosines (..., r, r) of effects from what is left, 1 where unseen; ``alone`` (..., r) with nothing else."""
     size = np.einsum("...ii->...i", left)
     seen = visible(left, alone)
     root = np.sqrt(np.where(seen, size, 1.0))
@@ -179,10 +165,7 @@ def visible(left: Floats, alone: Floats) -> NDArray[np.bool_]:
 
 
 def imitators(information: Floats, row: int, base: Sequence[int]) -> list[int]:
-    """Rows of the base that together look like an effect that they hide, those that matter.
-
-    By least squares of the effect's column on those of the base; of many solutions the smallest.
-    """
+    """Rows of the base that together look like an effect: least squares of its column on theirs, the smallest solution."""
     fitted = list(base)
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / scale[:, None] / scale[None, :]

@@ -26,17 +26,13 @@ _LEAST_RATIO = 0.02  # ratio to the reading noise below which a component does n
 
 @dataclass(frozen=True, eq=False)
 class PlannedNoise:
-    """What is known of the noise before anything is measured.
+    """What is known of the noise before anything is measured."""
 
-    ``reading`` standard deviation of a reading along each axis, mm; ``placing``, ``growth`` of a set-up offset, and of
-    what grows, at the longest length, mm; ``None`` where nothing is known; ``longest`` that length, mm; ``None`` where
-    it is the longest of whatever is planned.
-    """
-
-    reading: tuple[float, float, float]
+    reading: tuple[float, float, float]  # standard deviation of a reading along each axis, mm
+    # placing, growth: of a set-up offset, and of what grows, at the longest length, mm; None where nothing is known
     placing: float | None = 0.0
     growth: float | None = 0.0
-    longest: float | None = None
+    longest: float | None = None  # that length, mm; None where it is the longest of whatever is planned
 
     @property
     def coordinate(self) -> float:
@@ -94,10 +90,7 @@ def white_noise(model: RecordingModel) -> PlannedNoise:
 
 
 def uncorrelated(model: RecordingModel, values: Floats, noise: PlannedNoise | None) -> LinearModel:
-    """The model about parameters (k,) in observations of which each has the noise of one reading, and none is correlated.
-
-    ``noise`` ``None`` for white noise.
-    """
+    """The model about parameters (k,) in uncorrelated observations with the noise of one reading each."""
     linear = model.linearised(values)
     if noise is None:
         return linear
@@ -121,7 +114,6 @@ def _prior(component: str, sigma: float) -> tuple[Floats, Floats]:
 
 @cache
 def _half_cauchy(absent: float, scale: float) -> tuple[Floats, Floats]:
-    """Nodes and weights: Gauss and Legendre in the logarithm, and the two ends, of which hardly anything is left."""
     low, high = np.log(_LEAST_RATIO), np.log(LARGEST_RATIO)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     ratio = np.exp(low + 0.5 * (high - low) * (nodes + 1))

@@ -155,7 +155,6 @@ def append(recorded: Points, placings: Sequence[SetUp]) -> Points:
 
 
 def _concatenated(parts: Sequence[Points]) -> Points:
-    """All parts with the columns that every one of them has."""
     names = [name for name in parts[0].columns if all(name in part.columns for part in parts)]
     return Points(
         np.vstack([p.xyz for p in parts]), np.concatenate([p.measurement for p in parts]),

@@ -27,14 +27,10 @@ ASSUMED_NOISE_UM = 1.0  # standard uncertainty of a coordinate where the job sta
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What there is before better set-ups are searched for.
+    """What there is before better set-ups are searched for."""
 
-    ``artefact`` at the set-ups of a recording or of a ready plan; ``again`` the first set-up of the recording, to be
-    set up elsewhere; ``None`` without a recording.
-    """
-
-    artefact: Artefact
-    again: SetUp | None
+    artefact: Artefact  # at the set-ups of a recording or of a ready plan
+    again: SetUp | None  # the first set-up of the recording, to be set up elsewhere; None without a recording
 
 
 @dataclass(frozen=True)
@@ -97,10 +93,7 @@ class Setting:
         return self.volume.machine
 
     def sized(self, points: Points) -> Setting:
-        """The same with the artefact's length as these points show it, where its certified figures stand in the recording.
-
-        Without it each set-up would take the longest distance of its own for the one that the certificate speaks of.
-        """
+        """The same with the artefact's length as these points show it, where its certified figures stand in the recording."""
         if not self.artefact.with_references or self.artefact.length_mm is not None:
             return self
         longest = self.observed(points).sizes[0].nominal
@@ -116,10 +109,7 @@ class Setting:
         return self.observe(self.artefact, points)
 
     def rivals(self, points: Points) -> tuple[Effect, ...]:
-        """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here.
-
-        Effects with a nonlinear parameter are left out: how well one is seen depends on its value.
-        """
+        """Effects that the job does not name: those that the plan lists, else all of the first tier that could act here."""
         named = {effect.name for effect in self.named}
         if self.plan.rivals is not None:
             where = "job.toml [plan] rivals"
@@ -141,7 +131,6 @@ class Setting:
 
 
 def _noise(job: Job) -> PlannedNoise:
-    """What an earlier recording showed, and else what the job states."""
     plan, stated = job.facts.plan, job.facts.recording.u_coordinate_um
     name = results_named(plan.noise_from)
     if name is None:

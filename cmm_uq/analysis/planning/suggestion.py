@@ -66,13 +66,10 @@ class _Group:
 
 @dataclass(frozen=True, eq=False)
 class _Information:
-    """Information of the recording (k, k), of each candidate (c, k, k) and of certificates (k, k).
-
-    ``names`` (k,) says whose rows they are, ``fitted`` which of them the diagnosis fits.
-    """
+    """Information of the recording (k, k), of each candidate (c, k, k) and of certificates (k, k)."""
 
     told: Information
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # (k,) says whose rows they are, fitted which of them the diagnosis fits
     fitted: frozenset[str]
     recorded: Floats
 
@@ -93,11 +90,7 @@ def next_plan(
     plan: PlanFacts | None = None,
     goals: Sequence[DetectionGoal] = (),
 ) -> NextPlan | None:
-    """The fewest set-ups, within the machine's travel or the recorded volume, that part all that cannot be told apart.
-
-    Gives plan, ``None`` where nothing is to be parted or shown, or no set-up helps. What it reaches of what is wanted
-    it says.
-    """
+    """The fewest set-ups that part all that cannot be told apart; ``None`` where nothing is to be parted or none helps."""
     groups = _groups(diagnosis)
     if not (groups or goals) or planning is None or planning.elsewhere is None:
         return None
@@ -133,7 +126,6 @@ def next_plan(
 
 
 def _groups(diagnosis: Diagnosis) -> list[_Group]:
-    """What cannot be told apart, with the odds by which the diagnosis says so."""
     found = []
     combinations_found = diagnosis.search.combinations
     index = {str.__str__(e.name): i for i, e in enumerate(diagnosis.search.first.explanations)}
@@ -148,10 +140,7 @@ def _groups(diagnosis: Diagnosis) -> list[_Group]:
 
 
 def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
-    """Of a reading, which repeats average, and of a set-up, which they do not, over that of a coordinate as it was found.
-
-    Without repeats a recording does not tell one from the other: each then has half.
-    """
+    """Of a reading, which repeats average, and of a set-up, over that of a coordinate; each half without repeats."""
     noise, points = diagnosis.noise, diagnosis.after.artefact.points
     if int(points.group.max()) + 1 == len(np.unique(points.measurement)):
         return 0.5, 0.5
@@ -160,7 +149,6 @@ def _variances(diagnosis: Diagnosis) -> tuple[float, float]:
 
 
 def _with_all(after: RecordingModel, names: Sequence[str]) -> RecordingModel:
-    """The model with further effects, periods as found or the longest."""
     shape = dict(after.shapes)
     for name in names:
         effect = after.artefact.acting(every()[name])
@@ -197,12 +185,10 @@ def _information(
 
 
 def _sizes(after: RecordingModel, groups: Sequence[_Group]) -> dict[tuple[str, str], Floats]:
-    """Size of each effect of each group, by its first and its own name, without the others of the group."""
     return {(group.names[0], name): _size(after, name, group.names) for group in groups for name in group.names}
 
 
 def _size(after: RecordingModel, name: str, group: Sequence[str]) -> Floats:
-    """Size at which one effect of a group, without the others, explains the recording, over its prior standard deviation."""
     others = tuple(effect for effect in after.effects if effect.name not in group)
     model = _with_all(replace(after, effects=others), [name])
     try:
@@ -217,17 +203,13 @@ def _size(after: RecordingModel, name: str, group: Sequence[str]) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Aims:
-    """What a plan shall reach.
+    """What a plan shall reach."""
 
-    ``known`` information of the recording and of candidates; ``groups`` of effects to part; ``wanted`` effects to show;
-    ``sizes`` of the effects of groups; ``variances`` of a reading and of a set-up, over that of a coordinate.
-    """
-
-    known: _Information
+    known: _Information  # information of the recording and of candidates
     groups: Sequence[_Group]
     wanted: tuple[DetectionGoal, ...]
     sizes: Mapping[tuple[str, str], Floats]
-    variances: tuple[float, float]
+    variances: tuple[float, float]  # of a reading and of a set-up, over that of a coordinate
     _start: dict[tuple[int, int, int], float] = field(default_factory=dict)
 
     def added(self, repeats: int) -> Floats:
@@ -318,7 +300,6 @@ class _Aims:
 
 
 def _within_reach(aims: _Aims) -> tuple[Selection, int] | None:
-    """The plan for all aims but effects to show that would need too many set-ups, the one that needs most first."""
     found = _fewest(aims)
     while found is not None and found[0].after > 0 and aims.wanted:
         shown = aims.amplitudes(aims.after(*found)[None], aims.wanted)[0]

@@ -23,16 +23,12 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Volume:
-    """Room for set-ups.
-
-    ``machine`` whose readings they are; ``box`` (3, 2) lowest and highest reading of each axis that points may have,
-    mm; ``heights`` of the artefact's middle, z readings, mm; ``directions`` (d, 3) unit vectors that fixtures allow;
-    none means any.
-    """
+    """Room for set-ups."""
 
     machine: Machine
-    box: Floats
-    heights: tuple[float, float] = (-np.inf, np.inf)
+    box: Floats  # (3, 2) lowest and highest reading of each axis that points may have, mm
+    heights: tuple[float, float] = (-np.inf, np.inf)  # of the artefact's middle, z readings, mm
+    # (d, 3) unit vectors that fixtures allow; none means any
     directions: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     @classmethod
@@ -144,9 +140,10 @@ def _turns(body: Floats) -> list[tuple[Text, Floats]]:
     ends: list[tuple[Text, Floats]] = [(say("ends exchanged"), _about(2, 2))]
     if extent[1] < _FLAT * extent[0]:
         return ends
+    # about the normal
     quarters: list[tuple[Text, Floats]] = [
         (say("turned by {angle:.0f}°", angle=90.0 * quarter), _about(2, quarter)) for quarter in (1, 2, 3)
-    ]  # about the normal
+    ]
     return [*quarters, (say("turned over"), _about(0, 2))]
 
 
@@ -161,6 +158,5 @@ def _about(axis: int, quarters: int) -> Floats:
 
 
 def _held(body: Floats, attitude: Floats, volume: Volume) -> bool:
-    """Whether a fixture holds it so: a bar along its length, anything else by its normal."""
     thin = np.ptp(body, axis=0)[1] < _FLAT * np.ptp(body, axis=0)[0]
     return volume.allows(attitude[:, 0] if thin else attitude[:, 2])

@@ -124,7 +124,6 @@ def _time(points: Points, balls: bool) -> Iterator[Finding]:
 
 
 def _moments(points: Points, time: Floats) -> Iterator[Finding]:
-    """Moments that alone break the order of a clock, and keep it in milliseconds, minutes or hours."""
     if len(time) < 8:
         return
     before, after = np.maximum.accumulate(time), np.minimum.accumulate(time[::-1])[::-1]
@@ -150,7 +149,6 @@ def _moments(points: Points, time: Floats) -> Iterator[Finding]:
 
 
 def _stuck(points: Points) -> Iterator[Finding]:
-    """A column that changed from set-up to set-up, and then stood still to the last digit for many of them."""
     for column, values in _measured(points):
         firsts = _firsts(points.group) if _constant_in_groups(points.group, values) else np.arange(len(values))
         sequence = values[firsts]
@@ -175,7 +173,6 @@ def _stuck(points: Points) -> Iterator[Finding]:
 
 
 def _slipped(points: Points) -> Iterator[Finding]:
-    """A column that belongs to whole set-ups and changes in the middle of each: moved by a row against the others."""
     firsts = _firsts(points.group)
     sizes = np.diff([*firsts, len(points)])
     if len(firsts) < _STUCK_ROWS or sizes.min() < 2 or not _in_blocks(points.group):
@@ -197,13 +194,11 @@ def _slipped(points: Points) -> Iterator[Finding]:
 
 
 def _of_placings(values: Floats, firsts: Ints, sizes: Ints) -> bool:
-    """Whether a column is the same for all points of each set-up, but for one at the edge, and changes between them."""
     constant = [np.ptp(values[a : a + k]) == 0 for a, k in zip(firsts, sizes, strict=True)]
     return bool(np.sum(constant) >= len(firsts) - 1 and np.mean(np.diff(values[firsts]) != 0) >= _MOVING)
 
 
 def _approach(points: Points) -> Iterator[Finding]:
-    """A probe travels against the outward normal."""
     names = [f"approach_{a}" for a in AXES]
     if not all(name in points.columns for name in (*names, "nx", "ny", "nz")):
         return
@@ -231,7 +226,6 @@ def _approach(points: Points) -> Iterator[Finding]:
 
 
 def _measured(points: Points) -> Iterator[tuple[str, Floats]]:
-    """Columns of sensors, which change as they like."""
     for column in (*TEMPERATURES, "pressure_hpa", "humidity_pct"):
         if column in points.columns:
             yield column, points.columns[column]

@@ -107,7 +107,6 @@ class DamageSearch:
         return replace(finding(cause.kind, self.points, rows, told, cause.column), set_aside=True, rows=lost)
 
     def _lost_with(self, rows: Ints) -> Ints:
-        """Rows that cannot be used without these: the other end of a bar, the other corners of a triangle."""
         return np.flatnonzero(np.isin(self.points.group, self.points.group[rows])) if self.shape.together else rows
 
     def _placings(self, rows: Ints) -> list[int]:
@@ -160,7 +159,6 @@ class DamageSearch:
         return say("{one} and {other} are exchanged: exchange their coordinates", one=one, other=other)
 
     def _blocks(self) -> Iterator[Damage]:
-        """Measurements, runs of rows and repeats that fit as a whole once one mistake is undone in all their rows."""
         both = (*row_mistakes(self.shape), *block_mistakes(self.shape))
         for rows in self._candidates():
             if self._open[rows].mean() >= _PART and (cause := self._first(both, rows)) is not None:
@@ -192,7 +190,6 @@ class DamageSearch:
                 yield cause
 
     def _stuck(self, row: int) -> Damage | None:
-        """One coordinate repeated from the row before, digit for digit, while the others moved on."""
         same = self.points.xyz[row] == self.points.xyz[row - 1] if row else np.zeros(3, dtype=bool)
         if same.sum() != 1:
             return None
@@ -211,7 +208,6 @@ class DamageSearch:
         return None
 
     def _fit(self, rows: Ints, xyz: Floats, reference: Floats, edges: int = 0) -> bool:
-        """Whether these rows fit as well as the sound ones, inside the travel as these are, where their repeats are."""
         after = self.shape.misfit(xyz, reference, self._placings(rows))[rows]
         return (
             int(np.sum(after > self._fine)) <= edges
@@ -220,7 +216,6 @@ class DamageSearch:
         )
 
     def _near_repeats(self, rows: Ints, xyz: Floats) -> int:
-        """How many of some rows lie where sound repeats of the same points lie, or have none."""
         near, points = 0, self.points
         for row in rows:
             same = (points.measurement == points.measurement[row]) & (points.point == points.point[row]) & ~self.bad
@@ -229,7 +224,6 @@ class DamageSearch:
         return near
 
     def _numbered_otherwise(self, rows: Ints) -> bool:
-        """Whether a set-up that does not fit by itself has the artefact's distances, in another order."""
         if not self.shape.names[2:] or self.shape.names[0] == "nx" or len(rows) > _MOST_BALLS:
             return False
         xyz, reference = self.points.xyz[rows], self.shape.reference[rows]
@@ -256,10 +250,7 @@ _ABSURD = (1.0, 2e4)  # mm; a bar shorter or longer than this is in another unit
 def coordinate_findings(
     points: Points, shape: ArtefactShape, observe: Observed, set_aside: Collection[int], where: str
 ) -> list[Finding]:
-    """Damaged coordinates, each with the rows to leave out.
-
-    ``where`` the recording's name, for messages.
-    """
+    """Damaged coordinates, each with the rows to leave out. ``where`` the recording's name, for messages."""
     _refuse_absurd_size(shape, where)
     search = DamageSearch(points, shape)
     counted = ~np.isin(points.measurement, list(set_aside))
@@ -281,7 +272,6 @@ def coordinate_findings(
 
 
 def _refuse_absurd_size(shape: ArtefactShape, where: str) -> None:
-    """A bar without a certificate has no length to compare, but none is shorter than a millimetre, or twenty metres long."""
     low, high = _ABSURD
     if np.isfinite(shape.size) or not shape.is_bar or low <= shape.extent <= high:
         return
@@ -294,7 +284,6 @@ def _refuse_absurd_size(shape: ArtefactShape, where: str) -> None:
 
 
 def _refuse_whole(search: DamageSearch, where: str) -> None:
-    """Refuse a mistake that concerns the whole recording, or a whole column of it."""
     points, shape = search.points, search.shape
     bad = int(search.bad.sum())
     told = _missed(search)
@@ -321,7 +310,6 @@ def _refuse_whole(search: DamageSearch, where: str) -> None:
 
 
 def _astray(points: Points) -> float:
-    """Part of the points whose readings lie outside the travel."""
     return float(np.any(outside_travel(points), axis=1).mean())
 
 
@@ -331,7 +319,6 @@ def _missed(search: DamageSearch) -> str:
 
 
 def _reversed_bars(points: Points, shape: ArtefactShape) -> list[Finding]:
-    """Repeats of a bar whose balls are numbered the other way round than in the others."""
     if not shape.together or shape.reference.shape[1]:
         return []
     ends = np.array([rows[np.argsort(points.point[rows])] for rows in shape.rows])

@@ -14,22 +14,17 @@ from cmm_uq.base.points import Floats, Ints, Points
 
 @dataclass(frozen=True)
 class Finding:
-    """Something odd in a recording.
+    """Something odd in a recording."""
 
-    ``kind`` ``impossible``, ``duplicate``, ``repeated block``, ``swapped``, ``reversed``, ``unit``, ``sign``,
-    ``exchanged coordinates``, ``shifted column``, ``stuck`` or ``outlier``; ``measurements`` that it concerns;
-    ``lines`` of the file; ``why`` in words, and how to mend it; ``column`` that it concerns, if one; ``set_aside``
-    whether the estimates leave these rows, or this column, out; ``rows`` of the recording, from 0, that are left out
-    with it.
-    """
-
+    # impossible, duplicate, repeated block, swapped, reversed, unit, sign, exchanged coordinates, shifted column, stuck
+    # or outlier
     kind: str
     measurements: tuple[int, ...]
     lines: tuple[int, ...]
-    why: Text
+    why: Text  # in words, and how to mend it
     column: str | None = None
-    set_aside: bool = False
-    rows: tuple[int, ...] = ()
+    set_aside: bool = False  # whether the estimates leave these rows, or this column, out
+    rows: tuple[int, ...] = ()  # of the recording, from 0, that are left out with it
 
 
 def finding(kind: str, points: Points, rows: NDArray[np.bool_] | Ints, why: Text, column: str | None = None) -> Finding:
@@ -54,7 +49,6 @@ def at_lines(points: Points, rows: Ints) -> Text:
 
 
 def _which(numbers: Sequence[int]) -> Text:
-    """Several numbers, in ascending order: from and to, all, or the first six of them."""
     if len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
         return say("{first} to {last}", first=numbers[0], last=numbers[-1])
     shown = [number(n) for n in numbers[:6]]

@@ -25,20 +25,15 @@ COORDINATES = tuple(f"{a}_mm" for a in AXES)
 
 @dataclass(frozen=True, eq=False)
 class Mistake:
-    """One mistake, and its undoing.
-
-    ``kind`` of finding; ``what`` the mistake, as a sentence without its full stop; ``fix`` what to do; ``columns`` that
-    it concerns; ``undo`` makes coordinates (k, 3), or references (k, j), as they would be without it; ``edges`` rows
-    that it cannot mend.
-    """
+    """One mistake, and its undoing."""
 
     kind: str
-    what: Text
+    what: Text  # the mistake, as a sentence without its full stop
     fix: Text
     columns: tuple[str, ...]
-    undo: Callable[[Floats], Floats]
+    undo: Callable[[Floats], Floats]  # makes coordinates (k, 3), or references (k, j), as they would be without it
     of_references: bool = False
-    edges: int = 0
+    edges: int = 0  # rows that it cannot mend
 
     def apply(self, xyz: Floats, reference: Floats) -> tuple[Floats, Floats]:
         """Coordinates (k, 3) and references (k, j) as they would be without it."""
@@ -120,7 +115,6 @@ def _shift(
 
 
 def _from_the_other_end(reference: Floats) -> Floats:
-    """The certified distance of the first face for the last, of the second for the last but one, and so on."""
     faces, rank = np.unique(reference, return_inverse=True)
     return np.asarray(faces[::-1][rank].reshape(reference.shape), dtype=np.float64)
 

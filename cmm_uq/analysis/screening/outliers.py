@@ -14,10 +14,7 @@ _SHARE = 2 / 3  # of the points from the first to the last outlier of a repeat, 
 
 
 def moved_stretches(points: Points, outliers: Ints) -> list[Ints]:
-    """Outliers of one repeat that are most of the points from the first to the last of them.
-
-    Gives rows of each stretch, in the order of their points.
-    """
+    """Outliers of one repeat that are most of the points from the first to the last of them."""
     found = []
     for group in np.unique(points.group[outliers]):
         run = np.flatnonzero(points.group == group)
@@ -41,10 +38,7 @@ def stretch_words(points: Points, stretch: Ints, times: Sequence[float]) -> Text
 
 
 def recurring_points(points: Points, outliers: Ints) -> list[Ints]:
-    """Outliers of points that are off in most of their readings, and in several set-ups.
-
-    Gives rows of each point, in the order of the points' numbers.
-    """
+    """Outliers of points that are off in most of their readings, and in several set-ups."""
     found = []
     for point in np.unique(points.point[outliers]):
         rows = outliers[points.point[outliers] == point]

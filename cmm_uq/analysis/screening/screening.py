@@ -28,10 +28,7 @@ from cmm_uq.maths.inference.linear_model import LinearModel
 
 
 def copied_measurements(points: Points) -> dict[int, int]:
-    """Groups that repeat one of another measurement to the last digit, with that other (see :attr:`Points.copies`).
-
-    A repeat that repeats another of its own measurement is none: with a coarse display that happens honestly.
-    """
+    """Groups that repeat one of another measurement to the last digit, with that other (see :attr:`Points.copies`)."""
     return {
         later: original
         for later, original in points.copies.items()
@@ -57,12 +54,9 @@ _REFUSED_WHOLE = ("unit", "sign", "shifted column")
 
 @dataclass(frozen=True, eq=False)
 class ScreenedRecording:
-    """A recording that may be fitted, and what screening found in it.
+    """A recording that may be fitted, and what screening found in it."""
 
-    ``points`` without the rows and columns that are left out; ``findings`` all of them.
-    """
-
-    points: Points
+    points: Points  # without the rows and columns that are left out
     findings: tuple[Finding, ...]
 
 
@@ -70,11 +64,7 @@ def screen_recording(
     points: Points, facts: ArtefactFacts, screening: Screening | None, observe: Observe, *, needed: Collection[str],
     set_aside: Collection[int], where: str,
 ) -> ScreenedRecording:  # fmt: skip
-    """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it.
-
-    ``screening`` what its kind asks of a recording; ``None`` when it asks nothing; ``where`` the recording's name, for
-    messages.
-    """
+    """A recording without what cannot be used, and all that is odd in it; before an artefact is made of it."""
     shape = screening.shape_of(facts, points) if screening else None
     made = partial(observe, facts, where=where)
     damaged = coordinate_findings(points, shape, made, set_aside, where) if shape else []
@@ -97,10 +87,7 @@ def with_sound_sensors(points: Points, findings: Sequence[Finding]) -> Points:
 def screen(
     points: Points, *, needed: Collection[str], set_aside: Collection[int], where: str, balls: bool = False
 ) -> tuple[Finding, ...]:
-    """All that is odd in a recording without regard to its artefact's shape.
-
-    ``where`` the recording's name, for messages.
-    """
+    """All that is odd in a recording without regard to its artefact's shape. ``where`` the recording's name, for messages."""
     impossible = impossible_values(points, balls=balls)
     for found in impossible:
         if found.column in needed:
@@ -215,13 +202,11 @@ def _measurement(points: Points, group: int) -> int:
 
 
 def _aside(item: Finding, set_aside: Collection[int]) -> bool:
-    """Whether the estimates leave out what was found: a copy, or a measurement that the job leaves out."""
     *others, last = item.measurements
     return last in set_aside or (item.kind == "duplicate" and not any(other in set_aside for other in others))
 
 
 def _reversal(item: Finding, points: Points, needed: Collection[str]) -> Finding:
-    """A bar numbered the other way round is left out where the model uses what was recorded beside each ball."""
     if item.kind != "swapped" or item.rows:
         return item
     rows = np.flatnonzero(np.isin(points.lines, item.lines)) if len(points.lines) else np.zeros(0, dtype=np.int64)
@@ -242,18 +227,15 @@ def _reversal(item: Finding, points: Points, needed: Collection[str]) -> Finding
 
 
 def _left_out(item: Finding) -> Finding:
-    """Copies of a block are left out, and columns of sensors that cannot be trusted."""
     return replace(item, set_aside=item.set_aside or bool(item.rows) or item.column in SENSORS)
 
 
 def _told(item: Finding, damaged: Sequence[Finding]) -> bool:
-    """Whether a reading outside the travel is told already as what it is."""
     lines = {line for other in damaged for line in other.lines}
     return item.kind == "impossible" and item.column in ("x_mm", "y_mm", "z_mm") and set(item.lines) <= lines
 
 
 def _hint(points: Points, axis: int) -> Text:
-    """What would bring most readings of an axis inside: the origin, a sign, another axis."""
     if outside_travel(points)[:, axis].mean() < 0.5:
         return NOTHING
     low, high = points.machine.travel_mm[axis]

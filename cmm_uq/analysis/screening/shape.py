@@ -117,7 +117,6 @@ def body_misfit(xyz: Floats, body: Floats, _: float) -> Floats:
 
 
 def _broad(points: Floats, samples: Ints) -> Ints:
-    """Samples of three that span a triangle: three on a line leave a body free to turn about it."""
     spanned = points[samples]
     areas = np.linalg.norm(np.cross(spanned[:, 1] - spanned[:, 0], spanned[:, 2] - spanned[:, 0]), axis=1)
     return np.asarray(samples[areas >= 0.2 * areas.max(initial=0.0)], dtype=np.int64)
@@ -189,7 +188,6 @@ def samples_of(count: int, size: int) -> Ints:
 
 
 def _some(count: int) -> Ints:
-    """Rows by which samples are judged: all of them, or as many as decide as well."""
     return np.unique(np.linspace(0, count - 1, min(count, _JUDGED)).astype(np.int64))
 
 

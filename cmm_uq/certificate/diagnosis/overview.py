@@ -110,7 +110,6 @@ def _sure(result: JobDiagnosis) -> Text:
 
 
 def _otherwise(d: Diagnosis) -> Text:
-    """What remains as probable that leaves out an effect that is asserted."""
     asserted = {item.effect for item in d.effects}
     others = [one for one in d.remaining.rivals if one.probability >= _TOLD and not asserted <= set(one.effects)]
     each = [

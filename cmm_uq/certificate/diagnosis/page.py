@@ -99,7 +99,6 @@ def diagnosis_sections(result: JobDiagnosis) -> tuple[Section, ...]:
 
 
 def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
-    """What is to be done first, what it rests on behind it, long tables last."""
     noise = noise_words(result.diagnosis, stated_um(result))
     sections = (
         Section(say("What was left out"), _left_out(result)),
@@ -118,7 +117,6 @@ def _sections(result: JobDiagnosis) -> tuple[Section, ...]:
 
 
 def _explained_by(result: JobDiagnosis) -> tuple[Text, Text]:
-    """What the recording is compared with, in short."""
     if result.simulated is None:
         return say("Effects that the job names"), commas(titles(result.job.facts.model.effects)) or say("none")
     return say("Compared with the simulation"), commas(names(result.simulated.files))
@@ -143,7 +141,6 @@ def _left_out(result: JobDiagnosis) -> tuple[Block, ...]:
 
 
 def _effect(result: JobDiagnosis, item: OmittedEffect) -> Facts:
-    """One effect: what it is, how large, what to look at, how sure."""
     d = result.diagnosis
     size = size_of(effect_of(item.effect, d.after.effects), item.parameters)
     told = (say("{size:capital}.", size=size), other_periods(item), contained(result.simulated, item.effect))
@@ -157,7 +154,6 @@ def _effect(result: JobDiagnosis, item: OmittedEffect) -> Facts:
 
 
 def _consistent(result: JobDiagnosis) -> tuple[Block, ...]:
-    """The residuals of a recording that agrees with its model: within their uncertainty, and no other picture."""
     d = result.diagnosis
     if d.verdict != "consistent":
         return ()
@@ -176,7 +172,6 @@ def _consistent(result: JobDiagnosis) -> tuple[Block, ...]:
 
 
 def _before_after(result: JobDiagnosis) -> tuple[Block, ...]:
-    """Where something was found: each observation before and after, and what is gained."""
     d = result.diagnosis
     if not d.effects:
         return ()
@@ -227,7 +222,6 @@ def _label_before(result: JobDiagnosis) -> Text:
 
 
 def _changes(result: JobDiagnosis) -> Table | None:
-    """Estimates of the effects that the job names, before and after: how biased they were."""
     d = result.diagnosis
     if not d.effects:
         return None
@@ -253,7 +247,6 @@ def _changes(result: JobDiagnosis) -> Table | None:
 
 
 def _title_of(key: tuple[str, str], model: RecordingModel) -> Text:
-    """A parameter of an effect, or a size of the artefact, in words."""
     owner, name = key
     if owner == ARTEFACT:
         return next(size.title for size in model.artefact.sizes if size.name == name)
@@ -261,7 +254,6 @@ def _title_of(key: tuple[str, str], model: RecordingModel) -> Text:
 
 
 def _consequences(result: JobDiagnosis) -> tuple[Block, ...]:
-    """Figures and decisions of the recording, and of the same recording corrected for what was left out."""
     if result.consequences is None:
         return ()
     blocks: list[Block] = []

@@ -141,7 +141,6 @@ def _shown(plan: NextPlan, artefact: Artefact) -> Table:
 
 
 def _acting(change: DetectionChange, artefact: Artefact) -> Effect:
-    """The effect with the sizes that this artefact allows it, where it is a fault of its own."""
     return artefact.acting(every()[change.effect])
 
 
@@ -243,7 +242,6 @@ def explanation(rival: Rival) -> Text:
 
 
 def _cost_rows(result: JobDiagnosis) -> Iterator[tuple[Text, ...]]:
-    """Of what the job names, of every figure and of every decision: under each explanation, and averaged."""
     remaining, costs = result.diagnosis.remaining, result.costs
     for effect, parameters in remaining.averaged.items():
         for name, quantity in parameters.items():

@@ -55,7 +55,6 @@ def effects_section(proof: DiagnosisProof) -> Section:
 
 
 def _smallest(proof: DiagnosisProof, reach: Reach) -> tuple[Text, Text]:
-    """Smallest size that is found in nine of ten, and its interval."""
     found = proof.judgement.by_strength
     if found is None or reach.amplitude(found.often) is None:
         return DASH, DASH
@@ -79,7 +78,6 @@ def unseen_section(proof: DiagnosisProof) -> Section:
 
 
 def _unseen(reaches: tuple[Reach, ...]) -> list[Text]:
-    """Effects that act on what is recorded, and do not show."""
     told = {
         TAKEN: say(
             "Nothing of these shows, for they leave the observations as they are or what the job names takes all:"

@@ -106,19 +106,14 @@ def standing(figure: AcceptanceFigure) -> Text:
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisProof:
-    """A job whose diagnosis was tried on sealed cases.
+    """A job whose diagnosis was tried on sealed cases."""
 
-    ``job`` with the set-ups that cases were drawn on; ``design`` these, with the job's own errors and noise; ``seed``,
-    ``alpha`` of the cases, and rate of false alarms that the diagnosis was asked for; ``truth`` contents of the sealed
-    file; ``records`` what was said of each case, by number; ``judgement`` of all.
-    """
-
-    job: Job
-    design: Design
-    seed: int
+    job: Job  # with the set-ups that cases were drawn on
+    design: Design  # these, with the job's own errors and noise
+    seed: int  # seed, alpha: of the cases, and rate of false alarms that the diagnosis was asked for
     alpha: float
     truth: bytes
-    records: tuple[Mapping[str, Any], ...]
+    records: tuple[Mapping[str, Any], ...]  # what was said of each case, by number
     judgement: ProofJudgement
 
     @property

@@ -24,11 +24,7 @@ TRUTH, RECORDS, LOCK = "truth.json", "cases.jsonl", "lock"
 
 
 class AnswersFolder:
-    """A folder with the sealed truth and the answers so far; this process alone writes to it while it is open.
-
-    ``folder`` that may hold a run which was interrupted; ``truth`` contents of the sealed file: the run is the same if
-    and only if these are.
-    """
+    """A folder with the sealed truth and the answers so far; this process alone writes to it while it is open."""
 
     def __init__(self, folder: Path, truth: bytes) -> None:
         self.folder = folder

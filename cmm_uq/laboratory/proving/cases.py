@@ -36,51 +36,37 @@ WEAKEST, STRONGEST = 3.0, 15.0  # √λ between which hidden causes are drawn
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """An effect of the catalogue that acts and that the job does not name.
+    """An effect of the catalogue that acts and that the job does not name."""
 
-    ``effect``, ``parameters`` its name, and its reported parameters; ``strength`` √λ, with the other one that is hidden
-    projected out too.
-    """
-
-    effect: str
+    effect: str  # effect, parameters: its name, and its reported parameters
     parameters: Mapping[str, float]
-    strength: float
+    strength: float  # √λ, with the other one that is hidden projected out too
 
 
 @dataclass(frozen=True)
 class UnknownCause:
-    """A cause that no catalogue has.
+    """A cause that no catalogue has."""
 
-    ``what`` a function, or a fault of the artefact; ``size_um`` its size; ``strength``, ``left`` √λ of it, and of what
-    the nearest effect of the catalogue leaves of it; ``like`` that effect; empty where none takes anything; ``form`` of
-    a function; ``errors`` of the nodes of the artefact, on the scale of ``size_um``.
-    """
-
-    what: str
+    what: str  # a function, or a fault of the artefact
     size_um: float
-    strength: float
+    strength: float  # strength, left: √λ of it, and of what the nearest effect of the catalogue leaves of it
     left: float
-    like: str
+    like: str  # that effect; empty where none takes anything
     form: FunctionForm | None = None
-    errors: tuple[tuple[float, ...], ...] = ()
+    errors: tuple[tuple[float, ...], ...] = ()  # of the nodes of the artefact, on the scale of size_um
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is true of one case.
+    """What is true of one case."""
 
-    ``number``, ``kind`` which case, and what it hides, one of :data:`KINDS`; ``noise_kind``, ``noise`` of its
-    recording; ``sizes`` true sizes of the artefact, of its certificate's distribution; ``hidden`` effects; ``stranger``
-    what else acts.
-    """
-
-    number: int
+    number: int  # number, kind: which case, and what it hides, one of KINDS
     kind: str
-    noise_kind: str
+    noise_kind: str  # noise_kind, noise: of its recording
     noise: Noise
-    sizes: tuple[float, ...]
+    sizes: tuple[float, ...]  # true sizes of the artefact, of its certificate's distribution
     hidden: tuple[HiddenEffect, ...] = ()
-    stranger: UnknownCause | None = None
+    stranger: UnknownCause | None = None  # what else acts
 
     def as_data(self) -> dict[str, Any]:
         return {**asdict(self), "noise": micrometres(self.noise)}

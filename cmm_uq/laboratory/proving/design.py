@@ -43,18 +43,14 @@ _AXIS_TIMES, _GROWN_TIMES, _DOF, _STEP_TIMES, _SLOW_PART, _WALKED_TIMES = 3.0, 2
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The set-ups that cases are drawn on.
+    """The set-ups that cases are drawn on."""
 
-    ``model`` what the job names, with its artefact in its set-ups; ``values`` (k,) true parameters of what it names,
-    and sizes of the artefact; ``noise`` the job's own; ``cte_per_k`` expansion of the artefact; 0 where it is not
-    stated; ``dates`` recordings of which the observations are differences, each with the noise: two where the artefact
-    was recorded earlier, which is not drawn again.
-    """
-
-    model: RecordingModel
-    values: Floats
+    model: RecordingModel  # what the job names, with its artefact in its set-ups
+    values: Floats  # (k,) true parameters of what it names, and sizes of the artefact
     noise: Noise
-    cte_per_k: float = 0.0
+    cte_per_k: float = 0.0  # expansion of the artefact; 0 where it is not stated
+    # recordings of which the observations are differences, each with the noise: two where the artefact was recorded
+    # earlier, which is not drawn again
     dates: int = 1
     sights: dict[str, Sensitivity] = field(default_factory=dict)
 
@@ -152,7 +148,6 @@ class Design:
     def _hidden(
         self, sight: Sensitivity, count: int, seed: int, rank: int, random: np.random.Generator
     ) -> tuple[HiddenEffect, ...]:
-        """One or two effects, the first of them each in its turn."""
         if not self.effects:
             return ()
         order = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(3,))).permutation(len(self.effects))
@@ -187,7 +182,6 @@ class Design:
         return tuple(found)
 
     def _stranger(self, sight: Sensitivity, kind: str, random: np.random.Generator) -> UnknownCause | None:
-        """A cause outside the catalogue of which no single effect of it leaves too little to be seen."""
         faults = tuple(possible_faults(self.model))
         for _ in range(_ATTEMPTS):
             what = str(random.choice(FUNCTIONS if kind == cases.OUTSIDE else faults))
@@ -256,7 +250,6 @@ class Design:
 
 
 def _drawn(between: list[tuple[float, float]], random: np.random.Generator) -> tuple[float, ...]:
-    """Nonlinear parameters at random, evenly in their logarithm."""
     return tuple(float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in between)
 
 

@@ -40,23 +40,20 @@ _BINS = (3.0, 4.5, 6.0, 9.0, 12.0, 15.0)
 
 @dataclass(frozen=True)
 class JudgedCase:
-    """One case.
-
-    ``case`` what was true; ``verdict`` what was said; ``refused`` where the diagnosis gave no answer; ``found``,
-    ``alone`` hidden effects that were found, and those of them that no group was named with; ``wrong`` effects that
-    were named wrongly; ``said`` probability of each asserted effect, and whether it acts; ``intervals`` which, as
-    :data:`STATED`; how many hold the truth, and how many there are; ``right`` whether the verdict is; ``heldout_um``
-    rms of predictions of what the fit has not seen, before and after; ``None`` where nothing was asserted.
-    """
+    """One case."""
 
     case: Case
-    verdict: str
+    verdict: str  # what was said; refused where the diagnosis gave no answer
+    # found, alone: hidden effects that were found, and those of them that no group was named with
     found: tuple[str, ...] = ()
     alone: tuple[str, ...] = ()
-    wrong: tuple[str, ...] = ()
-    said: tuple[tuple[float, bool], ...] = ()
-    intervals: tuple[tuple[str, int, int], ...] = ()
+    wrong: tuple[str, ...] = ()  # effects that were named wrongly
+    said: tuple[tuple[float, bool], ...] = ()  # probability of each asserted effect, and whether it acts
+    intervals: tuple[
+        tuple[str, int, int], ...
+    ] = ()  # which, as STATED; how many hold the truth, and how many there are
     right: bool = False
+    # rms of predictions of what the fit has not seen, before and after; None where nothing was asserted
     heldout_um: tuple[float, float] | None = None
 
 
@@ -89,7 +86,6 @@ def judge(
 
 
 def _beside(case: Case, *, whole: bool, apart: bool) -> str:
-    """Beside what the parameters are estimated that the job names."""
     if case.kind == NOTHING:
         return NAMED
     if not whole:
@@ -130,10 +126,7 @@ def _inside(said: Mapping[str, Sequence[float | None]], true: Mapping[str, float
 
 @dataclass(frozen=True, eq=False)
 class ProofJudgement:
-    """All cases together.
-
-    ``cases`` each of them.
-    """
+    """All cases together."""
 
     cases: tuple[JudgedCase, ...]
 
@@ -253,15 +246,12 @@ MET, OPEN, MISSED = "met", "open", "missed"
 
 @dataclass(frozen=True)
 class AcceptanceFigure:
-    """A figure with its limits.
+    """A figure with its limits."""
 
-    ``key``, ``what`` in results.json, and in words; ``rate`` that was counted; ``low``, ``high`` limits of the rate.
-    """
-
-    key: str
+    key: str  # key, what: in results.json, and in words
     what: Text
     rate: Rate
-    low: float
+    low: float  # low, high: limits of the rate
     high: float
 
     @property

@@ -21,15 +21,12 @@ LEVEL = 0.95
 
 @dataclass(frozen=True)
 class Rate:
-    """So many of so many, with the interval of Clopper and Pearson (Biometrika 26 (1934), 404–413).
+    """So many of so many, with the interval of Clopper and Pearson (Biometrika 26 (1934), 404–413)."""
 
-    ``count``, ``of`` how many of how many; ``clusters`` where those come in clusters, such as the intervals of one
-    recording, (count, of) of each: what one cluster says is then worth less than as many that know nothing of each
-    other.
-    """
-
-    count: int
+    count: int  # count, of: how many of how many
     of: int
+    # where those come in clusters, such as the intervals of one recording, (count, of) of each: what one cluster says
+    # is then worth less than as many that know nothing of each other
     clusters: tuple[tuple[int, int], ...] = ()
 
     @classmethod
@@ -50,7 +47,6 @@ class Rate:
 
     @property
     def _effective(self) -> float:
-        """Number of independent ones that say as much."""
         if not self.clusters:
             return float(self.of)
         each = np.array(self.clusters, dtype=np.float64)
@@ -113,15 +109,12 @@ _CURVE = np.linspace(3.0, 15.0, 49)
 
 @dataclass(frozen=True, eq=False)
 class DetectionCurve:
-    """How finding grows with strength.
+    """How finding grows with strength."""
 
-    ``often``, ``interval`` strength found in nine of ten, median and 95 % interval; beyond :data:`LARGEST` it is
-    infinite; ``strengths``, ``curve``, ``low``, ``high`` (p,) strengths, and the probability to be found there, median
-    and 95 % interval.
-    """
-
+    # often, interval: strength found in nine of ten, median and 95 % interval; beyond LARGEST it is infinite
     often: float
     interval: tuple[float, float]
+    # strengths, curve, low, high: (p,) strengths, and the probability to be found there, median and 95 % interval
     strengths: Floats
     curve: Floats
     low: Floats

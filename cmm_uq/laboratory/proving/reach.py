@@ -22,23 +22,17 @@ _TRIALS = 5  # draws of a fault by which it is judged
 
 @dataclass(frozen=True)
 class Reach:
-    """What the set-ups show of an effect under the job's own noise.
+    """What the set-ups show of an effect under the job's own noise."""
 
-    ``effect``, ``title`` its name, and in words; ``standing`` ``drawn``; or why no case hides it; ``parameter``,
-    ``unit`` its first reported parameter; ``per_unit`` √λ of one unit of it; 0 where nothing shows; ``allowed`` largest
-    size that physics allows, in the unit; ``columns`` that it goes by and that the recording has not; ``alike`` another
-    effect that these set-ups hardly tell from it; empty where there is none.
-    """
-
-    effect: str
+    effect: str  # effect, title: its name, and in words
     title: Text
-    standing: str
-    parameter: str
+    standing: str  # drawn; or why no case hides it
+    parameter: str  # parameter, unit: its first reported parameter
     unit: Unit
-    per_unit: float = 0.0
-    allowed: float = 0.0
-    columns: tuple[str, ...] = ()
-    alike: str = ""
+    per_unit: float = 0.0  # √λ of one unit of it; 0 where nothing shows
+    allowed: float = 0.0  # largest size that physics allows, in the unit
+    columns: tuple[str, ...] = ()  # that it goes by and that the recording has not
+    alike: str = ""  # another effect that these set-ups hardly tell from it; empty where there is none
 
     def amplitude(self, strength: float) -> float | None:
         """Size of this strength; ``None`` beyond what physics allows."""
@@ -74,7 +68,6 @@ def reaches(design: Design) -> tuple[Reach, ...]:
 
 
 def _alike(sight: Sensitivity, name: str) -> str:
-    """The other effect that comes nearest to one, where it leaves hardly anything of it."""
     column = sight.candidates[name][0][:, 0]
     length = float(np.linalg.norm(column))
     others = [
@@ -88,16 +81,11 @@ def _alike(sight: Sensitivity, name: str) -> str:
 
 @dataclass(frozen=True)
 class FaultReach:
-    """What the set-ups show of a fault of the artefact.
-
-    ``what`` one of :data:`~cmm_uq.laboratory.proving.unknown_causes.FAULTS`; ``shows`` whether it shows at a size that
-    is reckoned with; ``left`` part of it that the nearest effect of the machine leaves, typically; 0 where nothing
-    shows; ``like`` that effect.
-    """
+    """What the set-ups show of a fault of the artefact."""
 
     what: str
-    shows: bool
-    left: float = 0.0
+    shows: bool  # whether it shows at a size that is reckoned with
+    left: float = 0.0  # part of it that the nearest effect of the machine leaves, typically; 0 where nothing shows
     like: str = ""
 
     @property

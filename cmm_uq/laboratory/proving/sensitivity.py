@@ -28,18 +28,13 @@ _SHAPES = 6  # nonlinear parameters of an effect by which it is judged whether a
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """What observations show under one noise.
+    """What observations show under one noise."""
 
-    ``model``, ``values`` what the job names, and its parameters (k,); ``white`` makes columns (m, b) of the
-    observations white; ``sigma`` standard deviation of what is white, mm; ``taken`` (m, r) orthonormal, what the job
-    names takes of white columns.
-    """
-
-    model: RecordingModel
+    model: RecordingModel  # model, values: what the job names, and its parameters (k,)
     values: Floats
-    white: Callable[[Floats], Floats]
-    sigma: float
-    taken: Floats
+    white: Callable[[Floats], Floats]  # makes columns (m, b) of the observations white
+    sigma: float  # standard deviation of what is white, mm
+    taken: Floats  # (m, r) orthonormal, what the job names takes of white columns
 
     @classmethod
     def of(cls, model: RecordingModel, values: Floats, noise: Noise) -> Sensitivity:

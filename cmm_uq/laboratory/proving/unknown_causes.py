@@ -40,22 +40,16 @@ class ForeignEffect(Effect):
 
 @dataclass(frozen=True)
 class FunctionForm:
-    """A function that no effect has.
-
-    ``what`` one of :data:`FUNCTIONS`; ``over``, ``along`` axis whose reading it is a function of, and along which it
-    displaces points; ``low``, ``high`` readings, mm, between which that axis was read; of a jump, times in s; ``at``,
-    ``width`` where it is and how wide, on a scale from −1 to 1; of a wave its phase, and its half turns;
-    ``measurement`` the set-up that a load stands on.
-    """
+    """A function that no effect has."""
 
     what: str
-    over: str
+    over: str  # over, along: axis whose reading it is a function of, and along which it displaces points
     along: str
-    low: float
+    low: float  # low, high: readings, mm, between which that axis was read; of a jump, times in s
     high: float
-    at: float
+    at: float  # at, width: where it is and how wide, on a scale from −1 to 1; of a wave its phase, and its half turns
     width: float
-    measurement: int = 0
+    measurement: int = 0  # the set-up that a load stands on
 
     def displacement(self, points: Points) -> Floats:
         """(n, 3, 1), mm, for a size of one micrometre."""
@@ -82,7 +76,6 @@ class FunctionForm:
         return np.asarray((2 * value - self.low - self.high) / max(self.high - self.low, 1e-9))
 
     def _place(self, points: Points) -> Floats:
-        """Reading over its largest, of the axis that displaces: what shifts a whole set-up alike is not seen."""
         reading = points.carriages[:, AXES.index(self.along)]
         return np.asarray(reading / max(float(np.abs(reading).max()), 1e-9))
 
@@ -136,10 +129,7 @@ def possible_faults(model: RecordingModel) -> Iterator[str]:
 def artefact_fault(
     model: RecordingModel, values: Floats, what: str, cte_per_k: float, errors: Sequence[Sequence[float]] = ()
 ) -> UnknownArtefactFault:
-    """A fault of the artefact as an error of its points.
-
-    ``model``, ``values`` with the artefact, and its parameters (k,).
-    """
+    """A fault of the artefact as an error of its points. ``model``, ``values`` with the artefact, and its parameters (k,)."""
     xyz, points = model.placed(values), model.artefact.points
     if what == "length":
         sizes = values[len(values) - len(model.artefact.sizes) :].copy()
@@ -165,11 +155,7 @@ def artefact_fault(
 
 
 def nodes(xyz: Floats, points: Points) -> tuple[Ints, Floats]:
-    """Which node of the artefact each point is, (n,), and the artefact's axes there, (n, 3, a): one of a line, else three.
-
-    Points of two set-ups are the same node where they lie at the same place of the artefact. A set-up whose points lie
-    otherwise is of another artefact, or of other nodes.
-    """
+    """Node of the artefact of each point (n,), and its axes there (n, 3, a); those whose points lie otherwise have others."""
     known: list[Floats] = []
     number = np.zeros(len(xyz), dtype=np.int64)
     lines = all(_is_line(xyz[points.measurement == m]) for m in np.unique(points.measurement))

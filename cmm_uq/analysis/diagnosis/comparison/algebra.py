@@ -20,10 +20,7 @@ _LEAST_BASE = 1e-300  # of a sum of squares that rounding took below it
 
 
 def log_sum(log: Floats, axis: int) -> Floats:
-    """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``.
-
-    A search asks for thousands of small ones, and what scipy does beside these steps takes thrice their time.
-    """
+    """Logarithm of sums of what has these finite logarithms, in the steps of ``scipy.special.logsumexp``."""
     largest = log.max(axis=axis, keepdims=True)
     most = log == largest
     count = most.sum(axis=axis, keepdims=True, dtype=np.float64)
@@ -72,10 +69,7 @@ def log_sum_of_powers(base: Floats, degrees: int, axis: int | tuple[int, ...]) -
 
 
 def eigen(blocks: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues (…, r) of symmetric matrices and their eigenvectors (…, r, r); of two columns, which abound, by a rotation.
-
-    The rotation is Jacobi's (Golub, Van Loan 2013, Matrix Computations, section 8.5.2), as exact as what is iterated.
-    """
+    """Eigenvalues (…, r), vectors (…, r, r) of symmetric matrices; of two columns by Jacobi's rotation (Golub, Van Loan)."""
     if blocks.shape[-1] != 2:
         strengths, turn = np.linalg.eigh(blocks)
         return np.asarray(strengths), np.asarray(turn)
@@ -129,18 +123,14 @@ def squared(rows: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class SigmaIntegral:
-    """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ: in closed form if ln σ is uniform, else from a table.
+    """Log of ∫ p(σ) σ^(−m') exp(−squares/2σ²) dσ: in closed form if ln σ is uniform, else from a table."""
 
-    ``sigma``, ``log_sigma`` (s,) grid, mm, and its log probability; ``degrees`` m'; ``square`` typical of the squares, mm².
-    """
-
-    sigma: Floats
+    sigma: Floats  # sigma, log_sigma: (s,) grid, mm, and its log probability
     log_sigma: Floats
     degrees: int
     square: float
 
     def __call__(self, squares: Floats) -> Floats:
-        """Of the shape of the squares, which are overwritten."""
         np.maximum(squares, 1e-300, out=squares)
         np.log(squares, out=squares)
         if self.table is not None:
@@ -230,10 +220,7 @@ class Precision:
 
 
 def precisions(kinds: Sequence[NoiseKind], reached: Floats, certified: Floats) -> list[Precision]:
-    """Of each kind of noise, where the baseline reaches ``reached`` (m, q), orthonormal.
-
-    ``certified`` (m, c) is what a certificate leaves open, for one standard deviation, in units of the noise.
-    """
+    """Of each kind of noise, the baseline's reach (m, q) projected out; ``certified`` (m, c) open by certificates."""
     found = []
     for kind in kinds:
         Q, R = np.linalg.qr(kind.white(reached))

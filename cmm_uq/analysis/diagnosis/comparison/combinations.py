@@ -42,16 +42,13 @@ class Combination:
 
 @dataclass(frozen=True, eq=False)
 class Combinations:
-    """All combinations worth following.
-
-    ``explanations`` of which they are made; ``by_key`` by the indices of their explanations; ``counts`` probability,
-    beforehand, of none, one, two … known effects that act by themselves; ``imitated`` nonparametric terms that leave
-    next to nothing of an effect in this recording.
-    """
+    """All combinations worth following."""
 
     explanations: Sequence[Explanation]
-    by_key: Mapping[Key, Combination]
+    by_key: Mapping[Key, Combination]  # by the indices of their explanations
+    # probability, beforehand, of none, one, two … known effects that act by themselves
     counts: tuple[float, ...] = EFFECTS
+    # nonparametric terms that leave next to nothing of an effect in this recording
     imitated: Mapping[int, Key] = field(default_factory=dict)
 
     @cached_property
@@ -139,7 +136,6 @@ def explore(
 
 
 def _counts(comparison: CandidateComparison) -> tuple[float, ...]:
-    """Probability of none, one, two … known effects: of one more at least than are everywhere."""
     counts: tuple[float, ...] = EFFECTS
     while len(counts) - 1 <= len(effects_of_every_machine(comparison)):
         counts = with_two_more(counts)
@@ -157,7 +153,6 @@ def effects_of_every_machine(comparison: CandidateComparison) -> list[int]:
 def _explored(
     comparison: CandidateComparison, before: Combinations | None, changed: Key, counts: tuple[float, ...]
 ) -> Combinations:
-    """The same with so many known effects at the most."""
     known = (
         {}
         if before is None
@@ -271,10 +266,7 @@ class _Search:
         return np.array(numbers, dtype=np.intp), np.array(forms).T
 
     def pairs_like(self, index: int) -> list[tuple[int, int]]:
-        """Pairs of other known effects that together leave next to nothing of one, and neither of them does alone.
-
-        A bar that sags is as two scales at once: no exchange of one for one leads from that to these.
-        """
+        """Pairs of other known effects that together leave next to nothing of one, and neither of them does alone."""
         numbers, forms = self._forms
         own = np.flatnonzero(numbers == index)
         if not len(own):
@@ -310,7 +302,6 @@ class _Search:
         return len(shown) > 0 and max(shown) <= ALIKE * min(shown)
 
     def _shown(self, index: int) -> float:
-        """How much of an effect the observations show where its coefficient is as large as physics allows."""
         columns = self.comparison.explanations[index].members[0].columns
         return float(np.linalg.norm(columns / self.comparison.noise_scale[:, None]))
 
@@ -321,10 +312,7 @@ class _Search:
 def log_evidence_together(
     comparison: CandidateComparison, versions: Sequence[Version]
 ) -> tuple[float, tuple[Version, ...]]:
-    """Log evidence of explanations that hold together, and the best version of each.
-
-    Exact for one; for several, the sizes and versions of each are summed with those of the others held at their best.
-    """
+    """Log evidence of explanations together: exact for one; of several each is summed with the others at their best."""
     best = list(versions)
     totals = [0.0] * len(best)
     for _ in range(4):

@@ -22,29 +22,22 @@ _ABSORBED = 1e-5  # part of its length below which a column is the baseline's ow
 
 @dataclass(frozen=True)
 class Version:
-    """One version of an explanation at one size.
-
-    ``explanation``, ``member`` which; ``amplitude`` standard deviation of its coefficients, in units of the noise.
-    """
+    """One version of an explanation at one size."""
 
     explanation: int
     member: int
-    amplitude: float
+    amplitude: float  # standard deviation of its coefficients, in units of the noise
 
 
 @dataclass(frozen=True, eq=False)
 class MemberGroup:
-    """Members with the same number of columns, r.
+    """Members with the same number of columns, r."""
 
-    ``explanation``, ``member`` (M,) say which; ``weight`` (M,) is the log probability of each within its explanation;
-    ``start`` (M,) the first of its columns in the stack; ``amplitudes`` (M, a) the sizes to try.
-    """
-
-    explanation: Ints
+    explanation: Ints  # explanation, member: (M,) say which
     member: Ints
-    weight: Floats
-    start: Ints
-    amplitudes: Floats
+    weight: Floats  # (M,) is the log probability of each within its explanation
+    start: Ints  # (M,) the first of its columns in the stack
+    amplitudes: Floats  # (M, a) the sizes to try
     r: int
 
     @property
@@ -95,11 +88,7 @@ def stack_members(
     least_noise: float,
     degrees_of_freedom: int,
 ) -> tuple[Floats, tuple[MemberGroup, ...]]:
-    """Columns (m, K) that the baseline leaves of all members, over the noise scale (m,), and their groups.
-
-    ``rest`` what the baseline leaves of columns (m, b); ``least_noise`` mm; with it the largest coefficients are as
-    large as physics allows.
-    """
+    """Columns (m, K) over the noise scale (m,) that the baseline leaves of all members, and their groups."""
     found: dict[int, list[tuple[int, int, float, Floats, float]]] = {}
     whole = [
         (owner, j, np.log(member.weight / total), member.columns)
@@ -137,9 +126,9 @@ def stack_members(
 
 _WIDE = 30  # columns of a version from which on its principal axes are kept where it is given
 _KEPT = 12_000_000  # numbers that are kept of the inner products of what was given last
-
-_FEW = 3
-"""Observations over columns that are given, from which on it pays to make inner products of those that are kept."""
+_FEW = (
+    3  # Observations over columns that are given, from which on it pays to make inner products of those that are kept
+)
 
 MemberKey = tuple[int, int]  # an explanation and its member
 Basis = tuple[MemberKey, bool]  # a member, and whether it is seen along its principal axes in place of its columns
@@ -180,24 +169,16 @@ class ConditionedData:
 
 @dataclass(frozen=True, eq=False)
 class Conditioning:
-    """Members that were given, and what is kept of them.
+    """Members that were given, and what is kept of them."""
 
-    ``stack`` (m, K) columns of all members; ``where`` columns of the stack of each; ``by_noise`` precision times
-    columns (m, b), by kind of noise (k, m, b).
-    """
-
-    stack: Floats
-    where: dict[MemberKey, slice]
-    by_noise: Callable[[Floats], Floats]
+    stack: Floats  # (m, K) columns of all members
+    where: dict[MemberKey, slice]  # columns of the stack of each
+    by_noise: Callable[[Floats], Floats]  # precision times columns (m, b), by kind of noise (k, m, b)
 
     def beside(
         self, conditions: Sequence[Version], plain: Floats, weighed: Floats, log: Floats, *, own: bool
     ) -> ConditionedData:
-        """Data beside explanations at their sizes.
-
-        ``plain``, ``weighed`` data (m, b), and (k, m, b) times the precision of each kind of noise; ``log`` (k,) of the
-        noise; ``own`` whether the data are the recording's, so that inner products with them are kept.
-        """
+        """Data (m, b), and (k, m, b) times each kind's precision, beside explanations at their sizes; ``log`` (k,)."""
         squares = np.einsum("mb,kmb->kb", plain, weighed)
         if not conditions:
             none = np.zeros((len(weighed), 0, len(plain)))
@@ -305,7 +286,6 @@ class Conditioning:
 
     @cached_property
     def _axes(self) -> dict[MemberKey, tuple[Floats, Floats]]:
-        """Principal axes of wide members that were ever given."""
         return {}
 
     def _weighed_columns(self, version: Version) -> Floats:

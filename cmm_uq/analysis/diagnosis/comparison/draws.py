@@ -26,10 +26,7 @@ _LEAST_LEFT = 0.1  # part of a residual's variance that the fit must leave for i
 
 
 def draw_nothing(comparison: CandidateComparison, random: np.random.Generator, draws: int) -> Floats:
-    """What the baseline leaves (m, draws), mm, of recordings of which nothing is missing, their noise by its posterior.
-
-    A few readings do not tell whether their noise is normal; so many draws have heavy tails as that is probable.
-    """
+    """What the baseline leaves (m, draws), mm, of recordings with nothing missing, their noise and tails by its posterior."""
     weight = comparison.noise_posterior()
     chosen = random.choice(weight.size, draws, p=weight.ravel() / weight.sum())
     kind, size = np.unravel_index(chosen, weight.shape)
@@ -63,10 +60,7 @@ def left_of_noise(
     sigma: Floats,
     heavy: NDArray[np.bool_] | None = None,
 ) -> Floats:
-    """What the baseline leaves (m, draws), mm, of noise of one kind and sizes (draws,), in heavy tails where these are.
-
-    Where the display's steps matter, coordinates are rounded as the recording's were.
-    """
+    """What the baseline leaves (m, draws), mm, of noise of one kind and sizes (draws,), in heavy tails where these are."""
     fine = kind.unrounded if comparison.display else None
     # of a stream of its own: the others stay as they are
     wider = None if heavy is None else tail_widths(random.spawn(1)[0], heavy, len(comparison.left))
@@ -84,11 +78,7 @@ def draw_noise(
     kind: NoiseKind, random: np.random.Generator, draws: int, noise_scale: Floats, standing: tuple[Ints, Floats],
     wider: Floats | None = None,
 ) -> Floats:  # fmt: skip
-    """Noise (m, draws) of one kind, over the noise scale, a reading's standard deviation being one.
-
-    ``noise_scale`` (m,) of the observations; ``wider`` (m, draws) by how much each is wider than a normal one; see
-    :func:`tail_widths`.
-    """
+    """Noise (m, draws) over that of a reading; ``wider`` (m, draws): how much wider than normal (:func:`tail_widths`)."""
     order, side = standing
     white = np.empty((len(order), draws))
     white[order] = random.standard_normal((len(order), draws)) * (1.0 if wider is None else wider)
@@ -121,11 +111,7 @@ def _root(kind: NoiseKind, count: int) -> Floats:
 
 
 def order_and_side(left: Floats, reached: Floats) -> tuple[Ints, Floats]:
-    """Order and side of the observations that follow from their values alone.
-
-    ``left`` (m,) what the baseline leaves of them; ``reached`` (m, q) orthonormal basis of what it reaches. Gives (m,)
-    indices by the size of what is left, equal ones by how much the baseline reaches of them; (m,) sign of what is left.
-    """
+    """Order (m,) by size of what is left, then by what ``reached`` (m, q) takes, and its sign (m,): free of numbering."""
     size = float(np.sqrt(np.mean(left**2))) or 1.0
     keys = (left / size, np.sum(reached**2, axis=1), np.abs(left) / size)
     return np.lexsort([np.round(key, _DIGITS) for key in keys]), np.where(left < 0, -1.0, 1.0)

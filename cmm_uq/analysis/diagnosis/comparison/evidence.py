@@ -43,28 +43,21 @@ _BLOCK, _COLUMNS = 150_000, 500  # numbers of a block that a processor's cache h
 
 @dataclass(frozen=True, eq=False)
 class CandidateComparison:
-    """Explanations against "nothing is missing".
+    """Explanations against "nothing is missing"."""
 
-    ``observed`` (m,) observations over their noise scale, mm; ``baseline`` (m, p) columns over their noise scale that
-    may take any coefficient; ``kinds`` of noise; ``sigma``, ``log_sigma`` (s,) grid of the noise, mm, and its log
-    probability; ``explanations`` candidates; columns in mm; ``noise_scale`` (m,); ``least_noise`` mm, the least that
-    the noise may be; with it the largest coefficients are as large as physics allows; ``certified`` (m, c) what a
-    certificate leaves open, for one standard deviation, in units of the noise; ``display`` steps to which all
-    coordinates are rounded, where they matter; ``often_heavy`` probability, beforehand, that recordings of which
-    nothing is missing have heavy tails.
-    """
-
-    observed: Floats
-    baseline: Floats
+    observed: Floats  # (m,) observations over their noise scale, mm
+    baseline: Floats  # (m, p) columns over their noise scale that may take any coefficient
     kinds: Sequence[NoiseKind]
-    sigma: Floats
+    sigma: Floats  # sigma, log_sigma: (s,) grid of the noise, mm, and its log probability
     log_sigma: Floats
-    explanations: Sequence[Explanation]
-    noise_scale: Floats
+    explanations: Sequence[Explanation]  # candidates; columns in mm
+    noise_scale: Floats  # (m,)
+    # mm, the least that the noise may be; with it the largest coefficients are as large as physics allows
     least_noise: float
+    # (m, c) what a certificate leaves open, for one standard deviation, in units of the noise
     certified: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    display: Display | None = None
-    often_heavy: float = OFTEN
+    display: Display | None = None  # steps to which all coordinates are rounded, where they matter
+    often_heavy: float = OFTEN  # probability, beforehand, that recordings of which nothing is missing have heavy tails
     _axes: dict[int, tuple[Floats, Floats]] = field(default_factory=dict, init=False)
     _best: dict[frozenset[Version], dict[int, tuple[float, Version]]] = field(default_factory=dict, init=False)
     _weighed: dict[frozenset[Version], ConditionedData] = field(default_factory=dict, init=False)
@@ -171,10 +164,7 @@ class CandidateComparison:
         return found
 
     def noise_posterior(self, left: Floats | None = None) -> Floats:
-        """Probability (kinds, s) of each kind and size of the noise, given nothing beyond the baseline.
-
-        ``left`` (m,) of the observations, by default what the baseline leaves of them.
-        """
+        """Probability (kinds, s) of each kind and size of the noise, given what the baseline leaves (m,)."""
         every = self.squares if left is None else self._by_noise(left[:, None])[:, :, 0] @ left
         log = self._logs[:, None] + self.log_sigma - self.degrees_of_freedom * np.log(self.sigma)
         log -= 0.5 * every[:, None] / self.sigma**2
@@ -183,10 +173,7 @@ class CandidateComparison:
     def log_evidence(
         self, left: Floats | None = None, conditions: Sequence[Version] = (), among: Container[int] | None = None
     ) -> tuple[Floats, Floats]:
-        """Log evidence (b,) of what is given, and (c, b) of each explanation beside it.
-
-        ``left`` (m, b) data, by default the recording's.
-        """
+        """Log evidence (b,) of what is given, and (c, b) of each explanation beside it, for ``left`` (m, b)."""
         known = self._beside(left, conditions)
         return self._of_given(known), self._total(known, among)
 
@@ -200,10 +187,7 @@ class CandidateComparison:
         return total
 
     def of_versions(self, index: int, conditions: Sequence[Version] = ()) -> tuple[Ints, Floats, Floats]:
-        """Visible versions (v,) of an explanation, log evidence of each beside what is given, and its log weight.
-
-        Their sizes are summed.
-        """
+        """Visible versions (v,) of an explanation, log evidence of each beside what is given, and its log weight."""
         found = [
             (group.member, special.logsumexp(cube[:, :, 0], axis=1), group.weight)
             for group, cube in self.each(None, conditions, (index,))
@@ -218,12 +202,7 @@ class CandidateComparison:
         return np.asarray(np.einsum("mb,kmb->kb", columns, self._by_noise(columns)))
 
     def of_signal(self, signal: Floats, noise: Floats) -> Floats:
-        """Log evidence (c, b) of each explanation over nothing for signals (m, b) in noise at right angles to everything.
-
-        It is nearly what a signal shows on average.
-
-        ``noise`` (m,) that counts by its size alone.
-        """
+        """Log evidence (c, b) over nothing for signals (m, b) in noise (m,) at right angles: what one shows on average."""
         known = self._beside(signal, ())
         known = replace(known, squares=known.squares + self.lengths(noise[:, None]))
         return self._total(known) - self._of_given(known)
@@ -318,10 +297,7 @@ class CandidateComparison:
     def _of_wide(
         self, known: ConditionedData, group: MemberGroup, blocks: Floats, part: slice, seen: Floats
     ) -> Floats | None:
-        """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``.
-
-        The principal axes of the members by themselves, which are kept, are corrected for what is given.
-        """
+        """As :meth:`_under`, where members have far more columns than what is given beside the recording; else ``None``."""
         given = seen.shape[3] - 1
         if known.squares.shape[1] > 1 or not given or group.r < _CORRECTED * given:
             return None

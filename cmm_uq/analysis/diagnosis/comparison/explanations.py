@@ -40,41 +40,30 @@ _DIVIDED = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 @dataclass(frozen=True, eq=False)
 class Member:
-    """One version of an explanation.
+    """One version of an explanation."""
 
-    ``columns`` (m, r) mm; ``shape`` nonlinear parameter that they belong to; ``weight`` how probable, among the
-    versions; ``values`` (p, r) mm, a nonparametric function where its covariate is given, for one unit of each
-    coefficient; ``rough`` whether an effect has another form here than its own, though the same mechanism.
-    """
-
-    columns: Floats
-    shape: tuple[float, ...] = ()
-    weight: float = 1.0
+    columns: Floats  # (m, r) mm
+    shape: tuple[float, ...] = ()  # nonlinear parameter that they belong to
+    weight: float = 1.0  # how probable, among the versions
+    # (p, r) mm, a nonparametric function where its covariate is given, for one unit of each coefficient
     values: Floats = field(default_factory=lambda: np.zeros((0, 0)))
-    rough: bool = False
+    rough: bool = False  # whether an effect has another form here than its own, though the same mechanism
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A candidate.
+    """A candidate."""
 
-    ``name`` the effect's name; for a nonparametric term what it depends on; ``kind`` ``effect``, ``several`` (known
-    effects at once) or ``unknown`` (a nonparametric term); ``members`` versions, as probable as their weights say;
-    ``covariate`` (p,) what a nonparametric term depends on, of the points or of the observations; ``covariate_name``
-    its name in the recording; ``term`` of a nonparametric one that effects may be imitated by; ``imitated_by`` of an
-    effect; ``weight`` how readily it is thought of, beside others of its kind; ``effect`` that it is, if it is one;
-    ``together`` whether it is one of what a machine out of adjustment has, and long enough an artefact shows it.
-    """
-
-    name: Text
-    kind: str
-    members: tuple[Member, ...]
-    covariate: Floats | None = None
+    name: Text  # the effect's name; for a nonparametric term what it depends on
+    kind: str  # effect, several (known effects at once) or unknown (a nonparametric term)
+    members: tuple[Member, ...]  # versions, as probable as their weights say
+    covariate: Floats | None = None  # (p,) what a nonparametric term depends on, of the points or of the observations
     covariate_name: str | None = None
-    term: Nonparametric | None = None
+    term: Nonparametric | None = None  # of a nonparametric one that effects may be imitated by
     imitated_by: tuple[Nonparametric, ...] = ()
-    weight: float = 1.0
+    weight: float = 1.0  # how readily it is thought of, beside others of its kind
     effect: Effect | None = None
+    # whether it is one of what a machine out of adjustment has, and long enough an artefact shows it
     together: bool = False
 
     @property
@@ -92,10 +81,7 @@ def effect_of(explanation: Explanation) -> Effect:
 
 
 def known_effects(model: RecordingModel, values: Floats, named: tuple[str, ...]) -> list[Explanation]:
-    """Every effect of the catalogue that could act here and is not named in the model already.
-
-    ``values`` (k,) parameters about which it is linear.
-    """
+    """Every effect of the catalogue that could act here and is not in the model, linear about ``values`` (k,)."""
     points = model.artefact.points.at(model.where(values))
     found = []
     for effect in possible_effects(model.artefact):
@@ -140,7 +126,6 @@ def possible_effects(artefact: Artefact) -> Iterator[Effect]:
 
 
 def _roughly(model: RecordingModel, effect: Effect, points: Points, values: Floats) -> Iterator[Member]:
-    """An idealised effect, larger or smaller towards the ends or one end of its axis, or of the time."""
     along = effect.course(points)
     if along is None:
         return
@@ -180,10 +165,7 @@ def refine(model: RecordingModel, values: Floats, explanation: Explanation, memb
 
 
 def with_shorter_periods(model: RecordingModel, values: Floats, explanation: Explanation) -> Explanation:
-    """A periodic effect with the periods below those that are searched: between positions at equal distances they fit as well.
-
-    Each octave is as probable as another, so that the shorter ones, of which there are so many, do not outweigh the others.
-    """
+    """A periodic effect with periods below those searched, which equal distances fit as well; octaves equally probable."""
     effect = effect_of(explanation)
     axis = effect.shape[0].period_along
     if axis is None:
@@ -209,10 +191,7 @@ def from_even_scale(effect: Effect, value: Floats) -> Floats:
 
 
 def effects_together(singles: Sequence[Explanation]) -> list[Explanation]:
-    """All known effects of the machine at once, each as large as the others in the observations.
-
-    It names none of them, but lets the lack-of-fit test see those that are visible together only.
-    """
+    """All known effects of the machine at once, each as large as the others in the observations."""
     columns = [e.members[0].columns for e in singles if not e.shaped and (e.effect is None or not e.effect.of_artefact)]
     if len(columns) < 2:
         return []

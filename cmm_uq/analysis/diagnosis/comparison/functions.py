@@ -38,11 +38,7 @@ _GRID = 60
 
 
 def unknown_functions(model: RecordingModel, values: Floats) -> list[Explanation]:
-    """Nonparametric terms, smooth or with one jump.
-
-    Errors along each axis of each reading and of the place, scales of time, and anything of each covariate of the
-    observations.
-    """
+    """Nonparametric terms, smooth or with one jump."""
     points = model.artefact.points.at(model.where(values))
     found = [*_of_readings(model, points, values), *_of_place(model, points, values), *_of_time(model, points, values)]
     found += [*_of_direction(model), *_of_all_scales(model, points, values)]
@@ -105,7 +101,6 @@ def _of_time(model: RecordingModel, points: Points, values: Floats) -> Iterator[
 
 
 def _in_proportion(effect: Effect, points: Points, axis: str) -> bool:
-    """Whether an effect moves points along an axis in proportion to its reading, and by nothing else."""
     if effect.shape or len(effect.coefficients) > 1:
         return False
     moved = effect.basis(points)[:, :, 0]
@@ -129,7 +124,6 @@ def _of_direction(model: RecordingModel) -> Iterator[Explanation]:
 
 
 def _of_all_scales(model: RecordingModel, points: Points, values: Floats) -> Iterator[Explanation]:
-    """One scale of all axes, about their zero or their middle, as a function of each further column."""
     readings = points.carriages
     middle = 0.5 * (readings.min(axis=0) + readings.max(axis=0))
     span = 0.5 * float(np.ptp(readings, axis=0).max())
@@ -163,10 +157,7 @@ def _along(axis: int, factor: Floats) -> Floats:
 
 
 def covariates(model: RecordingModel) -> dict[str, Floats]:
-    """What each used observation may depend on, (m,): the mean of every recorded column, and its place in the order of time.
-
-    Without a time the order of rows says nothing: whoever sorted them is no cause.
-    """
+    """Mean (m,) of every recorded column of each observation, and its place in the order of time where one is recorded."""
     points = model.artefact.points
     found = {}
     for name, values in points.columns.items():
@@ -187,10 +178,7 @@ def mean_of(model: RecordingModel, values: Floats) -> Floats:
 
 
 def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, float]]:
-    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps.
-
-    ``same`` is the largest gap between values that are taken for one.
-    """
+    """Factors (n, r), mm, of functions of a covariate and their weights: smooth ones, and steps in its widest gaps."""
     for function in smooth_functions(covariate):
         yield function, 1.0
     distinct = np.unique(covariate)
@@ -204,7 +192,6 @@ def _functions(covariate: Floats, same: float = 0.0) -> Iterator[tuple[Floats, f
 
 
 def _one_sided(functions: Iterable[tuple[Floats, float]]) -> Iterator[tuple[Floats, float]]:
-    """The same, and each jump from or to zero besides: of what is right but on one side, where no constant is free."""
     for function, weight in functions:
         if function.shape[1] > 1:
             yield function, weight

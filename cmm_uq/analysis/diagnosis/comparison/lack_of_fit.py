@@ -29,10 +29,7 @@ _LEAST = 0.05  # part of the evidence of nothing below which tails are left out:
 
 
 def under_heavy_tails(normal: CandidateComparison, data: Floats) -> Iterator[tuple[int, CandidateComparison]]:
-    """Columns of data for which heavy tails matter, each with its own comparison under them.
-
-    ``data`` (m, b) mm, of which the baseline has been taken.
-    """
+    """Columns of data (m, b), mm, the baseline taken, for which heavy tails matter, each with its comparison under them."""
     often = normal.often_heavy
     evidence = normal.of_nothing(data)
     likeliest, total = evidence.argmax(axis=0), np.logaddexp.reduce(evidence, axis=0)
@@ -81,10 +78,7 @@ def log_prior(candidates: Sequence[Explanation]) -> Floats:
 
 
 def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None = None) -> tuple[float, Floats, Floats]:
-    """Probability, under nothing, of as much evidence for something.
-
-    Also what is drawn under nothing: the statistic, and the largest log evidence of a nonparametric term.
-    """
+    """Probability, under nothing, of as much evidence for something."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
     draws = draw_nothing(comparison, random, DRAWS)
     statistic, odds = statistic_of(comparison, np.column_stack([comparison.left, draws]))
@@ -97,10 +91,7 @@ def lack_of_fit(comparison: CandidateComparison, seed: int, alpha: float | None 
 
 
 def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Generator, alpha: float) -> float:
-    """The same probability by odds that reckon with heavy tails, from as many draws as say on which side of the rate it is.
-
-    However many there are, as many make the tail, so that ever less of it is extrapolated.
-    """
+    """The same probability by odds that reckon with heavy tails, from as many draws as say on which side of the rate it is."""
     normal = comparison.only([k for k, kind in enumerate(comparison.kinds) if kind.name != "tails"])
     least = float(np.quantile(statistic_of(normal, draws)[0], _TAIL))
     value = float(robust_statistic_of(normal, comparison.left[:, None], least)[0])
@@ -117,19 +108,13 @@ def _nearer(comparison: CandidateComparison, draws: Floats, random: np.random.Ge
 
 
 def statistic_of(comparison: CandidateComparison, data: Floats) -> tuple[Floats, Floats]:
-    """Log odds (b,) of something for data (m', b): one explanation, or the best known effect with any other.
-
-    Also the log evidence (c, b) of each explanation over nothing.
-    """
+    """Log odds (b,) of something for data (m', b): one explanation, or the best effect with any other; and (c, b) of each."""
     found = _Evidence.of(comparison, data)
     return found.log_odds(), found.something - found.nothing
 
 
 def robust_statistic_of(normal: CandidateComparison, data: Floats, least: float) -> Floats:
-    """Log odds (b,) as :func:`statistic_of` has them, the noise of each data having heavy tails as that is probable.
-
-    ``data`` (m', b) mm.
-    """
+    """Log odds (b,) as of :func:`statistic_of`, the noise of each data (m', b), mm, with tails as heavy as probable."""
     found, often = _Evidence.of(normal, data), normal.often_heavy
     high = np.flatnonzero(found.log_odds() > least)
     if not often or not len(high):
@@ -143,19 +128,14 @@ def robust_statistic_of(normal: CandidateComparison, data: Floats, least: float)
 
 @dataclass(frozen=True, eq=False)
 class _Evidence:
-    """Log evidence of data (m, b).
-
-    ``explanations`` candidates; ``nothing``, ``something`` (b,) of nothing, and (c, b) of each explanation; ``single``
-    known effects of which two are tried together; ``lead`` the best of them for each of the data; ``None`` where there
-    are no two; ``alone``, ``both`` (b,) of it, and (c, b) of each of them beside it.
-    """
+    """Log evidence of data (m, b)."""
 
     explanations: Sequence[Explanation]
-    nothing: Floats
+    nothing: Floats  # nothing, something: (b,) of nothing, and (c, b) of each explanation
     something: Floats
-    single: Sequence[int]
-    lead: list[Version] | None
-    alone: Floats
+    single: Sequence[int]  # known effects of which two are tried together
+    lead: list[Version] | None  # the best of them for each of the data; None where there are no two
+    alone: Floats  # alone, both: (b,) of it, and (c, b) of each of them beside it
     both: Floats
 
     @classmethod
@@ -218,7 +198,6 @@ def best_versions(comparison: CandidateComparison, data: Floats, explanations: S
 
 
 def _together(versions: Sequence[Version]) -> dict[Version, list[int]]:
-    """Columns of data that have a version in common."""
     found: dict[Version, list[int]] = {}
     for column, version in enumerate(versions):
         found.setdefault(version, []).append(column)

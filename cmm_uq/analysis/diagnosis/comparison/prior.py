@@ -105,7 +105,6 @@ class CombinationPrior:
 
 
 def _everywhere(explanations: Sequence[Explanation], shown: Iterable[int], *, of_artefact: bool) -> frozenset[int]:
-    """Explanations that every machine, or every artefact, has to some degree."""
     return frozenset(
         i for i in shown
         if (effect := explanations[i].effect) is not None and explanations[i].together and effect.of_artefact == of_artefact

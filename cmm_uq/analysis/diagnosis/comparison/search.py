@@ -58,22 +58,16 @@ NOT_TOLD_APART = 0.02  # odds from which another effect in the place of one coun
 
 @dataclass(frozen=True, eq=False)
 class ModelComparison:
-    """The candidates that a model's misfit is compared with.
+    """The candidates that a model's misfit is compared with."""
 
-    ``model``, ``values`` what is explained so far, and its estimate; ``comparison`` candidates; ``log_odds`` (c,) log
-    evidence of each over nothing; ``probability`` (c,) of each explanation, nothing included in the comparison;
-    ``p_value`` of "nothing is missing"; ``null`` (draws,) test statistic under nothing; ``null_maximum`` (draws,)
-    largest log evidence of a nonparametric term over nothing, under nothing.
-    """
-
-    model: RecordingModel
+    model: RecordingModel  # model, values: what is explained so far, and its estimate
     values: Floats
     comparison: CandidateComparison
-    log_odds: Floats
-    probability: Floats
+    log_odds: Floats  # (c,) log evidence of each over nothing
+    probability: Floats  # (c,) of each explanation, nothing included in the comparison
     p_value: float
-    null: Floats
-    null_maximum: Floats
+    null: Floats  # (draws,) test statistic under nothing
+    null_maximum: Floats  # (draws,) largest log evidence of a nonparametric term over nothing, under nothing
 
     @property
     def explanations(self) -> Sequence[Explanation]:
@@ -82,25 +76,18 @@ class ModelComparison:
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """What a search ends with.
+    """What a search ends with."""
 
-    ``first`` comparison before anything is found; ``last`` what is left after everything is, without candidates;
-    ``combinations`` of explanations, with their probabilities; ``None`` where the lack-of-fit test does not reject;
-    ``chosen`` indices, among the candidates, of the known effects that are found; ``versions`` of them, and of what is
-    unknown besides, in the most probable combination; ``model`` the job's model with what was left out; ``unexplained``
-    probability that something unknown acts besides; ``rough`` of the effects found, those of which another form is more
-    probable than their own; ``stated`` standard uncertainty of a coordinate, mm, as the job states it.
-    """
-
-    first: ModelComparison
-    last: CandidateComparison
+    first: ModelComparison  # comparison before anything is found
+    last: CandidateComparison  # what is left after everything is, without candidates
+    # of explanations, with their probabilities; None where the lack-of-fit test does not reject
     combinations: Combinations | None
-    chosen: Key
-    versions: tuple[Version, ...]
-    model: RecordingModel
-    unexplained: float
-    rough: Key = frozenset()
-    stated: float | None = None
+    chosen: Key  # indices, among the candidates, of the known effects that are found
+    versions: tuple[Version, ...]  # of them, and of what is unknown besides, in the most probable combination
+    model: RecordingModel  # the job's model with what was left out
+    unexplained: float  # probability that something unknown acts besides
+    rough: Key = frozenset()  # of the effects found, those of which another form is more probable than their own
+    stated: float | None = None  # standard uncertainty of a coordinate, mm, as the job states it
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -108,13 +95,7 @@ class SearchResult:
 
 
 def search(model: RecordingModel, stated: float | None, *, alpha: float, seed: int) -> SearchResult:
-    """Find what a model leaves out.
-
-    Squarenesses that are found so large that the model bends are modelled, and everything is compared again about them: else
-    what they leave out to first order would be taken for further effects.
-
-    ``stated`` standard uncertainty of a coordinate, mm, as the job states it.
-    """
+    """Find what a model leaves out; squarenesses so large that the model bends are modelled, and all compared about them."""
     found = _search(model, stated, alpha, seed)
     for _ in range(_AGAIN):
         whole = found.model
@@ -155,7 +136,6 @@ def _search(model: RecordingModel, stated: float | None, alpha: float, seed: int
 
 
 def _of(first: ModelComparison, combinations: Combinations, chosen: Key, stated: float | None) -> SearchResult:
-    """What a search ends with where these effects are found."""
     versions = combinations.versions(chosen)
     found = first.model if not chosen else with_effects(first, versions, chosen)
     last = comparison_of(found, stated, ())
@@ -184,10 +164,7 @@ def withhold(result: SearchResult, withheld: Key) -> SearchResult:
 
 
 def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResult, int] | None:
-    """The same search with the next most probable in the place of an effect, and which that is; ``None`` where none may be.
-
-    It is one that these data cannot tell from it, is probable enough to be named, and has with all such one half, as any.
-    """
+    """The search with the next most probable in an effect's place, and which: not to be told from it, and half with it."""
     combinations = result.combinations
     if combinations is None:
         return None
@@ -202,7 +179,6 @@ def substitute(result: SearchResult, index: int, tried: Key) -> tuple[SearchResu
 
 
 def _rough(comparison: CandidateComparison, versions: Sequence[Version], index: int) -> float:
-    """Probability that an effect, beside the others, has another form than its own."""
     member, evidence, weight = comparison.of_versions(index, [v for v in versions if v.explanation != index])
     probability = np.exp(evidence + weight - special.logsumexp(evidence + weight))
     rough = [comparison.explanations[index].members[i].rough for i in member]
@@ -210,7 +186,6 @@ def _rough(comparison: CandidateComparison, versions: Sequence[Version], index: 
 
 
 def _shaped(combinations: Combinations) -> set[int]:
-    """Effects with a nonlinear parameter that probable combinations contain."""
     return {
         version.explanation
         for key, probability in combinations.probability.items()
@@ -220,7 +195,6 @@ def _shaped(combinations: Combinations) -> set[int]:
 
 
 def _refined(first: ModelComparison, combinations: Combinations, index: int) -> Explanation:
-    """An effect with a nonlinear parameter, finer wherever that fits beside what is most probable with it, however short."""
     most = combinations.likeliest(key for key in combinations.by_key if index in key)
     others = [v for v in combinations.by_key[most].versions if v.explanation != index]
     explanation = first.explanations[index]
@@ -276,7 +250,6 @@ def effects_to_assert(combinations: Combinations) -> Key:
 
 
 def _imitated(comparison: CandidateComparison, combinations: Combinations) -> dict[int, Key]:
-    """Of each effect that may be asserted, the probable functions that leave next to nothing of it."""
     probable = [i for i in range(len(combinations.explanations)) if combinations.of(i) > _PROBABLE]
     kinds = {kind: [i for i in probable if combinations.explanations[i].kind == kind] for kind in (EFFECT, UNKNOWN)}
     best = {i: _version(combinations, i) for i in probable}
@@ -287,16 +260,12 @@ def _imitated(comparison: CandidateComparison, combinations: Combinations) -> di
 
 
 def _version(combinations: Combinations, index: int) -> Version:
-    """The version of an explanation in the most probable combination that contains it."""
     most = combinations.likeliest(key for key in combinations.by_key if index in key)
     return next(v for v in combinations.by_key[most].versions if v.explanation == index)
 
 
 def _of_any_form(combinations: Combinations, chosen: Key) -> Key:
-    """Effects that are improbable only because a nonparametric term, which could be the same, describes them as well.
-
-    None that could stand in the place of one that is chosen: together they would determine nothing.
-    """
+    """Effects improbable only because a nonparametric term, which could be the same, describes them as well."""
     found = set()
     instead = {j for i in chosen for j, odds in combinations.instead(chosen, i).items() if odds > NOT_TOLD_APART}
     for i, effect in enumerate(combinations.explanations):
