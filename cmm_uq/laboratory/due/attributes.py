@@ -104,8 +104,7 @@ def reliability_range(passed: int, tested: int, confidence: float) -> tuple[floa
 WELL_WITHIN = 0.8
 """Part of the limit up to which the interval is lengthened; remembered of ILAC-G24 / OIML D 10, not checked against it."""
 
-STEP_UP = 0.1
-"""Part by which an interval is lengthened at most."""
+STEP_UP = 0.1  # part by which an interval is lengthened at most
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,8 @@ def two_sided_limit(probability: float) -> float:
     return -NormalDist().inv_cdf(probability / 2)
 
 
-_NOTHING = 1e-9
-"""Part of a variance that is none."""
-
-FAMILY = 0.05
-"""Probability that anything at all is called significant where nothing changed."""
+_NOTHING = 1e-9  # part of a variance that is none
+FAMILY = 0.05  # probability that anything at all is called significant where nothing changed
 
 
 @dataclass(frozen=True)

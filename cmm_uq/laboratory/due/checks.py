@@ -28,9 +28,7 @@ from cmm_uq.laboratory.due.observed import is_of_machine, part_used
 from cmm_uq.laboratory.records.facts import RecordedCertificate, RecordedValue
 
 Standing = Literal["in control", "warning", "action", "nothing compared"]
-
-WARNING, ACTION = 2.0, 3.0
-"""Limits of a chart of one value, in standard uncertainties."""
+WARNING, ACTION = 2.0, 3.0  # limits of a chart of one value, in standard uncertainties
 
 
 @dataclass(frozen=True)

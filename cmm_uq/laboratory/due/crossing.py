@@ -39,9 +39,7 @@ def grid(gaps: int) -> Floats:
     return np.concatenate([[0.0], np.geomspace(7.0, HORIZON * YEAR, gaps)])
 
 
-DAYS, FINE = grid(48), grid(160)
-"""A sixth further each, for many machines whose dates are wide; a twentieth, for one."""
-
+DAYS, FINE = grid(48), grid(160)  # A sixth further each, for many machines whose dates are wide; a twentieth, for one
 PATHS = 2048
 _AT_ONCE = 2_000_000
 _SEED = 20

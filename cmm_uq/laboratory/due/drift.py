@@ -27,11 +27,8 @@ from scipy import special
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats, Ints
 
-YEAR = 365.25
-"""Days: rates and spreads are stated per year."""
-
-HORIZON = 40.0
-"""Years that are looked ahead; what is later is never."""
+YEAR = 365.25  # days: rates and spreads are stated per year
+HORIZON = 40.0  # years that are looked ahead; what is later is never
 
 PARTS = (0.05, 0.5, 0.95)
 """Probabilities at which the day of a crossing is stated: the ends of a 90 % interval, and its median."""
@@ -208,8 +205,7 @@ MEDIANS = np.array([0.1, 0.05, 0.05, 0.07, 0.35, 0.15, 0.05, 0.4])
 SPREADS = np.array([0.8, 0.8, 0.8, 0.8, 0.5, 0.6, 0.8, 0.6])
 """Standard deviations of the logarithms: a factor of five either way is not surprising, of three for those of a level."""
 
-USUAL_RATE_SD = 0.15
-"""Of the rate common to a whole fleet, in limits per year: it may drift either way."""
+USUAL_RATE_SD = 0.15  # of the rate common to a whole fleet, in limits per year: it may drift either way
 
 WALKS_DIFFER = 0.5
 """Standard deviation of the logarithm of one machine's wandering: a sixth of them wander 1.6 times as much, or more."""

@@ -28,9 +28,7 @@ from cmm_uq.laboratory.due.drift import (
     side_by_side,
 )
 
-KEPT = 12
-"""Tales kept of a machine at a node."""
-
+KEPT = 12  # tales kept of a machine at a node
 _ODDS = np.log([1 - WRONG, WRONG])
 _TIMES = WRONG_TIMES**2 - 1
 
@@ -211,8 +209,7 @@ def _kept(
     return DriftState(mean, covariance, taken(log_weight, tale, 4))
 
 
-FEWEST = 2
-"""Certificates from which on a history says anything of a machine's own drift."""
+FEWEST = 2  # certificates from which on a history says anything of a machine's own drift
 
 
 def change_since(

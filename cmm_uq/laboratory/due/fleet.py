@@ -51,12 +51,8 @@ LEARNT_FROM = 200
 DRAWS, LEAST_DRAWS, MANY = 64, 6, 20_000
 """Draws of the hyper-parameters that machines are estimated at: fewer where there are many machines."""
 
-FALSE_DISCOVERIES = 0.05
-"""Part of the machines said not to belong that may well belong (Benjamini and Hochberg 1995)."""
-
-_WALKERS, _STEPS = 16, 50
-"""Of each of the four ensembles, and between two looks at how well they have mixed."""
-
+FALSE_DISCOVERIES = 0.05  # part of the machines said not to belong that may well belong (Benjamini and Hochberg 1995)
+_WALKERS, _STEPS = 16, 50  # of each of the four ensembles, and between two looks at how well they have mixed
 _AT_ONCE = 8000
 _FILTERED_AT_ONCE = 6000
 _LEAST_SHIFT = 0.02

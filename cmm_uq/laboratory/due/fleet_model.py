@@ -25,8 +25,7 @@ _RATE, _MODEL, _PLACE = (NAMES.index(name) for name in ("rate_sd", "model_sd", "
 MOST_ARTEFACTS = 100
 """Of those that several machines were measured with: the others, used least, count as each machine's own."""
 
-_KEPT = 4
-"""Tales that hyper-parameters are learnt from."""
+_KEPT = 4  # tales that hyper-parameters are learnt from
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,11 +30,8 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.due.crossing import Crossing
     from cmm_uq.laboratory.due.drift import DriftPrior as Prior
 
-YEAR = 365.2425
-"""Days."""
-
-_LEAST = 1e-9
-"""Standard uncertainty of a value that is stated without one, as a part of the largest value."""
+YEAR = 365.2425  # days
+_LEAST = 1e-9  # standard uncertainty of a value that is stated without one, as a part of the largest value
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,8 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
 
-_LARGEST = 1e4
-"""Of a parameter: beyond, no model changes any more."""
-
-_EXPONENT = 700.0
-"""Of e, within a double's range."""
+_LARGEST = 1e4  # of a parameter: beyond, no model changes any more
+_EXPONENT = 700.0  # of e, within a double's range
 
 
 @dataclass(frozen=True)
@@ -115,23 +112,12 @@ MODELS: Mapping[str, ReliabilityModel] = {
 }
 
 
-LEVEL = 0.95
-"""Of the test of lack of fit, and of the range of the interval."""
-
-_SURE = 1e-12
-"""No reliability is 0 or 1: one more calibration could show otherwise."""
-
-_FAR, _STEPS = 50.0, 2000
-"""Times, in units of the longest observed one, within which a reliability is sought."""
-
-_SEARCHED = 200
-"""Evaluations of a model in one search."""
-
-_STEP = 1e-6
-"""Of a parameter, for a gradient."""
-
-_APART = 1.5
-"""Two intervals are not alike where the step between them is so many times the mean step."""
+LEVEL = 0.95  # of the test of lack of fit, and of the range of the interval
+_SURE = 1e-12  # no reliability is 0 or 1: one more calibration could show otherwise
+_FAR, _STEPS = 50.0, 2000  # times, in units of the longest observed one, within which a reliability is sought
+_SEARCHED = 200  # evaluations of a model in one search
+_STEP = 1e-6  # of a parameter, for a gradient
+_APART = 1.5  # two intervals are not alike where the step between them is so many times the mean step
 
 
 @dataclass(frozen=True)

@@ -28,19 +28,13 @@ class IntervalBounds:
         return min(max(days, self.shortest_days), self.longest_days)
 
 
-USUAL = IntervalBounds()
-"""As suncal has it."""
+USUAL = IntervalBounds()  # as suncal has it
 
 
 DAYS_A_MONTH = 365.2425 / 12
-
-USUAL_MONTHS = 12
-"""Interval of a machine whose job says nothing."""
-
+USUAL_MONTHS = 12  # interval of a machine whose job says nothing
 USUAL_RELIABILITY = 0.95
-
-LONGEST_MONTHS = 60
-"""Longest interval that a method comes to where nothing is said: the five years of suncal."""
+LONGEST_MONTHS = 60  # longest interval that a method comes to where nothing is said: the five years of suncal
 
 
 @dataclass(frozen=True)

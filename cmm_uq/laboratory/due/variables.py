@@ -17,8 +17,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats
 
-_FAR, _STEPS = 100.0, 4000
-"""Times, in units of the longest observed interval, within which an interval is sought."""
+_FAR, _STEPS = 100.0, 4000  # times, in units of the longest observed interval, within which an interval is sought
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from cmm_uq.laboratory.live.soaking import Soak, is_temperature, unsettled
 from cmm_uq.laboratory.live.story import Place, Story
 from cmm_uq.laboratory.live.table import TYPED, LiveRecording, rows_of
 
-_SAID = 50
-"""Lines of what happened that a screen may show."""
+_SAID = 50  # lines of what happened that a screen may show
 
 
 class Conductor:
@@ -316,9 +315,7 @@ _ALL = say("nothing is left of the plan")
 _OF_ALL: Mapping[str, bool] = MappingProxyType({"timed": False})
 """Of points that share a moment which is none of theirs."""
 
-_PASTED_S = 0.6
-"""Between two points that are typed: in less nobody measures."""
-
+_PASTED_S = 0.6  # between two points that are typed: in less nobody measures
 _NUMBERS = ("measurement", "point", "repeat")
 
 

@@ -23,17 +23,10 @@ from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.linear_model import LinearModel
 
-LEVEL = 0.95
-"""Of the interval that is shown."""
-
-RARE = 0.01
-"""Part of sound set-ups whose repeats are asked for once more."""
-
-FEWEST = 3
-"""Degrees of freedom that the noise is estimated from."""
-
-_DETERMINED = 1e-9
-"""1 − h below which nothing but the observation itself says what it should be."""
+LEVEL = 0.95  # of the interval that is shown
+RARE = 0.01  # part of sound set-ups whose repeats are asked for once more
+FEWEST = 3  # degrees of freedom that the noise is estimated from
+_DETERMINED = 1e-9  # 1 − h below which nothing but the observation itself says what it should be
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,9 @@ from cmm_uq.base.output.staging import locked
 from cmm_uq.laboratory.live.journal import Moment, Record, RecordingJournal, opened, refuse_damaged
 from cmm_uq.laboratory.live.story import Story
 
-FOLDER = "acquisition"
-"""Inside the job's."""
-
+FOLDER = "acquisition"  # inside the job's
 LOCK = "lock"
-EVENTS, STREAMS = "{:04d}-events.jsonl", "{:04d}-streams.jsonl"
-"""Names of the two journals of a session, by its number."""
-
+EVENTS, STREAMS = "{:04d}-events.jsonl", "{:04d}-streams.jsonl"  # names of the two journals of a session, by its number
 _EVENTS = re.compile(r"(\d{4})-events\.jsonl")
 
 

@@ -19,11 +19,8 @@ from math import hypot, sqrt
 
 from cmm_uq.base.messages import Text, Verbatim, say
 
-NS = 1e-9
-"""s."""
-
-_BEFORE = 3
-"""Readings before a point that its value is made of, with the one after it."""
+NS = 1e-9  # s
+_BEFORE = 3  # readings before a point that its value is made of, with the one after it
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,8 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, OutputError
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_CHECKSUM = 8
-"""Hexadecimal digits of it."""
-
-MOST_WAITING = 64 * 2**20
-"""Bytes that wait in memory for room on the disk: twenty minutes of six instruments at 100 Hz."""
+_CHECKSUM = 8  # hexadecimal digits of it
+MOST_WAITING = 64 * 2**20  # bytes that wait in memory for room on the disk: twenty minutes of six instruments at 100 Hz
 
 
 @dataclass(frozen=True)

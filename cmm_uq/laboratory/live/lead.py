@@ -13,11 +13,8 @@ from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats, Ints, Points
 from cmm_uq.laboratory.live.story import Place, Point, Story
 
-_ON_LINE = 1e-6
-"""Of a set-up's length: what its points may lie off a line, for distances to be typed along it."""
-
-Run = tuple[int, int]
-"""Measurement and repeat."""
+_ON_LINE = 1e-6  # of a set-up's length: what its points may lie off a line, for distances to be typed along it
+Run = tuple[int, int]  # measurement and repeat
 
 
 @dataclass(frozen=True, eq=False)

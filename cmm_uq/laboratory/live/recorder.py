@@ -23,8 +23,7 @@ from cmm_uq.laboratory.live.joining import NS, Joined, Stream
 from cmm_uq.laboratory.live.journal import Moment, NoRoomError, RecordingJournal, lines_in
 from cmm_uq.laboratory.live.story import Place, Point, Story
 
-READINGS = "readings"
-"""Kind of such a record."""
+READINGS = "readings"  # kind of such a record
 
 
 class Blocks:

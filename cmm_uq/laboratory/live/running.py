@@ -23,9 +23,7 @@ from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, Event, Gap, LiveSource
 from cmm_uq.laboratory.live.screen import SessionView
 
-STILL_S = 1.0
-"""For which a file must not change."""
-
+STILL_S = 1.0  # for which a file must not change
 _UNFINISHED = (".tmp", ".part", ".crdownload", ".swp", "~")
 
 
@@ -102,8 +100,7 @@ COMMIT_S = 0.04
 """Between two commits, and two pictures: what came is on the disk after 100 ms at the latest, and seen after 50."""
 
 _LOOK_S = 0.5
-_AT_ONCE = 2000
-"""Events that are taken before the disk and the screen have their turn again."""
+_AT_ONCE = 2000  # events that are taken before the disk and the screen have their turn again
 
 
 class Screen(Protocol):

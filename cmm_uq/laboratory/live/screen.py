@@ -28,8 +28,7 @@ WORDS = {
 }
 """What each does."""
 
-WITH_TEXT = ("undo", "skip", "note")
-"""Those that say nothing without a text."""
+WITH_TEXT = ("undo", "skip", "note")  # those that say nothing without a text
 
 
 @dataclass(frozen=True)
@@ -104,12 +103,9 @@ def coming(step: PlannedPoint | None, lead: Lead) -> Text:
     return say("{where}, point {p}, repeat {r}, near {at} mm", where=where, p=p, r=r, at=at)
 
 
-WIDTH, HEIGHT = 30, 9
-"""Characters of each of the two views, without its frame."""
-
+WIDTH, HEIGHT = 30, 9  # characters of each of the two views, without its frame
 _VIEWS = ((0, 1, "from above: x right, y up"), (0, 2, "from the front: x right, z up"))
-_MOST = 36
-"""Points that are drawn with their number; 1 to 9, then letters."""
+_MOST = 36  # points that are drawn with their number; 1 to 9, then letters
 _MARKS = "123456789abcdefghijklmnopqrstuvwxyz*"
 
 

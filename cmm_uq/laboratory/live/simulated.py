@@ -19,18 +19,13 @@ from cmm_uq.laboratory.live.recorder import COORDINATES
 
 MAKER = "simulated"
 RATE_HZ = 10.0
-NOISE_MM = 1e-3
-"""Standard deviation of a coordinate."""
+NOISE_MM = 1e-3  # standard deviation of a coordinate
 
 ERRORS = np.array([[30e-6, 20e-6, 0.0], [0.0, -20e-6, 15e-6], [0.0, 0.0, 10e-6]])
 """What the machine indicates too much: 30, −20, 10 ppm along x, y, z, and two axes that are not square by 20 and 15 µrad."""
 
-TAKES_S = 0.7
-"""Time to measure a point."""
-
-_PLACED_MM = 5.0
-"""How far off the plan the artefact is set up."""
-
+TAKES_S = 0.7  # time to measure a point
+_PLACED_MM = 5.0  # how far off the plan the artefact is set up
 _USUAL = {"pressure_hpa": 1013.2, "humidity_pct": 45.0}
 
 

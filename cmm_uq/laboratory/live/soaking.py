@@ -18,8 +18,7 @@ from cmm_uq.laboratory.live.joining import NS
 _MEAN_S = 10.0
 _FEWEST = 4
 _HOUR = 3600.0
-_WHOLE = 0.95
-"""Part of the stated time that must have been seen."""
+_WHOLE = 0.95  # part of the stated time that must have been seen
 
 
 @dataclass

@@ -9,8 +9,7 @@ from typing import Any
 from cmm_uq.laboratory.live.joining import NS, Joined
 from cmm_uq.laboratory.live.journal import Moment, Record
 
-Place = tuple[int, int, int]
-"""Measurement, point, repeat."""
+Place = tuple[int, int, int]  # measurement, point, repeat
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ from cmm_uq.laboratory.live.recorder import COORDINATES
 from cmm_uq.laboratory.live.story import Point, Story
 
 _FIRST = ("measurement", "point", "repeat", *COORDINATES)
-TYPED = "typed"
-"""How a point came that the operator typed; ``typed length`` where it was a distance."""
+TYPED = "typed"  # how a point came that the operator typed; ``typed length`` where it was a distance
 
 
 @dataclass(frozen=True)

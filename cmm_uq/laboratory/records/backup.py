@@ -26,9 +26,7 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
 _MENDED = "Free the disk, mend the permissions, or name another file"
-
-KEPT = ".before-restore"
-"""What restored records are put in place of is kept under its name with this behind it."""
+KEPT = ".before-restore"  # what restored records are put in place of is kept under its name with this behind it
 
 
 def back_up(records: Records, out: Path) -> tuple[int, str]:

@@ -16,8 +16,7 @@ from cmm_uq.jobs.job import JobFile
 from cmm_uq.jobs.verdicts import Verdicts
 from cmm_uq.laboratory.records.facts import PERFORMANCE
 
-Named = Callable[[str], str]
-"""How a value is called in the field, by its name: ``scale_x.ppm``."""
+Named = Callable[[str], str]  # how a value is called in the field, by its name: ``scale_x.ppm``
 
 _UNIT_OF = (
     ("arcsec_per_m_k", "″/(m·K)"), ("arcsec_per_m", "″/m"), ("um_per_m", "µm/m"), ("um_per_h", "µm/h"), ("ppm_per_h", "ppm/h"),

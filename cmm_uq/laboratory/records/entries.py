@@ -24,8 +24,7 @@ KINDS = (
 CERTIFIED = frozenset({"report", "check", "imported"})
 """Kinds whose content is that of a certificate or of an interim check."""
 
-BEGINNING = "0" * 64
-"""What the first entry carries in place of a hash before it."""
+BEGINNING = "0" * 64  # what the first entry carries in place of a hash before it
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,14 +12,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-STATES = ("draft", "released", "withdrawn", "replaced")
-"""States of a certificate."""
-
-STANDING = ("draft", "released")
-"""States of a certificate that counts: neither withdrawn nor replaced."""
-
-PERFORMANCE = "performance:"
-"""With which the name of a value begins that a standard decided on."""
+STATES = ("draft", "released", "withdrawn", "replaced")  # states of a certificate
+STANDING = ("draft", "released")  # states of a certificate that counts: neither withdrawn nor replaced
+PERFORMANCE = "performance:"  # with which the name of a value begins that a standard decided on
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +165,7 @@ class ChainFinding:
     entry: int | None = None
 
 
-BY_NAME = "name:"
-"""What begins the key of something without a serial number."""
+BY_NAME = "name:"  # what begins the key of something without a serial number
 
 
 def spelled(serial: str) -> str:

@@ -24,7 +24,6 @@ from cmm_uq.laboratory.records.tables import (
 )
 
 Row = dict[str, Any]
-
 STATE_AFTER = {"withdrawal": "withdrawn", "replacement": "replaced"}
 
 

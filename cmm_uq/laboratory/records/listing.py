@@ -84,9 +84,7 @@ class CertificateFilter:
     until: dt.date | None = None
 
 
-COMMANDS = ("report", "diagnose")
-"""That make what is listed; named, so that the database finds its index."""
-
+COMMANDS = ("report", "diagnose")  # that make what is listed; named, so that the database finds its index
 _C = certificates.c
 _COLUMNS = (
     _C.entry, _C.job, _C.number, machines.c.called.label("machine"), machines.c.name.label("machine_name"),

@@ -17,15 +17,10 @@ if TYPE_CHECKING:
 
     from cmm_uq.laboratory.records.store import Records
 
-PATIENCE_S = 15.0
-"""How long to wait for another process that writes."""
+PATIENCE_S = 15.0  # how long to wait for another process that writes
 _TURNS = 150
-
-REVISION = "0002"
-"""Newest revision of the tables; see :mod:`cmm_uq.laboratory.records.migrations`."""
-
-KNOWN = ("0001", "0002")
-"""All revisions, oldest first."""
+REVISION = "0002"  # newest revision of the tables; see :mod:`cmm_uq.laboratory.records.migrations`
+KNOWN = ("0001", "0002")  # all revisions, oldest first
 
 
 def open_records(where: str | Path | None = None, *, create: bool = False, read_only: bool = False) -> Records:

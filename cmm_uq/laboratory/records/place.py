@@ -10,19 +10,11 @@ from pathlib import Path
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 
-APPLICATION = 0x434D4D55
-"""``application_id`` of the SQLite file: CMMU."""
-
-ENVIRONMENT = "CMM_UQ_RECORDS"
-"""Variable that names the records where no option does."""
-
-NONE = "none"
-"""In place of a file or URL: no records."""
-
+APPLICATION = 0x434D4D55  # ``application_id`` of the SQLite file: CMMU
+ENVIRONMENT = "CMM_UQ_RECORDS"  # variable that names the records where no option does
+NONE = "none"  # in place of a file or URL: no records
 FILE = "records.db"
-
-DEFAULT = Path("reports") / FILE
-"""Beside the folders of the reports."""
+DEFAULT = Path("reports") / FILE  # beside the folders of the reports
 
 
 def is_url(where: str | Path) -> bool:

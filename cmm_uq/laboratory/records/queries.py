@@ -41,9 +41,7 @@ from cmm_uq.laboratory.records.tables import (
 if TYPE_CHECKING:
     import pandas as pd
 
-_TOGETHER = 2000
-"""Certificates whose values are asked for in one query."""
-
+_TOGETHER = 2000  # certificates whose values are asked for in one query
 _C = certificates.c
 _CALLED = func.coalesce(artefacts.c.called, "")
 _CERTIFICATES = select(

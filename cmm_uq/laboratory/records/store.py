@@ -34,8 +34,7 @@ if TYPE_CHECKING:
 New = tuple[str, Mapping[str, Any], dt.datetime | None]
 """Kind, content, and moment of an entry to be added; ``None`` for now."""
 
-_BLOCK = 5000
-"""Entries that are written together."""
+_BLOCK = 5000  # entries that are written together
 
 
 class Records(RecordQueries):

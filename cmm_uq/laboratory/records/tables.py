@@ -28,8 +28,7 @@ META = MetaData(
     }
 )
 
-DAY = String(10)
-"""ISO 8601, which sorts as days do."""
+DAY = String(10)  # ISO 8601, which sorts as days do
 
 NUMBER = BigInteger().with_variant(Integer, "sqlite")
 """Number of an entry; SQLite makes its rows' own number of an INTEGER only."""

@@ -21,9 +21,7 @@ from cmm_uq.laboratory.records.tables import INDEX, META, certificates, entries
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
-MOST = 1000
-"""Findings after which no more are looked for."""
-
+MOST = 1000  # findings after which no more are looked for
 _BLOCK = 2000
 
 

@@ -20,20 +20,14 @@ from cmm_uq import __version__
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.schedule.processes import Packed, TaskAnswer, WorkerProcess, WorkerTask
 
-MOST_TASKS, MOST_BYTES = 100, 8 * 2**20
-"""In one task of the cluster, unless a single one is larger."""
+MOST_TASKS, MOST_BYTES = 100, 8 * 2**20  # in one task of the cluster, unless a single one is larger
 
 CONNECT_S, PATIENCE_S, LOOK_S = 10.0, 60.0, 5.0
 """How long to wait for a scheduler, for a worker where there is none any more, and between two looks."""
 
-IDLE_S = 60.0
-"""How long a worker keeps a process that nobody asks."""
-
-_AHEAD = 2
-"""Tasks of the cluster for each thread of its workers."""
-
+IDLE_S = 60.0  # how long a worker keeps a process that nobody asks
+_AHEAD = 2  # tasks of the cluster for each thread of its workers
 Chunk = tuple[tuple[int, Packed], ...]
-
 _GO_ON = "Mend the cluster; the same command with --resume goes on"
 
 

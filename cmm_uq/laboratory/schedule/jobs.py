@@ -38,8 +38,7 @@ Snapshot = frozenset[tuple[str, int, int, int]]
 """Name, size, and times of change in nanoseconds of every file in a folder."""
 
 _ID = re.compile(r"[A-Za-z0-9._-]{1,100}")
-_HEAD = 200
-"""Bytes of a recording that say whether it is a plan still to be measured."""
+_HEAD = 200  # bytes of a recording that say whether it is a plan still to be measured
 
 
 @dataclass(frozen=True)
@@ -146,8 +145,7 @@ Report = Callable[[JobFolder], bytes]
 """Reports a job into its folder below ``out``, and returns contents of results.json."""
 
 REPORTED, UNCHANGED, WAITING, BUSY, GONE = "reported", "unchanged", "waiting", "busy", "gone"
-REFUSED, FAILED, WOULD = "refused", "failed", "would report"
-"""What came of a job."""
+REFUSED, FAILED, WOULD = "refused", "failed", "would report"  # what came of a job
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from cmm_uq.base.errors import OutputError
 from cmm_uq.base.output.staging import locked
 
 _BEGUN = b"begun\n"
-_ATTEMPTS = 20
-"""At a file that others lock and remove at the same time."""
+_ATTEMPTS = 20  # at a file that others lock and remove at the same time
 
 
 @dataclass(eq=False)

@@ -13,9 +13,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, say
 from cmm_uq.jobs.verdicts import Verdict, Verdicts
 
-Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]
-"""What a message may be about."""
-
+Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]  # what a message may be about
 EVENTS: tuple[Event, ...] = get_args(Event)
 
 _OF_OUTCOME: Mapping[str, Event] = {"fail": "fail", "conditional fail": "fail", "incomplete": "incomplete"}

@@ -26,17 +26,10 @@ from cmm_uq.laboratory.schedule.notices import Channel, Notice, OutgoingMessage,
 from cmm_uq.laboratory.schedule.state import PRIVATE, State
 
 _MENDED = "Free the disk, or mend the permissions"
-
-MOST = 20
-"""Messages that one run sends one by one through a channel; what is beyond goes in one."""
-
-LISTED = 200
-"""Titles in a message of several."""
-
+MOST = 20  # messages that one run sends one by one through a channel; what is beyond goes in one
+LISTED = 200  # titles in a message of several
 _WAITING, _SENT, _UNFINISHED = ".json", ".sent", ".unfinished-"
-
-_ABANDONED_S = 3600.0
-"""Age at which nobody writes a file any more that takes milliseconds."""
+_ABANDONED_S = 3600.0  # age at which nobody writes a file any more that takes milliseconds
 
 
 @dataclass(frozen=True)

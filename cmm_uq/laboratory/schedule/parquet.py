@@ -16,9 +16,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.output.new_file import new_file, refuse_taken
 
 Row = tuple[Any, ...]
-
-GROUP = 20_000
-"""Rows in a group: a few megabytes, and few enough groups."""
+GROUP = 20_000  # rows in a group: a few megabytes, and few enough groups
 
 
 Columns = Sequence[tuple[str, str, str]]

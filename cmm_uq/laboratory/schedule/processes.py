@@ -251,10 +251,7 @@ def _given(stream: BinaryIO) -> Iterator[Any]:
 
 
 MOST_WORKERS = 256
-
-_AHEAD = 2
-"""Tasks for each process that are ready before it asks."""
-
+_AHEAD = 2  # tasks for each process that are ready before it asks
 _Waiting = queue.SimpleQueue[tuple[int, Any] | None]
 _Answers = queue.SimpleQueue[TaskAnswer | BaseException]
 

@@ -66,8 +66,7 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-_PATIENCE_S = 2.0
-"""How long to wait for another run that writes its line."""
+_PATIENCE_S = 2.0  # how long to wait for another run that writes its line
 
 
 @dataclass(frozen=True)

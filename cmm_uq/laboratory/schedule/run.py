@@ -34,12 +34,8 @@ from cmm_uq.laboratory.schedule.settings import RunTable
 from cmm_uq.laboratory.schedule.state import Problems
 
 SCHEMA = "cmm-uq/scheduled/1"
-
-_IN_A_ROW = 3
-"""Jobs one after another whose output is impossible: then it is so for the others too."""
-
-_PATIENCE_S = 60.0
-"""How long to wait for another run that sends messages."""
+_IN_A_ROW = 3  # jobs one after another whose output is impossible: then it is so for the others too
+_PATIENCE_S = 60.0  # how long to wait for another run that sends messages
 
 
 @dataclass(frozen=True)

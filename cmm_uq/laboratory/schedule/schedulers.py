@@ -10,15 +10,9 @@ from pathlib import PurePath
 from types import MappingProxyType
 from xml.sax.saxutils import escape
 
-DAYS = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
-"""Days of the week, as they are given."""
-
-UNIT = "cmm-uq-schedule"
-"""Name of units and task."""
-
-SECRETS = "schedule.env"
-"""File with the variables of secrets, beside schedule.toml."""
-
+DAYS = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")  # days of the week, as they are given
+UNIT = "cmm-uq-schedule"  # name of units and task
+SECRETS = "schedule.env"  # file with the variables of secrets, beside schedule.toml
 _OF_WINDOWS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Sunday")
 _NAMESPACE = "http://schemas.microsoft.com/windows/2004/02/mit/task"
 

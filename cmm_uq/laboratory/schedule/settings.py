@@ -16,12 +16,9 @@ from cmm_uq.base.files.toml_file import checked
 from cmm_uq.laboratory.schedule.notices import EVENTS, Event
 
 FILE = "schedule.toml"
-
 _ADDRESS = re.compile(r"[^\s@<>,;:\"()\[\]\\]+@[^\s@<>,;:\"()\[\]\\]+")
 _VARIABLE = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-
-PORTS = {"starttls": 587, "tls": 465, "none": 25}
-"""Usual ports of a mail server."""
+PORTS = {"starttls": 587, "tls": 465, "none": 25}  # usual ports of a mail server
 
 
 def _address(text: str) -> str:

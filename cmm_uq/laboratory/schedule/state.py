@@ -28,9 +28,7 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.records.facts import RecordedCertificate
     from cmm_uq.laboratory.records.store import Records
 
-PRIVATE = ".scheduled"
-"""Folder beside the reports with locks and messages."""
-
+PRIVATE = ".scheduled"  # folder beside the reports with locks and messages
 COMMAND = "report"
 
 

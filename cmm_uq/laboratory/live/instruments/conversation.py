@@ -9,8 +9,7 @@ from cmm_uq.laboratory.live.instruments.parsing import FramedMessage
 from cmm_uq.laboratory.live.instruments.profile import Identify, Send, bytes_of
 from cmm_uq.laboratory.live.instruments.source import Identity
 
-SECOND = 1_000_000_000
-"""ns."""
+SECOND = 1_000_000_000  # ns
 
 PAUSE = SECOND // 2
 """After an answer that did not come: where several questions are asked, a late one would be taken for the next one's."""

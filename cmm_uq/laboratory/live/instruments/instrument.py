@@ -39,11 +39,8 @@ from cmm_uq.laboratory.live.instruments.source import (
     Returned,
 )
 
-RETRY_S = 0.25
-"""Between two attempts to open a port that is gone; a return is to be noticed within 2 s."""
-
-INTRODUCED_WITHIN_S = 0.7
-"""Time for an instrument that came back to say which one it is."""
+RETRY_S = 0.25  # between two attempts to open a port that is gone; a return is to be noticed within 2 s
+INTRODUCED_WITHIN_S = 0.7  # time for an instrument that came back to say which one it is
 
 
 @dataclass(frozen=True)

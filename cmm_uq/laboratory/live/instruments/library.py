@@ -57,8 +57,7 @@ def _folder() -> Path:
     return Path(str(files("cmm_uq") / "laboratory" / "live" / "instruments" / "profiles"))
 
 
-NUMBER = r"[-+]?\s*\d+\.?\d*(?:[Ee][-+]?\d+)?"
-"""A number in a line."""
+NUMBER = r"[-+]?\s*\d+\.?\d*(?:[Ee][-+]?\d+)?"  # A number in a line
 
 _FOUND = re.compile(r"(?:[-+]\s*|(?<![\w.]))\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[A-Za-z_])\d+\.\d+")
 """The 1 of CH1 is none, the 20.1 of T20.1 is one."""

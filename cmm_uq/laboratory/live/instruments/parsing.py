@@ -165,12 +165,9 @@ def conversion(given: str, wanted: str) -> Callable[[float], float]:
     return lambda value: float(registry.Quantity(value, given).to(target).magnitude)
 
 
-_SHOWN = 60
-"""Bytes of a message that was not understood, as messages show them."""
-
+_SHOWN = 60  # bytes of a message that was not understood, as messages show them
 _PLAIN = ProfileQuantity()
-_NOTHING = Parse(pattern="(?!)")
-"""Understands nothing."""
+_NOTHING = Parse(pattern="(?!)")  # understands nothing
 
 
 @dataclass(frozen=True)

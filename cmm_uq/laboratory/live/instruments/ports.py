@@ -27,8 +27,7 @@ from cmm_uq.laboratory.live.instruments.source import TICK_S, Clock, Port, PortL
 if TYPE_CHECKING:
     import serial
 
-SCHEME = "visa://"
-"""Begins the name of a port that VISA knows: ``visa://GPIB0::17::INSTR``."""
+SCHEME = "visa://"  # begins the name of a port that VISA knows: ``visa://GPIB0::17::INSTR``
 
 
 class VisaPort:
@@ -77,12 +76,9 @@ class VisaPort:
 
 
 FILE = "file:"
-NETWORK = ("tcp://", "socket://")
-"""Plain TCP, by two names."""
+NETWORK = ("tcp://", "socket://")  # plain TCP, by two names
 RFC2217 = "rfc2217://"
-
-CONNECT_WITHIN_S = 1.0
-"""Time for a connection over the network: twice of it is less than what a reconnection may take."""
+CONNECT_WITHIN_S = 1.0  # time for a connection over the network: twice of it is less than what a reconnection may take
 
 KEPT_ALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
 """So that a connection whose other side was switched off is lost after 8 s, where nothing is sent that would show it."""
@@ -91,8 +87,7 @@ _CHUNK = 65536
 _ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
 
 
-PortOpener = Callable[[], Port]
-"""Opens a port, again and again."""
+PortOpener = Callable[[], Port]  # opens a port, again and again
 
 
 def opener(port: str, connection: Connection, *, tcp_port: int | None = None) -> PortOpener:

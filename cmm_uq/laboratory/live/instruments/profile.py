@@ -51,11 +51,8 @@ def _plain(text: str) -> bytes:
         raise ValueError(f"{text[error.start]!r} is no single byte: write each byte as <0x41>") from None
 
 
-MOST_FIELDS = 200
-"""Of a message."""
-
-ANSWER_WITHIN_S = 2.0
-"""Usual time for an answer."""
+MOST_FIELDS = 200  # of a message
+ANSWER_WITHIN_S = 2.0  # usual time for an answer
 
 
 def _codes(text: str) -> str:

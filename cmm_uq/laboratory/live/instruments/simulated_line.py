@@ -17,7 +17,6 @@ from cmm_uq.laboratory.live.instruments.speakers import Speaker
 
 Way = Literal["pty", "socket", "rfc2217"]
 WAYS: tuple[Way, ...] = ("pty", "socket", "rfc2217")
-
 _TICK_S = 0.01
 
 

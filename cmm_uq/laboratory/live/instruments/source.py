@@ -118,8 +118,7 @@ class SystemClock:
 SYSTEM: Clock = SystemClock()
 
 
-TICK_S = 0.05
-"""Longest wait for bytes; whoever waits longer looks at the clock in between."""
+TICK_S = 0.05  # longest wait for bytes; whoever waits longer looks at the clock in between
 
 
 class PortLostError(Exception):

@@ -9,9 +9,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.live.instruments.profile import ProfileFile, shown
 from cmm_uq.laboratory.live.instruments.source import Event, Reading, Returned
 
-_SAYS = ("the instrument says", "the machine says")
-"""How words of the instrument begin."""
-
+_SAYS = ("the instrument says", "the machine says")  # how words of the instrument begin
 _LETTERS = {"none": "N", "even": "E", "odd": "O", "mark": "M", "space": "S"}
 
 

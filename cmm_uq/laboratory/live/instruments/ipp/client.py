@@ -22,8 +22,7 @@ from cmm_uq.laboratory.live.instruments.ipp.protocol import (
 )
 from cmm_uq.laboratory.live.instruments.source import Clock, Port
 
-MOVED_WITHIN_S = 300.0
-"""Time for what moves it."""
+MOVED_WITHIN_S = 300.0  # time for what moves it
 
 NOT_THERE = frozenset({501, 502, 505, 506, 507, 509, 510})
 """Errors by which a server says that it does not know a command, an argument or a property (section 8.2)."""

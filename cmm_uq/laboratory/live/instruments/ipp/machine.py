@@ -28,14 +28,12 @@ from cmm_uq.laboratory.live.instruments.ports import NETWORK, PortOpener, opener
 from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
 from cmm_uq.laboratory.live.instruments.source import Clock, Event, Gap, Identity, PortLostError, Reading, Returned
 
-PORT = 1294
-"""Of an I++ DME server (specification 1.4.3, section 6.1)."""
+PORT = 1294  # of an I++ DME server (specification 1.4.3, section 6.1)
 
 AGAIN_WITHIN_S = 0.8
 """Least time for each answer of a server that came back; more where it took more to begin the first time."""
 
-RETRY_S = 0.25
-"""Between two attempts to connect; a return is to be noticed within 2 s."""
+RETRY_S = 0.25  # between two attempts to connect; a return is to be noticed within 2 s
 
 ALIVE_EVERY_S = 1.0
 """How often a server that says nothing is asked whether it is in error: a connection may be dead unnoticed."""

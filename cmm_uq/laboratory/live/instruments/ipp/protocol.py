@@ -20,14 +20,9 @@ from cmm_uq.laboratory.live.instruments.source import Clock, Port
 
 ACK, DATA, ERROR, DONE = "&", "#", "!", "%"
 Sign = Literal["&", "#", "!", "%"]
-
 END = b"\r\n"
-LONGEST = 65536
-"""Characters of a line (section 6.2)."""
-
-MOST_DIGITS = 16
-"""Of a number (section 6.1.4.2)."""
-
+LONGEST = 65536  # characters of a line (section 6.2)
+MOST_DIGITS = 16  # of a number (section 6.1.4.2)
 _RESPONSE = re.compile(r"(?P<tag>\d{5}|E\d{4}) (?P<sign>[&#!%])(?: (?P<rest>.*))?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d{1,3})?")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9]*(?:\.[A-Za-z][A-Za-z0-9]*)*")
@@ -49,8 +44,7 @@ class Term:
     arguments: tuple[Argument, ...] = ()
 
 
-Argument = float | str | Term
-"""A number, a text or a bare name, or a term."""
+Argument = float | str | Term  # A number, a text or a bare name, or a term
 
 
 @dataclass(frozen=True)
@@ -177,11 +171,8 @@ def number_text(value: float) -> str:
     return f"{value:.12g}"
 
 
-ANSWER_WITHIN_S = 2.0
-"""Time for the acknowledgement, and for data of what does not move the machine."""
-
-_KEPT = 1000
-"""Lines sent that are remembered."""
+ANSWER_WITHIN_S = 2.0  # time for the acknowledgement, and for data of what does not move the machine
+_KEPT = 1000  # lines sent that are remembered
 
 
 class FaultError(Exception):

@@ -37,8 +37,7 @@ TEXTS = {
 }  # fmt: skip
 """Severity and text of errors by their numbers (section 8.2)."""
 
-LIMIT_MM = 1000.0
-"""Of each axis, both ways."""
+LIMIT_MM = 1000.0  # of each axis, both ways
 
 
 @dataclass
