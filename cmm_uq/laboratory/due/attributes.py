@@ -1,17 +1,13 @@
 """Intervals from whether calibrations found the machine in tolerance: method A3 of NCSLI RP-1, and the staircase.
 
-Method A3 of NCSLI RP-1: whether the reliability observed at the end of an interval is the one that is wanted.
+A3: the numbers in and out of tolerance at the end of like intervals are binomial. The interval is changed where its
+reliability differs from the target with enough confidence, and by no more than a factor either way.
 
-The numbers in and out of tolerance at the end of like intervals are binomial. The interval is changed where its reliability
-differs from the target with enough confidence, and by no more than a factor either way.
-
-Automatic adjustment, or staircase (ILAC-G24 / OIML D 10:2022, method 1): each calibration changes the interval.
-
-A calibration that finds the machine well within its limits (to 80 %) lengthens the next interval by a
-step up; one that finds it beyond a limit shortens it by a step down; between, it stays. The steps
-follow from the reliability R that is wanted: where R of the calibrations go up and 1 − R down, the logarithm of the
-interval does not move, R·ln(1 + a) + (1 − R)·ln(1 − b) = 0. A step up is a tenth, or less where a step down would then be
-more than an interval may shrink by at once.
+Staircase (ILAC-G24 / OIML D 10:2022, method 1): a calibration that finds the machine well within its limits (to 80 %)
+lengthens the next interval by a step up; one that finds it beyond a limit shortens it by a step down; between, it stays.
+The steps follow from the reliability R that is wanted: where R of the calibrations go up and 1 − R down, the logarithm of
+the interval does not move, R·ln(1 + a) + (1 − R)·ln(1 − b) = 0. A step up is a tenth, or less where a step down would
+then be more than an interval may shrink by at once.
 """
 
 from __future__ import annotations
@@ -28,31 +24,23 @@ from cmm_uq.laboratory.due.rule import USUAL, IntervalBounds
 
 @dataclass(frozen=True)
 class IntervalTest:
-    """What the test of an interval found.
+    """What the test of an interval found; ``low`` and ``high`` bound its true reliability (Clopper–Pearson)."""
 
-    ``in_tolerance, tested``: calibrations found in tolerance at the end of the interval, and all of them;
-    ``observed``: their ratio; ``low`` and ``high`` bound the true one (Clopper–Pearson) at the confidence asked for;
-    ``rejection``: confidence with which the interval is rejected, 0 to 1; ``calculated``: interval that the method
-    computes, days; ``recommended``: the same where the rejection is confident enough, within its bounds; else the
-    interval as it is.
-    """
-
-    in_tolerance: int
+    in_tolerance: int  # and tested: calibrations found in tolerance at the end of the interval, and all of them
     tested: int
     observed: float
     low: float
     high: float
-    rejection: float
-    calculated: float
+    rejection: float  # confidence with which the interval is rejected, 0 to 1
+    calculated: float  # interval that the method computes, days
     recommended: float
 
 
 def interval_test(
     in_tolerance: int, tested: int, interval: float, target: float, changing: IntervalBounds = USUAL
 ) -> IntervalTest:
-    """Test an interval against a reliability target.
+    """Test an interval, days, against the reliability wanted at its end.
 
-    ``interval``: that interval, days; ``target``: reliability wanted at its end, between 0 and 1.
     With the observed reliability R₀ of n calibrations, of which x were in tolerance, and the target R, the rejection
     confidence is that of the two-sided binomial test, Q = 1 − 2 P(X ≤ x) below the target and 1 − 2 P(X ≥ x) above
     it, and 1 − P(X = x) where all or none were in tolerance. The new interval is I·10^((R₀ − R)·Q) below the target
@@ -109,13 +97,10 @@ STEP_UP = 0.1  # part by which an interval is lengthened at most
 
 @dataclass(frozen=True)
 class Staircase:
-    """Where the staircase has come to.
+    """Where the staircase has come to."""
 
-    ``interval``: days; ``up, kept, down``: calibrations that lengthened it, left it, and shortened it.
-    """
-
-    interval: float
-    up: int
+    interval: float  # days
+    up: int  # and kept, down: calibrations that lengthened it, left it, and shortened it
     kept: int
     down: int
 
@@ -130,10 +115,7 @@ def steps(reliability: float, factor: float = USUAL.factor) -> tuple[float, floa
 def staircase(
     used: Iterable[float], interval: float, reliability: float, changing: IntervalBounds = USUAL
 ) -> Staircase:
-    """Climb from a first interval.
-
-    ``interval``: first interval, days; ``changing``: bounds of the interval, and the most that it shrinks by at once.
-    """
+    """Climb from a first interval, days, by the parts of the limits that calibrations found used up."""
     up_by, down_by = steps(reliability, changing.factor)
     counts = [0, 0, 0]
     for part in used:

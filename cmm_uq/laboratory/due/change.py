@@ -1,7 +1,5 @@
 """What a value changed by between two certificates, and whether that means anything.
 
-What a value changed by between two certificates, and whether that means anything.
-
 Both values carry the error of the artefact. Where it was the same artefact, that part is in both, and cancels in their
 difference: u²(d) = u₁² + u₂² − 2·u_a1·u_a2 (JCGM 100:2008, 5.2.2, with correlation 1 of what comes from the artefact).
 Where all of an uncertainty comes from the artefact, as a test uncertainty does, nothing is stated of how the machine
@@ -62,10 +60,7 @@ class ValueChange:
 
 
 def each_of(count: int, family: float) -> float:
-    """Probability for each of several comparisons that gives ``family`` for all, were they independent (Šidák 1967).
-
-    For normal deviates, however correlated, it is no more than that.
-    """
+    """Probability for each of several comparisons that gives ``family`` for all, at most (Šidák 1967)."""
     return -math.expm1(math.log1p(-family) / max(count, 1))
 
 

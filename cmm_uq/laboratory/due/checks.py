@@ -33,16 +33,12 @@ WARNING, ACTION = 2.0, 3.0  # limits of a chart of one value, in standard uncert
 
 @dataclass(frozen=True)
 class InterimCheck:
-    """What one interim check comes to.
-
-    ``standing``: by the rule; ``worst``: the value that is furthest out, as it is called; empty where nothing could
-    be compared; ``ratio``: its difference from the calibration in units of the difference's standard uncertainty.
-    """
+    """What one interim check comes to."""
 
     certificate: RecordedCertificate
-    standing: Standing
-    worst: str
-    ratio: float
+    standing: Standing  # by the rule
+    worst: str  # the value that is furthest out, as it is called; empty where nothing could be compared
+    ratio: float  # its difference from the calibration in units of the difference's standard uncertainty
     warning: float
     action: float
 
@@ -53,10 +49,7 @@ def limit_for(count: int, single: float) -> float:
 
 
 def check_standings(calibration: RecordedCertificate, checks: Sequence[RecordedCertificate]) -> list[InterimCheck]:
-    """Each check by the rule, in turn.
-
-    ``checks``: of the same machine since, without an adjustment between, by day.
-    """
+    """Each check since the calibration, by day and without an adjustment between, by the rule."""
     stated = {one.name: _stated(one, calibration) for one in calibration.values if is_of_machine(one.unit)}
     found: list[InterimCheck] = []
     before: dict[str, ValueChange] = {}

@@ -47,20 +47,14 @@ _SEED = 20
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Of N machines.
+    """Of N machines."""
 
-    ``last``: (N,) ordinal of each machine's last certificate, or of an adjustment after it; ``days, probability``:
-    (G,) and (N, G), of having been beyond the limit at some time until so many days after it; ``level, u_level``:
-    (N,) the error at the last certificate, given all certificates, and its standard uncertainty; ``rate, u_rate``:
-    (N,) per year.
-    """
-
-    last: Floats
+    last: Floats  # (N,) ordinal of each machine's last certificate, or of an adjustment after it
     days: Floats
     probability: Floats
     level: Floats
     u_level: Floats
-    rate: Floats
+    rate: Floats  # and u_rate: (N,) per year
     u_rate: Floats
 
     @staticmethod
@@ -93,17 +87,12 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """When one machine crosses its limit.
+    """When one machine crosses its limit."""
 
-    ``last``: day of the last certificate, or of an adjustment after it: from here on is looked ahead; ``days,
-    probability``: (G,) of having crossed until so many days after it; ``level, u_level, rate, u_rate``: the error
-    then and its rate per year, with standard uncertainties.
-    """
-
-    last: date
-    days: Floats
+    last: date  # day of the last certificate, or of an adjustment after it: from here on is looked ahead
+    days: Floats  # and probability: (G,) of having crossed until so many days after it
     probability: Floats
-    level: float
+    level: float  # and u_level, rate, u_rate: the error then and its rate per year, with standard uncertainties
     u_level: float
     rate: float
     u_rate: float
@@ -173,11 +162,7 @@ def crossings(
     machines: Histories, prior: DriftPrior, state: DriftState, limit: Floats | float, *, one_sided: bool = False,
     paths: int = PATHS, until: float = HORIZON * YEAR, days: Floats = DAYS,
 ) -> Crossings:  # fmt: skip
-    """When the errors of many machines will be.
-
-    ``limit``: (N,) or one of all; ``until``: days to look ahead where less than the horizon does; later probabilities
-    are those of that day.
-    """
+    """When the errors of many machines will be; later than ``until`` days, probabilities are those of that day."""
     N = len(machines)
     flat = _States.of(state, prior)
     limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), N)
@@ -219,8 +204,8 @@ class _States:
 def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Of each path: where it stands in the weights, numbers for its state, and for each gap of the grid for walk and steps.
 
-    The first two are a lattice in three dimensions (Roberts 2018); a normal number of the walk has its mirror image in another
-    path; steps take a uniform number and a normal one.
+    The first two are a lattice in three dimensions (Roberts 2018); a normal number of the walk has its mirror image in
+    another path; steps take a uniform number and a normal one.
     """
     n = np.arange(paths)
     root = 1.324717957244746  # of x³ = x + 1, for two dimensions beside an even one
@@ -239,7 +224,6 @@ def _numbers(paths: int, gaps: int) -> tuple[Floats, Floats, Floats, Floats]:
 def _probabilities(
     states: _States, which: Ints, limits: Floats, one_sided: bool, numbers: tuple[Floats, ...], days: Floats
 ) -> Floats:
-    """Of having crossed by each day of the grid, for some machines."""
     place, normal, walk, stepping = numbers
     cumulated = np.cumsum(states.weight[which], axis=1)
     chosen = np.stack([np.searchsorted(row / row[-1], place) for row in cumulated])
@@ -283,7 +267,7 @@ def _log_survival(probability: Floats) -> Floats:
 
 
 def _quantile(days: Floats, log_survival: Floats, wanted: float) -> float:
-    """Where the survival has fallen to a value, between the days of the grid as a constant hazard goes."""
+    """Where the survival falls to a value, between the days of the grid as a constant hazard goes."""
     if log_survival[0] <= wanted:
         return 0.0
     after = int(np.argmax(log_survival <= wanted))

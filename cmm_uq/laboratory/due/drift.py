@@ -1,12 +1,8 @@
 """How one error of a machine drifts: its history as the model takes it, and what is known before its own certificates.
 
-How one error of a machine drifts: its history as the model takes it, and histories of many machines side by side.
-
 The model, per error factor or figure of performance (docs/records/drift.md): between adjustments the error is a level that
 moves at a constant rate, wanders as a Wiener process and now and then makes a step; an adjustment puts it back near zero and
 leaves the rate. Certificates see it with their stated uncertainty, of which those made with one artefact share a part.
-
-What is known of drift before a machine's own certificates: defaults with their reasons, or what its fleet taught.
 
 A prior is a set of nodes, each a full set of the model's parameters with a weight; the model is exact Gaussian algebra at
 every node (:mod:`cmm_uq.laboratory.due.drift_filter`), and the nodes are summed over. Defaults are in units of the limit,
@@ -38,10 +34,7 @@ MOST_SHARED = 0.999
 
 
 class RecordedSeries(Protocol):
-    """What is asked of a series of the records: arrays of n certificates, ordered by day and entry.
-
-    ``day`` is an ordinal, ``adjusted_since`` too, or 0 or NaN where no adjustment is known.
-    """
+    """A series of n certificates, by day and entry; days are ordinals, 0 or NaN for an unknown adjustment."""
 
     @property
     def day(self) -> NDArray[np.generic]: ...
@@ -61,26 +54,19 @@ class RecordedSeries(Protocol):
 class DriftHistory:
     """What the certificates of one machine say of one error.
 
-    Attributes
-    ----------
-    day : (n,) ordinals, not falling.
-    value, u : (n,) of the certificates; standard uncertainties.
-    u_artefact : (n,) the part of u that comes from the artefact, common to all certificates made with it.
-    artefact : n names.
-    adjusted_since : (n,) ordinal of the last adjustment before each certificate, NaN where none is known.
-    adjusted_after : ordinal of an adjustment after the last certificate, NaN for none: nobody has seen what it left.
-
     Raises
     ------
     CmmUqError : arrays that do not fit, no certificate, a figure that is no number, an uncertainty that is not positive.
+
+    ``adjusted_after``: ordinal of an adjustment after the last certificate, NaN for none: nobody has seen what it left.
     """
 
-    day: Floats
-    value: Floats
+    day: Floats  # (n,) ordinals, not falling
+    value: Floats  # and u: (n,) of the certificates; standard uncertainties
     u: Floats
-    u_artefact: Floats
-    artefact: tuple[str, ...]
-    adjusted_since: Floats
+    u_artefact: Floats  # (n,) the part of u that comes from the artefact, common to all certificates made with it
+    artefact: tuple[str, ...]  # n names
+    adjusted_since: Floats  # (n,) ordinal of the last adjustment before each certificate, NaN where none is known
     adjusted_after: float = float("nan")
 
     def __post_init__(self) -> None:
@@ -129,25 +115,18 @@ def history(series: RecordedSeries, adjusted_after: float | None = None) -> Drif
 
 @dataclass(frozen=True, eq=False)
 class Histories:
-    """Histories of N machines as arrays, the k-th certificates beside each other; n of the longest, q artefacts at most.
+    """Histories of N machines as arrays, the k-th certificates beside each other; n of the longest, q artefacts at most."""
 
-    ``value, u``: (n, N); ``shared``: (n, q, N) what one standard uncertainty of each artefact of the machine adds to
-    the certificate; ``years``: (n, N) since the certificate before, or since the adjustment where one came between;
-    ``adjusted``: (n, N) whether one did; ``given``: (n, N) whether the machine has so many certificates;
-    ``artefacts``: (N, q) numbers into ``names``, −1 where a machine used fewer; ``last``: (N,) ordinal of the last
-    certificate, or of an adjustment after it; ``adjusted_after``: (N,) whether there is one.
-    """
-
-    value: Floats
+    value: Floats  # and u: (n, N)
     u: Floats
-    shared: Floats
-    years: Floats
-    adjusted: NDArray[np.bool_]
-    given: NDArray[np.bool_]
-    artefacts: Ints
+    shared: Floats  # (n, q, N) what one standard uncertainty of each artefact of the machine adds to the certificate
+    years: Floats  # (n, N) since the certificate before, or since the adjustment where one came between
+    adjusted: NDArray[np.bool_]  # (n, N) whether one did
+    given: NDArray[np.bool_]  # (n, N) whether the machine has so many certificates
+    artefacts: Ints  # (N, q) numbers into ``names``, −1 where a machine used fewer
     names: tuple[str, ...]
-    last: Floats
-    adjusted_after: NDArray[np.bool_]
+    last: Floats  # (N,) ordinal of the last certificate, or of an adjustment after it
+    adjusted_after: NDArray[np.bool_]  # (N,) whether there is one
 
     def __len__(self) -> int:
         return len(self.last)
@@ -183,11 +162,7 @@ def side_by_side(histories: Sequence[DriftHistory]) -> Histories:
 
 
 def _since(of: DriftHistory) -> tuple[NDArray[np.bool_], Floats]:
-    """Whether an adjustment comes between each certificate and the one before, and the years since the later of both.
-
-    An adjustment is taken for one between two certificates also where its date is before the first of them, which did not know
-    of it.
-    """
+    """Whether an adjustment comes between each certificate and the one before, and the years since the later of both."""
     before = np.concatenate([[np.nan], of.adjusted_since[:-1]])
     adjusted = np.isfinite(of.adjusted_since) & ~(of.adjusted_since <= before)
     previous = np.concatenate([of.day[:1], of.day[:-1]])
@@ -222,24 +197,16 @@ WRONG, WRONG_TIMES = 0.01, 5.0
 
 @dataclass(frozen=True, eq=False)
 class DriftPrior:
-    """Nodes of the model's parameters, in the unit of the values and in years.
+    """Nodes of the model's parameters, in the unit of the values and in years; a group's are weighed by the machine's data."""
 
-    ``rate, rate_sd``: (K,) of a machine's rate; ``walk``: (K,) standard deviation that a year's wandering adds;
-    ``first_sd, as_left_sd``: (K,) of the level at the first certificate, and just after an adjustment; both about
-    zero; ``steps_per_year, step_sd``: (K,) how often a step comes, and how large; ``weight``: (K,) of the nodes
-    before the machine's data; they sum to one in all groups together; ``group``: (K,) nodes of one group are weighed
-    against each other by the machine's data; groups are not, since they come from a fleet's posterior, which has
-    these data already.
-    """
-
-    rate: Floats
+    rate: Floats  # and rate_sd: (K,) of a machine's rate
     rate_sd: Floats
-    walk: Floats
+    walk: Floats  # (K,) standard deviation that a year's wandering adds
     first_sd: Floats
     as_left_sd: Floats
-    steps_per_year: Floats
+    steps_per_year: Floats  # and step_sd: (K,) how often a step comes, and how large
     step_sd: Floats
-    weight: Floats
+    weight: Floats  # (K,) of the nodes before the machine's data; they sum to one in all groups together
     group: Ints
 
     def __len__(self) -> int:
@@ -257,11 +224,7 @@ def limit_for(limit: float | None, u: Floats) -> float:
 
 
 def default_prior(unit: float, nodes: int = NODES) -> DriftPrior:
-    """Of a machine without a fleet.
-
-    ``unit``: the limit; see :func:`limit_for`; ``nodes``: how many, at the points of Roberts' sequence (2018), the
-    golden ratio's generalisation to more dimensions.
-    """
+    """Of a machine without a fleet, in units of the limit: nodes at the points of Roberts' sequence (2018)."""
     d = len(NAMES)
     root = 2.0
     for _ in range(60):
@@ -278,11 +241,7 @@ def default_prior(unit: float, nodes: int = NODES) -> DriftPrior:
 
 
 def learnt_prior(theta: Floats, rate: Floats, rate_sd: Floats, unit: float) -> DriftPrior:
-    """Of a machine of a fleet.
-
-    ``theta``: (g, 8) logarithms of the hyper-parameters, draws of the fleet's posterior, in units of ``unit``;
-    ``rate, rate_sd``: (g,) of the machine's rate at each.
-    """
+    """Of a machine of a fleet: at (g, 8) draws of its posterior of logarithms, in units of ``unit``, and rates (g,)."""
     g, w = len(theta), len(_WALK_NODES)
     values = {name: np.repeat(value, w) for name, value in _in_unit(np.exp(theta), unit).items()}
     return DriftPrior(

@@ -1,7 +1,5 @@
 """Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
 
-Level and rate of many machines given their certificates: Kalman filters over every likely tale of steps.
-
 State of a machine: level, rate, and the errors of the artefacts that it was measured with, in their standard uncertainties.
 Given when steps came and which certificates were wrong, all is Gaussian and the filter is exact (Kalman 1960; Durbin and
 Koopman 2012, section 4.3). Those tales are summed over: each certificate makes four of one, and the likeliest are kept (a
@@ -35,26 +33,19 @@ _TIMES = WRONG_TIMES**2 - 1
 
 @dataclass(frozen=True, eq=False)
 class DriftStart:
-    """Rate and artefacts' errors of each machine at each node, before its own certificates.
+    """Rate and artefacts' errors of each machine at each node, before its own certificates."""
 
-    ``mean``: (1 + q, N, K); ``covariance``: (1 + q, 1 + q, N, K).
-    """
-
-    mean: Floats
-    covariance: Floats
+    mean: Floats  # (1 + q, N, K)
+    covariance: Floats  # (1 + q, 1 + q, N, K)
 
 
 @dataclass(frozen=True, eq=False)
 class DriftState:
-    """After the last certificate, or an adjustment after it, for N machines, K nodes and M tales.
+    """After the last certificate, or an adjustment after it, for N machines, K nodes and M tales."""
 
-    ``mean``: (2 + q, N, K, M) level, rate, errors of the artefacts; ``covariance``: (2 + q, 2 + q, N, K, M);
-    ``log_weight``: (N, K, M) joint density of certificates and tale.
-    """
-
-    mean: Floats
-    covariance: Floats
-    log_weight: Floats
+    mean: Floats  # (2 + q, N, K, M) level, rate, errors of the artefacts
+    covariance: Floats  # (2 + q, 2 + q, N, K, M)
+    log_weight: Floats  # (N, K, M) joint density of certificates and tale
 
     def between(self, first: int, last: int | None) -> DriftState:
         return DriftState(self.mean[:, first:last], self.covariance[:, :, first:last], self.log_weight[first:last])
@@ -98,10 +89,7 @@ def usual_start(machines: Histories, prior: DriftPrior) -> DriftStart:
 
 
 def filtered(machines: Histories, prior: DriftPrior, start: DriftStart | None = None, kept: int = KEPT) -> DriftState:
-    """Filter all certificates of all machines at all nodes.
-
-    ``start``: of rates and artefacts, where it is not :func:`usual_start`.
-    """
+    """Filter all certificates of all machines at all nodes, from :func:`usual_start` or another start."""
     start = start or usual_start(machines, prior)
     order = np.argsort(-machines.given.sum(axis=0), kind="stable")  # whoever has no further certificate is done
     machines, start = machines.some(order), DriftStart(start.mean[:, order], start.covariance[:, :, order])
@@ -121,7 +109,6 @@ def filtered(machines: Histories, prior: DriftPrior, start: DriftStart | None = 
 
 
 def _set_back(state: DriftState, adjusted: NDArray[np.bool_], prior: DriftPrior) -> None:
-    """The level as an adjustment leaves it, in place; ``adjusted`` is (N, 1, 1)."""
     state.mean[0] *= ~adjusted
     state.covariance[0] *= ~adjusted
     state.covariance[:, 0] *= ~adjusted
@@ -215,13 +202,10 @@ FEWEST = 2  # certificates from which on a history says anything of a machine's 
 def change_since(
     of: DriftHistory, days: float, *, prior: DriftPrior | None = None, limit: float | None = None
 ) -> float | None:
-    """Root mean square change of an error by so many days after its last certificate, in its unit.
+    """Root mean square change of an error by so many days after its last certificate, in its unit; ``None`` if unknown.
 
     A rate that is known less and less well the farther it is carried on, a wandering and now and then a step:
     √((r² + u²(r))·t² + w²·t + n·s²·t), averaged over the model's parameters given the certificates.
-
-    ``prior``: what the machine's fleet taught; else the default one; ``limit``: in units of which the default one is.
-    Gives ``None`` where there is one certificate only, or the machine was adjusted after the last: then nobody knows.
     """
     if len(of.day) < FEWEST or np.isfinite(of.adjusted_after):
         return None

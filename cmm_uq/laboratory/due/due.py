@@ -1,12 +1,7 @@
-"""When a machine is due: from its certificates, its rule and what its model has found.
+"""When a machine is due, and why: by its rule, what its certificates and those of its model found, its checks, its artefact.
 
-The interval of a machine by its rule, from what its certificates, and those of its model, have found.
-
-Where the history does not bear the method, the interval that the rule begins with is taken, and it is said why.
-
-What is to be calibrated when, and why: a machine by its rule, its interim checks and its artefact.
-
-No certificate counts that is dated after the day asked about: a clock that was wrong would hide that a machine is overdue.
+Where the history does not bear the method, the interval that the rule begins with is taken, and it is said why. No
+certificate counts that is dated after the day asked about: a clock that was wrong would hide that a machine is overdue.
 """
 
 from __future__ import annotations
@@ -38,25 +33,17 @@ METHOD_WORDS: Mapping[str, Text] = {
 
 @dataclass(frozen=True)
 class RecalibrationInterval:
-    """An interval, and why it is that long.
+    """An interval, and why it is that long."""
 
-    ``days``: ``None`` where it is a number of calendar months; ``months``: that many; ``None`` where it is a number
-    of days; ``why``: one sentence without a full stop.
-    """
-
-    days: float | None
-    months: int | None
-    why: Text
+    days: float | None  # ``None`` where it is a number of calendar months
+    months: int | None  # that many; ``None`` where it is a number of days
+    why: Text  # one sentence without a full stop
 
 
 def interval_by(
     rule: Rule, certificates: Sequence[RecordedCertificate], pool: Pool, priors: Mapping[str, Prior] | None = None
 ) -> RecalibrationInterval:
-    """The interval after the last of a machine's calibrations.
-
-    ``certificates``: of the machine, by day, up to its newest calibration; with later interim checks for the drift
-    model.
-    """
+    """The interval after the last of a machine's calibrations, by day; the drift model takes later checks too."""
     if rule.method == "fixed":
         return _fixed(rule)
     from cmm_uq.laboratory.due.methods import METHODS  # numpy and scipy: a fixed interval need not wait for them
@@ -74,7 +61,7 @@ def interval_by(
 
 @lru_cache(maxsize=100)
 def _fixed(rule: Rule) -> RecalibrationInterval:
-    """A fixed interval; thousands of machines share a rule, and putting it into words takes longer than all else of it."""
+    """Cached: thousands of machines share a rule, and putting it into words takes longer than all else of it."""
     months = months_of(rule)
     stated = say("fixed interval of {months}", months=months)
     usual = say("{months}, as its job does not say otherwise", months=months)
@@ -86,27 +73,20 @@ State = Literal["overdue", "due", "later", "unknown"]
 
 @dataclass(frozen=True)
 class DueItem:
-    """A machine or an artefact, and when it is to be calibrated.
-
-    ``last``: day of its last calibration; ``due``: day by which it is to be calibrated again; ``None`` where nothing
-    says so; ``remarks``: what else is to be known, a sentence each; ``artefact``: serial of the artefact that its
-    last calibration was made with; ``blocked``: why no certificate of it can be made as things stand; empty where
-    nothing is in the way; ``beyond``: whether its last certificate finds it beyond its limits: it is overdue from
-    that day on.
-    """
+    """A machine or an artefact, when it is to be calibrated, and what is in the way of a certificate of it."""
 
     item: Literal["machine", "artefact"]
     serial: str
     name: str
     model: str
     place: str
-    last: dt.date | None
-    due: dt.date | None
+    last: dt.date | None  # day of its last calibration
+    due: dt.date | None  # day by which it is to be calibrated again; ``None`` where nothing says so
     why: Text
-    remarks: tuple[Text, ...] = ()
-    artefact: str = ""
+    remarks: tuple[Text, ...] = ()  # what else is to be known, a sentence each
+    artefact: str = ""  # serial of the artefact that its last calibration was made with
     blocked: Text | None = None
-    beyond: bool = False
+    beyond: bool = False  # whether its last certificate finds it beyond its limits: it is overdue from that day on
 
     def state(self, on: dt.date, within: dt.timedelta) -> State:
         """Overdue before a day or beyond its limits, due within a time of it, later, or unknown."""
@@ -126,27 +106,18 @@ def after_months(start: dt.date, months: int) -> dt.date:
 
 @dataclass(frozen=True)
 class CalibrationRecord:
-    """What is known of a machine on a day.
+    """What is known of a machine on a day; of a fixed interval only since its last calibration."""
 
-    ``machine, rule``: as its newest certificate has them; ``certificates``: measured and standing ones up to the day,
-    by day; of a fixed interval those since the last calibration; ``limited``: whether the last calibration sets a
-    limit, or decides on one; ``late``: last date of those that are dated after the day; ``None`` where none is;
-    ``priors``: what its fleet taught of each value, by name.
-    """
-
-    machine: RecordedMachine
+    machine: RecordedMachine  # and rule: as its newest certificate has them
     rule: Rule
     certificates: Sequence[RecordedCertificate]
-    limited: bool = True
-    late: dt.date | None = None
-    priors: Mapping[str, Prior] = field(default_factory=dict)
+    limited: bool = True  # whether the last calibration sets a limit, or decides on one
+    late: dt.date | None = None  # last date of those that are dated after the day; ``None`` where none is
+    priors: Mapping[str, Prior] = field(default_factory=dict)  # what its fleet taught of each value, by name
 
 
 def machine_due(of: CalibrationRecord, artefacts: Mapping[str, ArtefactRow], on: dt.date, pool: Pool) -> DueItem:
-    """When a machine is to be calibrated again.
-
-    ``artefacts``: by serial; ``on``: the day asked about.
-    """
+    """When a machine is to be calibrated again; artefacts by serial."""
     machine, known = of.machine, of.certificates
     remarks: list[Text] = []
     if machine.by_name:

@@ -1,7 +1,5 @@
 """A fleet of machines and one of their errors: what drift is usual, who does not belong, and each machine's own drift.
 
-A fleet of machines and one of their errors: what drift is usual, who does not belong, and each machine's own drift.
-
 Hyper-parameters are sampled by emcee, all else is exact given them (:mod:`cmm_uq.laboratory.due.fleet_model`). Each
 machine is judged and estimated with what all the *others* say as its prior, so that its certificates count once.
 """
@@ -75,10 +73,7 @@ class FleetMember:
 
 @dataclass(frozen=True)
 class UsualRate:
-    """The rate per year that is usual for a group of machines, its standard uncertainty and 95 % interval.
-
-    ``kind`` is "fleet" (the average machine), "model" (at the fleet's average place) or "place" (for its average model).
-    """
+    """The rate per year that is usual for a group of machines, its standard uncertainty and 95 % interval."""
 
     kind: str
     name: str
@@ -101,34 +96,25 @@ class HyperParameter:
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Of N machines, rates per year.
+    """Of N machines, rates per year; expected is what all others say of a machine of its model and place."""
 
-    ``rate, u_rate``: (N,) with the fleet as prior; ``expected, u_expected``: (N,) what all others say of a machine of
-    its model and place, before its own certificates; ``p``: (N,) probability of a rate as far from that or farther,
-    near 1 where its certificates say nothing of it; ``crossing``: where there is a limit.
-    """
-
-    rate: Floats
+    rate: Floats  # and u_rate: (N,) with the fleet as prior
     u_rate: Floats
     expected: Floats
     u_expected: Floats
-    p: Floats
-    crossing: Crossings | None
+    p: Floats  # (N,) probability of a rate as far from that or farther, near 1 where its certificates say nothing of it
+    crossing: Crossings | None  # where there is a limit
 
 
 @dataclass(frozen=True, eq=False)
 class Fleet(FleetPrior):
-    """What was learnt: the prior for a further machine, and all else.
+    """What was learnt: the prior for a further machine, and all else."""
 
-    ``usual, spreads``: what is usual, and how much differs; ``machines``: names, in the order of the estimates;
-    ``learnt_from``: machines that the hyper-parameters were sampled from.
-    """
-
-    usual: tuple[UsualRate, ...]
+    usual: tuple[UsualRate, ...]  # and spreads: what is usual, and how much differs
     spreads: tuple[HyperParameter, ...]
-    machines: tuple[str, ...]
+    machines: tuple[str, ...]  # names, in the order of the estimates
     estimates: Estimates
-    learnt_from: int
+    learnt_from: int  # machines that the hyper-parameters were sampled from
     chains: Chains
 
 
@@ -136,12 +122,7 @@ def fit_fleet(
     members: Sequence[FleetMember], seed: int = 1, progress: Progress | None = None, *, learnt_from: int = LEARNT_FROM,
     crossing_paths: int = 512,
 ) -> Fleet:  # fmt: skip
-    """Learn from a fleet.
-
-    ``members``: machines with at least one certificate each; one alone is possible, and learns little;
-    ``learnt_from``: machines that hyper-parameters are sampled from, drawn by lot where there are more;
-    ``crossing_paths``: drawn for the day of crossing of each.
-    """
+    """Learn from a fleet: hyper-parameters from machines drawn by lot where there are more than ``learnt_from``."""
     if not members:
         raise CmmUqError("no machine has a certificate that states this value",
                          fix="Record certificates, or choose another --name")  # fmt: skip
@@ -168,7 +149,6 @@ def fit_fleet(
 def _sampled(
     machines: Histories, shared: SharedEffects, unit: float, seed: int, progress: Progress | None, most: int
 ) -> tuple[Chains, int]:
-    """Draws of the hyper-parameters, and from how many machines."""
     which = np.arange(len(machines))
     if len(which) > most:
         which = np.sort(
@@ -228,7 +208,6 @@ def _spreads(draws: Floats, unit: float) -> tuple[HyperParameter, ...]:
 def _estimated(
     machines: Histories, start: DriftStart, theta: Floats, unit: float, limits: Sequence[float | None], paths: int
 ) -> Estimates:
-    """Each machine's own estimates, from what the others say and its certificates; in parts that fit the memory."""
     prior = learnt_prior(theta, np.zeros(len(theta)), np.ones(len(theta)), unit)
     limit = np.array([np.inf if each is None else each for each in limits])
     chunk = max(1, _FILTERED_AT_ONCE // len(prior))
@@ -247,8 +226,8 @@ def _estimated(
 def _rates(state: DriftState, prior: DriftPrior, start: DriftStart) -> Floats:
     """Rate and u with the certificates, the same before them, and the probability of so great a shift between, (5, N).
 
-    If the machine is one of its fleet, the certificates shift the mean of its rate by a normal deviate whose variance is what
-    they take from the variance of the rate.
+    If the machine is one of its fleet, the certificates shift the mean of its rate by a normal deviate whose variance is
+    what they take from the variance of the rate.
     """
     weight = state.weights(prior)
     rate, variance = state.mean[1], state.covariance[1, 1]
@@ -293,20 +272,15 @@ def belonging(p: Floats, false_discoveries: float = FALSE_DISCOVERIES) -> NDArra
 
 @dataclass(frozen=True, eq=False)
 class FleetValue:
-    """One error factor or figure of performance over the fleet.
+    """One error factor or figure of performance over the fleet."""
 
-    ``name, quantity, unit``: of the value; the unit as recorded; ``members``: machines, in the order of the fleet's
-    estimates; ``belongs``: (N,) whether each machine drifts as its fleet lets expect, all values taken together;
-    ``left_out``: certificates that state no uncertainty, which cannot be weighed.
-    """
-
-    name: str
+    name: str  # and quantity, unit: of the value; the unit as recorded
     quantity: str
     unit: str
-    members: tuple[FleetMember, ...]
+    members: tuple[FleetMember, ...]  # machines, in the order of the fleet's estimates
     fleet: Fleet
-    belongs: NDArray[np.bool_]
-    left_out: int
+    belongs: NDArray[np.bool_]  # (N,) whether each machine drifts as its fleet lets expect, all values taken together
+    left_out: int  # certificates that state no uncertainty, which cannot be weighed
 
     @property
     def compared(self) -> bool:
@@ -314,10 +288,7 @@ class FleetValue:
 
     @cached_property
     def median(self) -> Floats:
-        """Days after its last certificate by which a machine has as likely as not crossed its limit, (N,).
-
-        0 where it had already; infinite beyond the horizon, and without a limit.
-        """
+        """Days (N,) from the last certificate to the median crossing: 0 where it was before, else perhaps infinite."""
         crossing = self.fleet.estimates.crossing
         return np.full(len(self.members), np.inf) if crossing is None else crossing.quantile(0.5)
 
@@ -377,10 +348,7 @@ def seen_again(member: FleetMember) -> bool:
 
 
 def judged(learnt: Iterable[tuple[str, str, str, tuple[FleetMember, ...], Fleet, int]], seed: int) -> FleetResult:
-    """Values with who belongs: one procedure over all machines and values, so that many values accuse no more machines.
-
-    Where nothing can be compared, no machine is said not to belong.
-    """
+    """Values with who belongs: one procedure over all machines and values, so that many values accuse no more machines."""
     all_learnt = list(learnt)
     p = np.concatenate([fleet.estimates.p for *_, fleet, _ in all_learnt])
     weighed = np.concatenate([np.full(len(members), comparable(members)) for *_, members, _, _ in all_learnt])

@@ -1,7 +1,5 @@
 """What a fleet's certificates say of its hyper-parameters, with all that is linear integrated exactly.
 
-What a fleet's certificates say of its hyper-parameters, with all that is linear integrated exactly.
-
 A machine's certificates speak of its rate and of the errors of its artefacts; given the hyper-parameters they do so nearly as
 a Gaussian would (exactly, where no tale but the first counts: moments over the tales otherwise). Rates of machines are those
 usual for fleet, model and place, and their own; artefacts are shared. All of these are then one Gaussian, integrated in one
@@ -30,16 +28,12 @@ _KEPT = 4  # tales that hyper-parameters are learnt from
 
 @dataclass(frozen=True, eq=False)
 class SharedEffects:
-    """What machines have in common: G = 1 + models + places + artefacts that several were measured with.
-
-    ``models, places, artefacts``: their names, in the order of the columns, after that of the whole fleet;
-    ``design``: (N, 1 + q, G) from these to the rate usual for each machine, and to the errors of its artefacts.
-    """
+    """What machines have in common: G = 1 + models + places + artefacts that several were measured with."""
 
     models: tuple[str, ...]
     places: tuple[str, ...]
     artefacts: tuple[str, ...]
-    design: Floats
+    design: Floats  # (N, 1 + q, G) from these to the rate usual for each machine, and to the errors of its artefacts
 
     def variances(self, theta: Floats, unit: float) -> Floats:
         """Before any data, (W, G)."""
@@ -72,14 +66,11 @@ def shared_by(machines: Histories, models: Sequence[str], places: Sequence[str])
 
 @dataclass(frozen=True, eq=False)
 class Messages:
-    """What each machine says of its rate and its artefacts, up to a factor exp(constant + η·v − v·Λ·v/2).
+    """What each machine says of its rate and its artefacts, up to a factor exp(constant + η·v − v·Λ·v/2)."""
 
-    ``constant``: (N, W); ``linear``: (N, W, 1 + q); ``precision``: (N, W, 1 + q, 1 + q).
-    """
-
-    constant: Floats
-    linear: Floats
-    precision: Floats
+    constant: Floats  # (N, W)
+    linear: Floats  # (N, W, 1 + q)
+    precision: Floats  # (N, W, 1 + q, 1 + q)
 
     def without_own_rate(self, rate_sd: Floats) -> Messages:
         own = 1.0 / (self.precision[..., 0, 0] + rate_sd**-2.0)
@@ -93,14 +84,11 @@ class Messages:
 
 @dataclass(frozen=True, eq=False)
 class SharedGaussian:
-    """The Gaussian of all that machines share, for W sets of hyper-parameters.
+    """The Gaussian of all that machines share, for W sets of hyper-parameters."""
 
-    ``precision, linear``: (W, G, G) and (W, G); ``log_evidence``: (W,) of all certificates.
-    """
-
-    precision: Floats
+    precision: Floats  # and linear: (W, G, G) and (W, G)
     linear: Floats
-    log_evidence: Floats
+    log_evidence: Floats  # (W,) of all certificates
 
 
 def messages(machines: Histories, shared: SharedEffects, theta: Floats, unit: float) -> Messages:
@@ -169,10 +157,7 @@ def log_posterior(machines: Histories, shared: SharedEffects, theta: Floats, uni
 def others(
     said: Messages, all_together: SharedGaussian, shared: SharedEffects, theta: Floats, unit: float
 ) -> DriftStart:
-    """Rate and artefacts' errors of each machine as all the others say: (1 + q, N, W) and (1 + q, 1 + q, N, W).
-
-    A machine's own message is taken out of the sum, which is exact.
-    """
+    """Rate and artefacts' errors of each machine as all the others say: (1 + q, N, W) and (1 + q, 1 + q, N, W)."""
     rate_sd = np.exp(theta[:, _RATE]) * unit
     of_usual = said.without_own_rate(rate_sd)
     N, r, _ = shared.design.shape
@@ -192,31 +177,18 @@ def others(
 
 @dataclass(frozen=True, eq=False)
 class FleetPrior:
-    """Draws of the hyper-parameters' posterior, and at each the Gaussian of what the fleet, models and places add to a rate.
+    """Draws of the hyper-parameters' posterior, and at each the Gaussian of what the fleet, models and places add to rates."""
 
-    Attributes
-    ----------
-    unit : what hyper-parameters are in units of; see :func:`~cmm_uq.laboratory.due.drift.limit_for`.
-    theta : (g, 8) logarithms of hyper-parameters.
-    models, places : names.
-    effects, covariance : (g, E) and (g, E, E) of 1 + models + places effects.
-    """
-
-    unit: float
-    theta: Floats
-    models: tuple[str, ...]
+    unit: float  # what hyper-parameters are in units of; see :func:`~cmm_uq.laboratory.due.drift.limit_for`
+    theta: Floats  # (g, 8) logarithms of hyper-parameters
+    models: tuple[str, ...]  # and places: names
     places: tuple[str, ...]
-    effects: Floats
+    effects: Floats  # and covariance: (g, E) and (g, E, E) of 1 + models + places effects
     covariance: Floats
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any], where: str = "fleet.json") -> FleetPrior:
-        """From ``prior`` of a value in ``fleet.json``.
-
-        Raises
-        ------
-        CmmUqError : it is not what this version writes.
-        """
+        """From ``prior`` of a value in ``fleet.json``."""
         try:
             theta, effects, covariance = (
                 np.array(data[key], dtype=np.float64) for key in ("log", "effects", "covariance")
@@ -243,23 +215,12 @@ class FleetPrior:
         }  # fmt: skip
 
     def prior(self, model: str = "", place: str = "") -> DriftPrior:
-        """Of a machine of a model at a place; either may be new to the fleet.
-
-        Parameters
-        ----------
-        model, place : names.
-        """
+        """Of a machine of a model at a place; either may be new to the fleet."""
         rate, rate_sd = self._usual_rate(model, place)
         return learnt_prior(self.theta, rate, rate_sd, self.unit)
 
     def start(self, machines: Histories, models: Sequence[str], places: Sequence[str]) -> tuple[DriftPrior, DriftStart]:
-        """The same of many machines, side by side: nodes common to all, and the rate of each.
-
-        Parameters
-        ----------
-        machines : their histories.
-        models, places : of each.
-        """
+        """The same of many machines, side by side: nodes common to all, and the rate of each."""
         known = {of: self._usual_rate(*of) for of in set(zip(models, places, strict=True))}
         rates = np.array([known[of] for of in zip(models, places, strict=True)])
         prior = self.prior()

@@ -1,10 +1,9 @@
 """The history of one machine: every value over its certificates, what it changed by, and when it will cross its limit.
 
-A straight line through the values of one machine since it was last adjusted.
-
-Generalised least squares: the values are as uncertain as their certificates say, and what comes from the artefact is common
-to all that were made with it. A common error shifts the line and does not tilt it. Where the values scatter about the line by
-more than their uncertainties allow, the line is as much more uncertain (Birge ratio).
+A straight line goes through the values since the last adjustment (generalised least squares): they are as uncertain as their
+certificates say, and what comes from the artefact is common to all that were made with it. A common error shifts the line
+and does not tilt it. Where the values scatter about the line by more than their uncertainties allow, the line is as much
+more uncertain (Birge ratio).
 """
 
 from __future__ import annotations
@@ -36,18 +35,13 @@ _LEAST = 1e-9  # standard uncertainty of a value that is stated without one, as 
 
 @dataclass(frozen=True)
 class TrendLine:
-    """The line.
+    """The line; ``excess`` is the Birge ratio, 1 where the scatter is no more than the uncertainties allow."""
 
-    ``count``: values that it was fitted to; ``day``: ordinal, at which ``value`` stands: that of the last of them;
-    ``value, slope``: then, and its change a year; ``covariance``: (2, 2) of both; ``excess``: Birge ratio: scatter
-    about the line over what the uncertainties allow; 1 where it is no more, and for two values.
-    """
-
-    count: int
-    day: int
-    value: float
+    count: int  # values that it was fitted to
+    day: int  # ordinal, at which ``value`` stands: that of the last of them
+    value: float  # and slope: then, and its change a year
     slope: float
-    covariance: Floats
+    covariance: Floats  # (2, 2) of both
     excess: float
 
     def at(self, day: Floats) -> tuple[Floats, Floats]:
@@ -101,30 +95,19 @@ def trend(series: Series) -> TrendLine | None:
 
 @dataclass(frozen=True)
 class ValueHistory:
-    """One value of a machine over time.
+    """One value of a machine over time."""
 
-    ``series``: its values, none of them after the day asked about; ``change``: since the recording before the last;
-    ``None`` where there is one only; ``adjusted``: whether the machine was adjusted between the two; ``line``:
-    through the values since the last adjustment; ``None`` where they do not give one; ``adjusted_after``: ordinal of
-    the machine's newest adjustment; ``None`` where none is known; ``prior``: what the machine's fleet taught of this
-    value; ``None`` for the default one; ``outcome``: of the newest certificate's statement on it; empty where it
-    states none.
-    """
-
-    series: Series
-    change: ValueChange | None
-    adjusted: bool
-    line: TrendLine | None
-    adjusted_after: int | None = None
-    prior: Prior | None = None
-    outcome: str = ""
+    series: Series  # its values, none of them after the day asked about
+    change: ValueChange | None  # since the recording before the last; ``None`` where there is one only
+    adjusted: bool  # whether the machine was adjusted between the two
+    line: TrendLine | None  # through the values since the last adjustment; ``None`` where they do not give one
+    adjusted_after: int | None = None  # ordinal of the machine's newest adjustment; ``None`` where none is known
+    prior: Prior | None = None  # what the machine's fleet taught of this value; ``None`` for the default one
+    outcome: str = ""  # of the newest certificate's statement on it; empty where it states none
 
     @cached_property
     def crossing(self) -> Crossing | None:
-        """When the limit will be crossed by the drift model; ``None`` without a limit, or a history that the model takes.
-
-        Worked out when it is first asked for: the model takes longer to load than all the rest.
-        """
+        """By the drift model, ``None`` without a limit or a history that it takes; worked out when first asked for."""
         if not self.series.limit:
             return None
         from cmm_uq.laboratory.due.crossing import crossing
@@ -149,18 +132,13 @@ class ValueHistory:
 
 @dataclass(frozen=True)
 class MachineHistory:
-    """All of a machine.
+    """All of a machine; certificates and interim checks by day, those withdrawn or replaced too."""
 
-    ``machine, on``: which, and up to which day; ``certificates``: its certificates and interim checks, by day, those
-    withdrawn or replaced too; ``values``: in the order of the newest certificate; ``remarks``: what is to be known, a
-    sentence each.
-    """
-
-    machine: RecordedMachine
+    machine: RecordedMachine  # and on: which, and up to which day
     on: dt.date
     certificates: tuple[RecordedCertificate, ...]
-    values: tuple[ValueHistory, ...]
-    remarks: tuple[Text, ...]
+    values: tuple[ValueHistory, ...]  # in the order of the newest certificate
+    remarks: tuple[Text, ...]  # what is to be known, a sentence each
 
     @property
     def decision(self) -> str:
@@ -182,12 +160,7 @@ def machine_history(
     priors: Mapping[str, Prior] | None = None,
     outcomes: Mapping[int, Mapping[str, str]] | None = None,
 ) -> MachineHistory:
-    """The history up to a day.
-
-    ``certificates``: of it, by day; ``series``: its values, by name; ``on``: the day; what is dated later does not
-    count; ``priors``: what its fleet taught of each value, by name; ``outcomes``: what certificates state of their
-    values, by entry and name.
-    """
+    """The history up to a day; outcomes of values by certificate's entry and value's name."""
     known = tuple(one for one in certificates if one.day <= on)
     remarks: list[Text] = []
     if machine.by_name:
@@ -217,7 +190,6 @@ def machine_history(
 
 
 def _until(series: Series, on: dt.date) -> Series:
-    """The series without what is dated later."""
     rows = series.day <= on.toordinal()
     if rows.all():
         return series

@@ -20,10 +20,7 @@ from cmm_uq.laboratory.records.facts import RecordedCertificate, Series
 
 
 def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Series:
-    """One value over certificates of one machine, by day, as the records give it.
-
-    ``certificates``: with their values; those without this one are left out.
-    """
+    """One value over certificates of one machine, by day, as the records give it."""
     rows = [(one, value) for one in certificates for value in one.values if value.name == name]
     last = rows[-1][1]
     limits = [value.limit for _, value in rows if value.limit is not None]
@@ -40,11 +37,10 @@ def series_from(certificates: Sequence[RecordedCertificate], name: str) -> Serie
 def drift_interval(
     certificates: Sequence[RecordedCertificate], reliability: float, priors: Mapping[str, DriftPrior]
 ) -> tuple[float, str, bool]:
-    """Days after the last calibration until the first of the errors may have crossed its limit, and which one it is.
+    """Days from the last calibration until the first of the errors may have crossed its limit, and which one it is.
 
-    ``certificates``: of the machine, by day, interim checks too: the model takes all that was seen, as its history
-    does; ``priors``: of the machine's fleet, by the value's name; the default one where there is none.
-    Gives days, infinite beyond the model's horizon, the quantity's name, and whether its prior is a fleet's.
+    Infinite beyond the model's horizon; last, whether its prior is a fleet's. Interim checks count: the model takes all that
+    was seen, as its history does.
     """
     last = calibrations(certificates)[-1]
     stated = (series_from(certificates, one.name) for one in last.values if is_of_machine(one.unit))

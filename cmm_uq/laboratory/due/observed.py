@@ -18,13 +18,10 @@ _DECIDED = {"pass": 0.0, "conditional pass": 1.0, "conditional fail": 2.0, "fail
 
 @dataclass(frozen=True)
 class CompletedInterval:
-    """An interval that a certificate ended.
-
-    ``used``: largest part of a limit that was found used up at its end; more than 1 is out of tolerance.
-    """
+    """An interval that a certificate ended."""
 
     days: int
-    used: float
+    used: float  # largest part of a limit that was found used up at its end; more than 1 is out of tolerance
 
     @property
     def in_tolerance(self) -> bool:

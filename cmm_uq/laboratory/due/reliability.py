@@ -1,13 +1,8 @@
-"""Method S2 of NCSLI RP-1: the interval at whose end a reliability target is met, from models of the reliability over time.
+"""Method S2 of NCSLI RP-1: the interval at whose end a reliability target is met, from ten models of it over time.
 
-How the reliability of equipment falls with the time since its calibration: the ten models of NCSLI RP-1, method S2.
-
-Times are in units of the longest observed one, so that every parameter is of the order of one.
-
-Method S2 of NCSLI RP-1: the interval at whose end a reliability target is met, from models of the reliability over time.
-
-Each model is fitted by maximum likelihood to the numbers in tolerance after intervals of different lengths. Models that the
-numbers reject (F test of the lack of fit) do not count; of the others the one with the largest figure of merit is taken.
+Each model is fitted by maximum likelihood to the numbers in tolerance after intervals of different lengths, in units of the
+longest, so that every parameter is of the order of one. Models that the numbers reject (F test of the lack of fit) do not
+count; of the others the one with the largest figure of merit is taken.
 """
 
 from __future__ import annotations
@@ -28,15 +23,11 @@ _EXPONENT = 700.0  # of e, within a double's range
 
 @dataclass(frozen=True)
 class ReliabilityModel:
-    """One model.
-
-    ``reliability``: of times (n,) since calibration, and parameters; ``starts``: parameters that a search begins
-    with.
-    """
+    """One model."""
 
     name: Text
-    reliability: Callable[[Floats, Floats], Floats]
-    starts: tuple[tuple[float, ...], ...]
+    reliability: Callable[[Floats, Floats], Floats]  # of times (n,) since calibration, and parameters
+    starts: tuple[tuple[float, ...], ...]  # parameters that a search begins with
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
@@ -122,34 +113,24 @@ _APART = 1.5  # two intervals are not alike where the step between them is so ma
 
 @dataclass(frozen=True)
 class ReliabilityData:
-    """Calibrations by the length of the interval that they ended.
+    """Calibrations by the length of the interval that they ended."""
 
-    ``days``: (k,) length of the intervals of each group; ``tested, in_tolerance``: (k,) how many there were, and how
-    many were found in tolerance.
-    """
-
-    days: Floats
-    tested: Floats
+    days: Floats  # (k,) length of the intervals of each group
+    tested: Floats  # and in_tolerance: (k,) how many there were, and how many were found in tolerance
     in_tolerance: Floats
 
 
 @dataclass(frozen=True)
 class ReliabilityFit:
-    """One model, fitted.
-
-    ``parameters``: that maximise the likelihood, for times in days / ``scale``; ``scale``: the longest observed
-    interval, days; ``interval``: days after which the reliability is the target; ``None`` where it never is;
-    ``rejection``: confidence with which the numbers reject the model, 0 to 1; ``accepted``: whether they do not, at
-    95 %; ``merit``: RP-1's figure of merit, N_G/C · t^¼.
-    """
+    """One model, fitted."""
 
     name: Text
-    parameters: Floats
-    scale: float
-    interval: float | None
-    rejection: float
-    accepted: bool
-    merit: float
+    parameters: Floats  # that maximise the likelihood, for times in days / ``scale``
+    scale: float  # the longest observed interval, days
+    interval: float | None  # days after which the reliability is the target; ``None`` where it never is
+    rejection: float  # confidence with which the numbers reject the model, 0 to 1
+    accepted: bool  # whether they do not, at 95 %
+    merit: float  # RP-1's figure of merit, N_G/C · t^¼
 
     def reliability(self, days: Floats) -> Floats:
         """At times (n,) after calibration."""
@@ -177,10 +158,7 @@ class ReliabilityRegression:
 
 
 def grouped(days: Sequence[float], in_tolerance: Sequence[bool], groups: int = 8) -> ReliabilityData:
-    """Calibrations in groups of equal width of their intervals; each group has the mean of its intervals.
-
-    ``days, in_tolerance``: (n,) length of each interval, and what was found at its end.
-    """
+    """Calibrations in groups of equal width of their intervals; each group has the mean of its intervals."""
     length, passed = np.asarray(days, dtype=np.float64), np.asarray(in_tolerance, dtype=np.float64)
     edges = np.histogram_bin_edges(length, bins=groups)
     index = np.clip(np.digitize(length, edges[1:-1]), 0, groups - 1)
@@ -244,7 +222,6 @@ def _fitted(
 
 
 def _most_likely(model: ReliabilityModel, data: ReliabilityData, scale: float) -> Floats:
-    """Parameters of the largest likelihood found from several starts."""
     t, out = data.days / scale, data.tested - data.in_tolerance
     fullest = (
         special.xlogy(data.in_tolerance, data.in_tolerance)

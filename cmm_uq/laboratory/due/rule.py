@@ -11,15 +11,11 @@ from cmm_uq.base.messages import Text, plural, say
 
 @dataclass(frozen=True)
 class IntervalBounds:
-    """How far and how readily an interval is changed; the defaults are those of suncal.
+    """How far and how readily an interval is changed; the defaults are those of suncal."""
 
-    ``confidence``: least confidence of a rejection that changes the interval; ``factor``: most that an interval grows
-    or shrinks by at once; ``least_days``: smaller changes are not worth making.
-    """
-
-    confidence: float = 0.5
-    factor: float = 2.0
-    least_days: float = 5.0
+    confidence: float = 0.5  # least confidence of a rejection that changes the interval
+    factor: float = 2.0  # most that an interval grows or shrinks by at once
+    least_days: float = 5.0  # smaller changes are not worth making
     shortest_days: float = 14.0
     longest_days: float = 1826.0
 
@@ -39,20 +35,14 @@ LONGEST_MONTHS = 60  # longest interval that a method comes to where nothing is 
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule; see :class:`cmm_uq.jobs.tables.machine.Recalibration`.
+    """A rule; see :class:`cmm_uq.jobs.tables.machine.Recalibration`."""
 
-    ``method``: one of fixed, A3, S2, staircase, control chart, drift; ``every_months``: interval, or the one that a
-    method begins with; ``reliability``: wanted at the end of an interval; ``shortest_months, longest_months``: bounds
-    of what a method, or a check, comes to; no longest one where nothing is said; ``stated``: whether the job says
-    anything.
-    """
-
-    method: str = "fixed"
-    every_months: int = USUAL_MONTHS
-    reliability: float = USUAL_RELIABILITY
+    method: str = "fixed"  # one of fixed, A3, S2, staircase, control chart, drift
+    every_months: int = USUAL_MONTHS  # interval, or the one that a method begins with
+    reliability: float = USUAL_RELIABILITY  # wanted at the end of an interval
     shortest_months: int = 1
     longest_months: int | None = None
-    stated: bool = False
+    stated: bool = False  # whether the job says anything
 
     @classmethod
     def of(cls, said: Mapping[str, Any] | None) -> Rule:

@@ -22,18 +22,13 @@ _FAR, _STEPS = 100.0, 4000  # times, in units of the longest observed interval, 
 
 @dataclass(frozen=True)
 class DriftPolynomial:
-    """A polynomial through zero, fitted by least squares.
+    """A polynomial through zero, fitted by least squares."""
 
-    ``coefficients``: (m,) of t, t², …; ``covariance``: (m, m) of them, from the scatter about the curve; ``scatter``:
-    standard deviation about the curve; ``freedoms``: degrees of freedom of it; ``longest``: interval that was
-    observed, days.
-    """
-
-    coefficients: Floats
-    covariance: Floats
-    scatter: float
-    freedoms: int
-    longest: float
+    coefficients: Floats  # (m,) of t, t², …
+    covariance: Floats  # (m, m) of them, from the scatter about the curve
+    scatter: float  # standard deviation about the curve
+    freedoms: int  # degrees of freedom of it
+    longest: float  # interval that was observed, days
 
     def change(self, days: Floats) -> Floats:
         """Expected after times (n,)."""
@@ -55,10 +50,7 @@ class LastValue:
 
 
 def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> DriftPolynomial:
-    """Fit what a value changed by.
-
-    ``days, changes``: (n,) length of each interval, and what the value changed by over it.
-    """
+    """Fit what a value changed by over each interval, days, both (n,)."""
     days, changes = np.asarray(days, dtype=np.float64), np.asarray(changes, dtype=np.float64)
     if len(days) <= order or not (days > 0).all():
         raise CmmUqError(
@@ -79,10 +71,7 @@ def fitted_drift(days: Floats, changes: Floats, order: int = 1) -> DriftPolynomi
 def reliability_after(
     drift: DriftPolynomial, start: LastValue, days: Floats, low: float | None, high: float | None
 ) -> Floats:
-    """Probability (n,) that the value lies within its limits after times (n,), each limit where there is one.
-
-    The prediction has Student's t with Welch–Satterthwaite degrees of freedom.
-    """
+    """Probability (n,) of lying within the limits after times (n,): Student's t, Welch–Satterthwaite degrees of freedom."""
     grown = drift.u_change(days)
     u = np.sqrt(grown**2 + start.u**2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,16 +86,11 @@ def reliability_after(
 def interval_of_reliability(
     drift: DriftPolynomial, start: LastValue, target: float, low: float | None, high: float | None
 ) -> float:
-    """Days until the probability of lying within the limits falls to the target.
-
-    Gives 0 where it is not reached from the beginning, infinity where it lasts a hundred of the longest observed
-    intervals.
-    """
+    """Days until the probability of lying within the limits falls to the target; infinite where it hardly does."""
     return _falls(lambda days: reliability_after(drift, start, days, low, high) - target, drift.longest)
 
 
 def _falls(excess: Callable[[Floats], Floats], longest: float) -> float:
-    """First time at which a function falls below zero."""
     times = np.concatenate([[0.0], np.geomspace(1e-4, _FAR, _STEPS) * longest])
     short = excess(times) < 0
     if short[0]:

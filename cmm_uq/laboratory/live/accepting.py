@@ -16,11 +16,7 @@ from cmm_uq.laboratory.live.table import LiveRecording, rows_of
 
 
 class Accepting:
-    """What happens to a point.
-
-    ``lead``: says where it belongs; ``judge``: what is said of it; ``repeats_most``: how often a set-up is measured
-    at most.
-    """
+    """What happens to a point: kept, shown, judged, written."""
 
     def __init__(
         self,

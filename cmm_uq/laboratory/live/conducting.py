@@ -32,13 +32,7 @@ _SAID = 50  # lines of what happened that a screen may show
 
 
 class Conductor:
-    """A session.
-
-    ``judge``: what is said of a point; ``soak_k_per_h``: largest change of a temperature in an hour; ``None``: none
-    is stated; ``machine``: has a machine measure a point, where one measures when it is asked; ``clear``: of each
-    machine that waits for its errors to be cleared by who has looked at them. ``said``: what happened and was not
-    read yet, oldest first; ``paused``: whether points are not taken.
-    """
+    """A session."""
 
     def __init__(
         self,
@@ -103,10 +97,7 @@ class Conductor:
             self.tell(Verbatim(f"{error.problem}. {error.fix}" if error.fix else error.problem))
 
     def file(self, name: str, content: bytes, moment: Moment, rows: Sequence[Mapping[str, float]], kept: str) -> None:
-        """Points of a file that a machine's program wrote: where the file says, else in the order of the plan.
-
-        ``content``: its bytes; ``kept``: name under which its bytes are kept beside the journal.
-        """
+        """Points of a file that a machine's program wrote: where the file says, else in the order of the plan."""
         digest = hashlib.sha256(content).hexdigest()
         if digest in self.story.files:
             self.tell(say("{name} holds what {other} held, byte for byte: it is not taken again", name=Verbatim(name),
@@ -156,7 +147,7 @@ class Conductor:
         )  # fmt: skip
 
     def _probed(self, reading: Reading) -> None:
-        """A point of a coordinate measuring machine; where it was asked for further ones, the next is asked for now."""
+        """A point of a machine; where it was asked for further ones, the next is asked for now."""
         columns = {self.recorder.column(reading.source, name): value for name, value in reading.values.items()}
         latency = self.recorder.latency_ns(reading.source)
         moment = Moment(reading.utc_ns - latency, reading.monotonic_ns - latency)
@@ -176,7 +167,6 @@ class Conductor:
                 self._machine(following)
 
     def _refused(self, reading: Reading, columns: Mapping[str, float]) -> Text | None:
-        """Why a point of a machine is not taken; ``None`` where it is."""
         if self.paused:
             return say("points are not taken now")
         if reading.status is not None:
@@ -184,7 +174,6 @@ class Conductor:
         return None if all(name in columns for name in COORDINATES) else say("it lacks a coordinate")
 
     def _take(self, typed: OperatorInput) -> None:
-        """The point that comes next, as typed or as the scales read."""
         step, now = self.step, self.recorder.now
         if self.paused:
             raise CmmUqError("paused: no point is taken", fix="resume goes on")

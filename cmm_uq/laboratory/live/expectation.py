@@ -31,19 +31,13 @@ _DETERMINED = 1e-9  # 1 − h below which nothing but the observation itself say
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Each observation (m,) as measured, and as all others predict it, µm against the artefact's nominal sizes.
+    """Each observation (m,) as measured, and as all others predict it, µm against the artefact's nominal sizes."""
 
-    ``measured``: deviation from what the artefact's nominal sizes would give, the set-up's own freedoms fitted;
-    ``expected``: the same as predicted; ``nan`` where nothing else says anything; ``u``: standard deviation of
-    measured less expected; ``factor``: of the interval at :data:`LEVEL`; ``sigma``: standard deviation of a
-    coordinate, µm.
-    """
-
-    measured: Floats
-    expected: Floats
-    u: Floats
-    factor: float
-    sigma: float
+    measured: Floats  # deviation from what the artefact's nominal sizes would give, the set-up's own freedoms fitted
+    expected: Floats  # the same as predicted; ``nan`` where nothing else says anything
+    u: Floats  # standard deviation of measured less expected
+    factor: float  # of the interval at :data:`LEVEL`
+    sigma: float  # standard deviation of a coordinate, µm
 
     @property
     def outside(self) -> Floats:
@@ -105,16 +99,12 @@ def _sigma(linear: LinearModel) -> tuple[float | None, float]:
 
 @dataclass(frozen=True)
 class RepeatScatter:
-    """How the repeats of one measurement scatter.
-
-    ``s``: standard deviation of a coordinate by its repeats, µm; ``usual``: the same as stated, or of all others, µm;
-    ``limit``: what one set-up in a hundred exceeds, µm.
-    """
+    """How the repeats of one measurement scatter."""
 
     measurement: int
-    s: float
-    usual: float
-    limit: float
+    s: float  # standard deviation of a coordinate by its repeats, µm
+    usual: float  # the same as stated, or of all others, µm
+    limit: float  # what one set-up in a hundred exceeds, µm
 
     @property
     def words(self) -> Text:

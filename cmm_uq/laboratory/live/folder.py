@@ -23,14 +23,11 @@ _EVENTS = re.compile(r"(\d{4})-events\.jsonl")
 
 @dataclass
 class Journals:
-    """The journals of the session that is running.
-
-    ``events``: of what happened: points, gaps, notes; ``streams``: of the readings that come by themselves.
-    """
+    """The journals of the session that is running."""
 
     folder: Path
-    events: RecordingJournal
-    streams: RecordingJournal
+    events: RecordingJournal  # of what happened: points, gaps, notes
+    streams: RecordingJournal  # of the readings that come by themselves
     story: Story
     _lock: int
 
@@ -129,7 +126,6 @@ def _torn_end(path: Path) -> bytes:
 
 
 def _cut(path: Path, count: int) -> None:
-    """Cut bytes off a file's end."""
     try:
         with path.open("rb+") as file:
             file.truncate(path.stat().st_size - count)

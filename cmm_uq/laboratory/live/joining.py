@@ -32,11 +32,7 @@ class Joined:
 
 
 class Stream:
-    """The last readings of one instrument for one column.
-
-    ``latency_s``: from the measurement to the arrival of its last byte; ``max_gap_s``: longest time between two
-    readings that is interpolated over.
-    """
+    """The last readings of one instrument for one column."""
 
     def __init__(self, column: str, source: str, *, latency_s: float = 0.0, max_gap_s: float = 10.0) -> None:
         self.column, self.source = column, source
@@ -73,10 +69,7 @@ class Stream:
             self._values.popleft()
 
     def at(self, moment_ns: int, now_ns: int | None) -> Joined | Text | None:
-        """Value at a moment of the monotonic clock; why there is none; ``None`` while the reading behind it may still come.
-
-        ``now_ns``: up to when readings have arrived; ``None``: no further one will.
-        """
+        """Value at a moment, or why there is none; ``None`` while a reading may come (never where ``now_ns`` is ``None``)."""
         after = bisect_left(self._times, moment_ns)
         if after == len(self._times):
             if now_ns is None:

@@ -33,12 +33,10 @@ class Moment:
 
 @dataclass(frozen=True)
 class Record:
-    """``number``: ascending by one in a file; ``moment``: when it was written down; ``data``: what it says, plain data."""
-
-    number: int
+    number: int  # ascending by one in a file
     kind: str
-    moment: Moment
-    data: Mapping[str, Any]
+    moment: Moment  # when it was written down
+    data: Mapping[str, Any]  # what it says, plain data
 
 
 def line_of(record: Record) -> bytes:
@@ -62,16 +60,12 @@ def record_of(line: bytes) -> Record | None:
 
 @dataclass(frozen=True)
 class JournalLine:
-    """A line of a file, read.
+    """A line of a file, read."""
 
-    ``number``: in the file, from 1; ``record``: ``None`` where it is damaged, or was never finished; ``whole``:
-    whether it ends with a line feed; only the last may not.
-    """
-
-    number: int
+    number: int  # in the file, from 1
     start: int
-    record: Record | None
-    whole: bool
+    record: Record | None  # ``None`` where it is damaged, or was never finished
+    whole: bool  # whether it ends with a line feed; only the last may not
 
 
 def lines_in(path: Path) -> Iterator[JournalLine]:
@@ -86,15 +80,11 @@ def lines_in(path: Path) -> Iterator[JournalLine]:
 
 @dataclass(frozen=True)
 class JournalContent:
-    """What a journal holds.
+    """What a journal holds."""
 
-    ``records``: all that are sound, in order; ``torn``: bytes behind the last whole line, which nobody was told were
-    kept; ``damaged``: lines, from 1, whose checksum does not fit, or behind which a record is missing.
-    """
-
-    records: tuple[Record, ...]
-    torn: bytes
-    damaged: tuple[int, ...]
+    records: tuple[Record, ...]  # all that are sound, in order
+    torn: bytes  # bytes behind the last whole line, which nobody was told were kept
+    damaged: tuple[int, ...]  # lines, from 1, whose checksum does not fit, or behind which a record is missing
 
 
 def opened(path: Path, *, first: int | None = None) -> JournalContent:
@@ -132,10 +122,7 @@ class NoRoomError(OutputError):
 
 
 class RecordingJournal:
-    """A journal that is written.
-
-    ``path``: of a file that does not exist yet; ``first``: number of its first record.
-    """
+    """A journal that is written, from record ``first`` on, in a file that does not exist yet."""
 
     def __init__(self, path: Path, *, first: int = 1) -> None:
         self.path, self.next = path, first

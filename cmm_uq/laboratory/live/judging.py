@@ -31,32 +31,24 @@ and by less than this part of that (squares) once they change places."""
 
 @dataclass(frozen=True)
 class PointJudgement:
-    """What is said.
-
-    ``again``: why the set-up should be measured once more; ``None``: nothing asks for it.
-    """
+    """What is said."""
 
     shown: tuple[Text, ...] = ()
     warnings: tuple[Text, ...] = ()
-    again: Text | None = None
+    again: Text | None = None  # why the set-up should be measured once more; ``None``: nothing asks for it
 
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """Knows the artefact, the machine and the model of a job.
-
-    ``facts, screening, observe``: of the artefact, and what its kind offers; ``observe`` is ``None`` where it offers
-    none; ``sigma``: standard uncertainty of a coordinate as stated, mm; ``where``: the recording's name, for
-    messages.
-    """
+    """Knows the artefact, the machine and the model of a job."""
 
     facts: ArtefactFacts
     screening: Screening | None
     observe: Observe | None
     machine: Machine
     effects: tuple[Effect, ...]
-    sigma: float | None
-    where: str
+    sigma: float | None  # standard uncertainty of a coordinate as stated, mm
+    where: str  # the recording's name, for messages
 
     def point(self, step: PlannedPoint, story: Story, lead: Lead) -> PointJudgement:
         """Of a point that was just accepted."""

@@ -19,28 +19,19 @@ Run = tuple[int, int]  # measurement and repeat
 
 @dataclass(frozen=True, eq=False)
 class PlannedPoint:
-    """A point to be measured.
-
-    ``xyz``: (3,) where the plan has it, mm, in the coordinates that are recorded; ``columns``: what the plan says of
-    it besides: references, approach, normals.
-    """
+    """A point to be measured."""
 
     place: Place
-    xyz: Floats
-    columns: Mapping[str, float]
+    xyz: Floats  # (3,) where the plan has it, mm, in the coordinates that are recorded
+    columns: Mapping[str, float]  # what the plan says of it besides: references, approach, normals
 
 
 @dataclass(frozen=True, eq=False)
 class Lead:
-    """A plan, as it is followed.
+    """A plan, as it is followed; unmeasured columns say what will be measured, not what is known."""
 
-    ``plan``: nominal points, in the order in which they are measured; ``titles``: of measurements, in words, by their
-    numbers; ``unmeasured``: columns of the plan that say what will be measured, not what is known: times,
-    temperatures.
-    """
-
-    plan: Points
-    titles: Mapping[int, Text]
+    plan: Points  # nominal points, in the order in which they are measured
+    titles: Mapping[int, Text]  # of measurements, in words, by their numbers
     unmeasured: frozenset[str] = frozenset({"time_s"})
 
     @cached_property
@@ -78,10 +69,7 @@ class Lead:
         return self._left(run, story.by_place)
 
     def next(self, story: Story, wanted: Run | None = None) -> PlannedPoint | None:
-        """The point that comes next; ``None`` when all is measured.
-
-        ``wanted``: what the operator goes on with; else what was begun, else the first that lacks a point.
-        """
+        """The point that comes next, of what is wanted, else begun, else the first; ``None`` when all is measured."""
         runs = self.all_runs(story)
         last = list(story.points.values())[-1].place if story.points else None
         begun = (last[0], last[2]) if last is not None else None
@@ -121,11 +109,7 @@ class Lead:
     def places(
         self, story: Story, ahead: PlannedPoint | None, numbers: Sequence[Place | None]
     ) -> list[PlannedPoint] | Text:
-        """Where the points of a file belong, as far as the plan has room: by their numbers, else as the plan goes on.
-
-        ``numbers``: measurement, point and repeat of each, where the file says so.
-        Gives a step for each; why not, where a number is none that is open.
-        """
+        """Where a file's points belong, as far as the plan has room: by their numbers, else as it goes on; else why not."""
         runs, taken = self.all_runs(story), story.by_place
         start = runs.index((ahead.place[0], ahead.place[2])) if ahead is not None else 0
         left = [step for run in (*runs[start:], *runs[:start]) for step in self._left(run, taken)]

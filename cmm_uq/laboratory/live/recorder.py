@@ -1,7 +1,5 @@
 """Takes what instruments say, keeps it, and joins it to the points: nothing is shown as accepted that is not on the disk.
 
-Takes what instruments say, keeps it, and joins it to the points: nothing is shown as accepted that is not on the disk.
-
 It knows no thread and no screen. Whoever runs it passes events on as they come, and calls :meth:`Recorder.tick` at least
 every 100 ms, which puts everything on the disk.
 """
@@ -95,14 +93,7 @@ _JUMP_S = 0.5
 
 
 class Recorder:
-    """One session of a recording.
-
-    ``journals``: that were begun for it; ``sources``: the instruments that the job declares; ``max_gap_s``: longest
-    time between two readings that is interpolated over; ``clock``: wall clock and monotonic one.
-    ``streams``: of readings that come by themselves, by column; ``stalled``: why nothing can be kept at the moment;
-    ``None``: everything is; ``counts``: readings of each instrument in this session; ``ill``: what each instrument
-    says is wrong with it, by its name; those that are well are not there; ``told``: what happened, to be shown once.
-    """
+    """One session of a recording."""
 
     def __init__(
         self, journals: Journals, sources: Sequence[DeclaredSource], *, max_gap_s: float, clock: Clock
@@ -164,11 +155,7 @@ class Recorder:
         *,
         of: Mapping[str, Any] | None = None,
     ) -> int:
-        """Write a point down; it counts once :meth:`commit` has returned ``True``.
-
-        ``of``: what more belongs to it: the instrument's bytes, the line typed, the file's hash.
-        Gives number of its record.
-        """
+        """Write a point down with what belongs to it; it counts once :meth:`commit` has returned ``True``."""
         data = {
             "place": list(place),
             "columns": dict(columns),
@@ -188,10 +175,7 @@ class Recorder:
         self._journals.say(kind, data, self.now)
 
     def commit(self, *, streams: bool = True) -> bool:
-        """Put everything on the disk; whether that was possible. If not, it waits, and :attr:`stalled` says why.
-
-        ``streams``: the readings that come by themselves too; without them a point is on the disk in half the time.
-        """
+        """Put everything on the disk, with or without streams; if not possible, it waits, and :attr:`stalled` says why."""
         if streams:
             self._blocks.put(self._journals.streams, self.now)
         try:
@@ -338,7 +322,6 @@ def settle_earlier(journals: Journals, sources: Iterable[DeclaredSource], max_ga
 def _streams(
     path: Path, points: list[Point], declared: dict[str, DeclaredSource], max_gap_s: float
 ) -> Iterable[tuple[Point, dict[tuple[str, str], Stream]]]:
-    """Each point with the streams about its moment."""
     for point in points:
         streams: dict[tuple[str, str], Stream] = {}
         for source in declared.values():

@@ -1,9 +1,7 @@
 """The one thread that writes, and those that listen: a session run until its operator ends it.
 
-A folder that a machine's program drops results into: each file is read once, when it has stood still.
-
-Stable is a file whose size and time of change are the same at two looks at least :data:`STILL_S` apart, and that did not
-change within that time. What was there before the session began is read too, unless a session took it already.
+A folder that a machine's program drops results into: each file is read once, when its size and time of change are the same
+at two looks :data:`STILL_S` apart. What was there before the session is read too, unless a session took it already.
 """
 
 from __future__ import annotations

@@ -33,14 +33,11 @@ WITH_TEXT = ("undo", "skip", "note")  # those that say nothing without a text
 
 @dataclass(frozen=True)
 class OperatorInput:
-    """A line, understood.
+    """A line, understood."""
 
-    ``word``: of :data:`WORDS`, ``take``, or ``point``; ``numbers``: three coordinates, or one distance, mm.
-    """
-
-    word: str
+    word: str  # of :data:`WORDS`, ``take``, or ``point``
     text: str = ""
-    numbers: tuple[float, ...] = ()
+    numbers: tuple[float, ...] = ()  # three coordinates, or one distance, mm
 
 
 def understood(line: str) -> OperatorInput:
@@ -74,20 +71,15 @@ def _numbers(parts: list[str]) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class SessionView:
-    """What there is to be seen.
-
-    ``next``: what comes next, with its coordinates; ``picture``: of the set-up in the machine; ``shown``: live
-    figures of the newest point and set-up; ``again``: why a repeat is asked for; ``instruments``: each with how many
-    readings came, and what ails it.
-    """
+    """What there is to be seen."""
 
     head: Text
-    next: Text
-    picture: tuple[str, ...]
-    shown: tuple[Text, ...]
-    again: Text
+    next: Text  # what comes next, with its coordinates
+    picture: tuple[str, ...]  # of the set-up in the machine
+    shown: tuple[Text, ...]  # live figures of the newest point and set-up
+    again: Text  # why a repeat is asked for
     temperatures: tuple[Text, ...]
-    instruments: tuple[Text, ...]
+    instruments: tuple[Text, ...]  # each with how many readings came, and what ails it
     said: tuple[Text, ...]
 
 
@@ -110,10 +102,7 @@ _MARKS = "123456789abcdefghijklmnopqrstuvwxyz*"
 
 
 def picture(machine: Machine, steps: Sequence[PlannedPoint], ahead: PlannedPoint | None) -> tuple[str, ...]:
-    """Lines of both views side by side; the point that comes next is an ``X``, the others their numbers.
-
-    ``machine``: whose travel is the frame; where it is not known, the points are.
-    """
+    """Both views side by side, framed by the machine's travel or the points; next is an ``X``, others their numbers."""
     if not steps:
         return ()
     readings = np.array([step.xyz for step in steps]) + machine.origin_mm

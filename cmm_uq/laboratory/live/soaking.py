@@ -1,7 +1,6 @@
 """Whether temperatures have settled: the change of each in an hour, over the time that the job states, against its criterion.
 
-A change counts as kept where it is within the limit with twice its standard uncertainty, by the straight line through means
-of ten seconds.
+It is within the limit with twice its standard uncertainty, by the straight line through means of ten seconds.
 """
 
 from __future__ import annotations
@@ -23,15 +22,11 @@ _WHOLE = 0.95  # part of the stated time that must have been seen
 
 @dataclass
 class Soak:
-    """The temperatures of one column over the last while.
-
-    ``limit_k_per_h``: largest change in an hour; ``None``: none is stated; ``over_min``: time over which it is taken,
-    min.
-    """
+    """The temperatures of one column over the last while."""
 
     column: str
-    limit_k_per_h: float | None
-    over_min: float
+    limit_k_per_h: float | None  # largest change in an hour; ``None``: none is stated
+    over_min: float  # time over which it is taken, min
     _means: deque[tuple[float, float]] = field(default_factory=deque)
     _sum: float = 0.0
     _count: int = 0

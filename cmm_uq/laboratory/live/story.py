@@ -14,39 +14,29 @@ Place = tuple[int, int, int]  # measurement, point, repeat
 
 @dataclass(frozen=True)
 class Point:
-    """A point that was accepted.
-
-    ``columns``: what was measured of it, by column; ``time_s``: since the start of the job; ``session``: number of
-    the session that accepted it; ``how``: it came: by an instrument's name, ``typed`` or a file's name; ``joined``:
-    what streams had at that moment, by column; ``missing``: why others had nothing, by column; ``settled``: whether
-    every stream has answered; ``timed``: whether the moment is its own; points of a file have that of the file.
-    """
+    """A point that was accepted."""
 
     record: int
     place: Place
-    columns: Mapping[str, float]
+    columns: Mapping[str, float]  # what was measured of it, by column
     moment: Moment
-    time_s: float
-    session: int
-    how: str
-    joined: Mapping[str, Joined] = field(default_factory=dict)
-    missing: Mapping[str, str] = field(default_factory=dict)
-    settled: bool = False
-    timed: bool = True
+    time_s: float  # since the start of the job
+    session: int  # number of the session that accepted it
+    how: str  # it came: by an instrument's name, ``typed`` or a file's name
+    joined: Mapping[str, Joined] = field(default_factory=dict)  # what streams had at that moment, by column
+    missing: Mapping[str, str] = field(default_factory=dict)  # why others had nothing, by column
+    settled: bool = False  # whether every stream has answered
+    timed: bool = True  # whether the moment is its own; points of a file have that of the file
 
 
 @dataclass
 class Session:
-    """One run of the program.
-
-    ``start``: by both clocks; ``offset_s``: time since the start of the job at its start; ``said``: what it was begun
-    with.
-    """
+    """One run of the program."""
 
     number: int
-    start: Moment
-    offset_s: float
-    said: Mapping[str, Any]
+    start: Moment  # by both clocks
+    offset_s: float  # time since the start of the job at its start
+    said: Mapping[str, Any]  # what it was begun with
     end_s: float = 0.0
 
     def time_s(self, moment: Moment) -> float:
@@ -58,27 +48,25 @@ class Session:
 class Story:
     """All sessions of a job, record by record.
 
-    ``points``: that count, by the number of their record, in the order in which they were accepted; ``undone``:
-    points that were taken back, each with the reason; ``identities``: what is known of each instrument, by its name;
-    ``gaps``: when instruments were silent: source, s since the start of the job, for how long (``None``: to the end),
-    why; ``clocks``: jumps of the wall clock: s since the start of the job, by how much, s; ``skipped, asked``:
-    set-ups that the operator left out, and repeats more that were asked for; ``notes``: of the operator, and
-    everything else that was said, each with its time; ``files``: that were read, by SHA-256, with their names;
-    ``damaged``: lines of journals that are not in it; ``changes``: how many records changed what counts.
+    ``points``: that count, by the number of their record, in the order in which they were accepted; ``identities``:
+    what is known of each instrument, by its name; ``gaps``: when instruments were silent: source, s since the start of
+    the job, for how long (``None``: to the end), why; ``clocks``: jumps of the wall clock: s since the start of the
+    job, by how much, s; ``skipped, asked``: set-ups that the operator left out, and repeats more that were asked for;
+    ``notes``: of the operator, and everything else that was said, each with its time.
     """
 
     sessions: list[Session] = field(default_factory=list)
     points: dict[int, Point] = field(default_factory=dict)
-    undone: list[tuple[Point, str]] = field(default_factory=list)
+    undone: list[tuple[Point, str]] = field(default_factory=list)  # points that were taken back, each with the reason
     identities: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     gaps: list[tuple[str, float, float | None, str]] = field(default_factory=list)
     clocks: list[tuple[float, float]] = field(default_factory=list)
     skipped: list[tuple[int, int]] = field(default_factory=list)
     asked: list[tuple[int, int]] = field(default_factory=list)
     notes: list[tuple[float, str]] = field(default_factory=list)
-    files: dict[str, str] = field(default_factory=dict)
-    damaged: list[str] = field(default_factory=list)
-    changes: int = 0
+    files: dict[str, str] = field(default_factory=dict)  # that were read, by SHA-256, with their names
+    damaged: list[str] = field(default_factory=list)  # lines of journals that are not in it
+    changes: int = 0  # how many records changed what counts
 
     @property
     def session(self) -> Session:

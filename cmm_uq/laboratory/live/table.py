@@ -79,11 +79,7 @@ def _cell(row: Row, name: str) -> str:
 def said_of(
     story: Story, rows: Sequence[Row], folder: Path, hashes: Sequence[str], *, simulated: bool
 ) -> dict[str, Any]:
-    """How the recording was taken, as plain data.
-
-    ``hashes``: SHA-256 of the recording, and of what it was before, lest a power cut between the two leave them
-    apart.
-    """
+    """How the recording was taken; with the hash of what it was before, lest a power cut leave the two files apart."""
     return {
         "program": PROGRAM,
         "simulated": simulated,

@@ -30,10 +30,7 @@ KEPT = ".before-restore"  # what restored records are put in place of is kept un
 
 
 def back_up(records: Records, out: Path) -> tuple[int, str]:
-    """Write all entries, and what follows from them, into a new SQLite file, whatever database they are in.
-
-    Gives number and hash of the last entry in it.
-    """
+    """Write all entries, and what follows, into a new SQLite file; number and hash of the last one."""
     if os.path.lexists(out):
         raise OutputError("is there already", where=str(out), fix="Name another file; nothing is overwritten")
     with _temporary(out) as path:
@@ -49,10 +46,7 @@ def back_up(records: Records, out: Path) -> tuple[int, str]:
 
 
 def restore(file: Path, place: str | Path) -> tuple[int, str]:
-    """Make records of a backup; records that are there are kept beside them.
-
-    Gives number and hash of the last entry.
-    """
+    """Make records of a backup; records that are there are kept beside them; number and hash of the last entry."""
     head = _checked(file)
     if is_url(place):
         _to_server(file, str(place))
@@ -89,7 +83,6 @@ def _set_aside(target: Path) -> None:
 
 
 def _checked(path: Path) -> tuple[int, str]:
-    """Number and hash of the last entry of a file whose chain holds."""
     with open_records(path, read_only=True) as records:
         with told(path), records.engine.connect() as connection:
             found = chain(connection)
@@ -144,7 +137,6 @@ def _temporary(out: Path) -> Iterator[Path]:
 
 
 def _in_place(path: Path, out: Path) -> None:
-    """Have a file on the disk, then under its name."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
     path.rename(out)

@@ -38,10 +38,7 @@ def certificate_content(
     files: Mapping[str, str],
     named: Named,
 ) -> dict[str, Any]:
-    """Content of the entry of a report or a diagnosis.
-
-    ``facts``: its job; ``None`` where only results.json is left; ``files``: SHA-256 of each file of the set, by name.
-    """
+    """Content of the entry of a report or a diagnosis; ``facts`` is ``None`` where only results.json is left."""
     try:
         job, verdicts = data["job"], Verdicts.of_results(data)
         return {
@@ -191,11 +188,7 @@ def _certified_part(statement: Mapping[str, Any]) -> float:
 
 
 def _of_the_artefact(data: Mapping[str, Any]) -> dict[str, float]:
-    """Of each parameter, the standard uncertainty that follows from that of the certified sizes: √(cᵀ V⁻¹ c).
-
-    c are its covariances with the sizes, V is their covariance matrix: the part of its variance that a linear function of the
-    sizes explains.
-    """
+    """Of each parameter, the part of its u that the sizes explain: √(cᵀ V⁻¹ c), c its covariances with them, V theirs."""
     given = data.get("covariance") or {}
     names = list(given.get("parameters") or ())
     certified = [ARTEFACT + size for size in data.get("certified") or {}]

@@ -29,17 +29,13 @@ BEGINNING = "0" * 64  # what the first entry carries in place of a hash before i
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One entry.
+    """One entry."""
 
-    ``number``: 1, 2, … without a gap; ``at``: moment of recording, UTC, ISO 8601; ``content``: canonical JSON;
-    ``previous``: hash of the entry before, hexadecimal.
-    """
-
-    number: int
-    at: str
+    number: int  # 1, 2, … without a gap
+    at: str  # moment of recording, UTC, ISO 8601
     kind: str
-    content: str
-    previous: str
+    content: str  # canonical JSON
+    previous: str  # hash of the entry before, hexadecimal
     hash: str
 
     @property

@@ -19,94 +19,68 @@ PERFORMANCE = "performance:"  # with which the name of a value begins that a sta
 
 @dataclass(frozen=True, slots=True)
 class RecordedMachine:
-    """A machine.
-
-    ``serial``: by which it is asked for; its name where it has no serial number. Of two machines with one serial
-    number the second has its manufacturer behind it; ``name, manufacturer, model, place``: as its newest certificate
-    has them; ``adjusted``: days on which it was adjusted, sorted; ``by_name``: whether it has no serial number and is
-    recognised by its name; ``calibrate``: ``[machine] calibrate`` of its newest certificate; ``None`` where the job
-    has none.
-    """
+    """A machine; the second of one serial number has its manufacturer behind it, one without has its name."""
 
     serial: str
-    name: str
+    name: str  # and manufacturer, model, place: as its newest certificate has them
     manufacturer: str
     model: str
     place: str
-    adjusted: tuple[dt.date, ...] = ()
-    by_name: bool = False
+    adjusted: tuple[dt.date, ...] = ()  # days on which it was adjusted, sorted
+    by_name: bool = False  # whether it has no serial number and is recognised by its name
     calibrate: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ArtefactRow:
-    """An artefact, with its newest certificate.
+    """An artefact, with its newest certificate."""
 
-    ``serial``: its serial number, or the number of its certificate, or its name; ``kind``: of the measurement it was
-    last used in; ``calibrated, due``: days of that.
-    """
-
-    serial: str
-    kind: str
+    serial: str  # its serial number, or the number of its certificate, or its name
+    kind: str  # of the measurement it was last used in
     certificate: str
     laboratory: str
-    calibrated: dt.date | None
+    calibrated: dt.date | None  # and due: days of that
     due: dt.date | None
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedValue:
-    """One error factor, size or figure of performance of one certificate.
+    """One error factor, size or figure of performance of one certificate."""
 
-    ``name``: ``scale_x.ppm``, ``artefact.length_mm``, ``accuracy.b89_range_um``, ``performance:E0``; ``quantity``:
-    how it is called in the field, as printed; ``lower, upper``: the stated 95 % interval; ``u_artefact``: part of
-    ``u`` that comes from what is certified of the artefact, common to certificates made with the same artefact; 0
-    where it is unknown; ``limit``: the value conforms while its amount is no larger; ``None`` where none is set.
-    """
-
-    name: str
-    quantity: str
+    name: str  # ``scale_x.ppm``, ``artefact.length_mm``, ``accuracy.b89_range_um``, ``performance:E0``
+    quantity: str  # how it is called in the field, as printed
     unit: str
     value: float
     u: float
-    lower: float
+    lower: float  # and upper: the stated 95 % interval
     upper: float
     u_artefact: float = 0.0
-    limit: float | None = None
+    limit: float | None = None  # the value conforms while its amount is no larger; ``None`` where none is set
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedCertificate:
-    """One certificate, interim check or diagnosis as recorded.
-
-    ``artefact``: serial of the artefact; empty where the job says nothing of it; ``adjusted_since``: last adjustment
-    of the machine before the recording, as the job or an entry says; ``decision``: the worst of its statements of
-    conformity, in the words of results.json; ``none`` where it states none; ``diagnosis``: verdict of the diagnosis;
-    empty where there is none; ``interim``: whether it is an interim check and no certificate; ``folder``: where its
-    files are; ``version``: of the package that made it; ``command``: that made it: report or diagnose;
-    ``artefact_due``: day by which the artefact was to be calibrated again, as the job said; ``covariance``: names,
-    and lower triangle row by row, of what is stated with one.
-    """
+    """One certificate, interim check or diagnosis as recorded; the decision is the gravest, or ``none``."""
 
     entry: int
     job: str
     machine: str
-    artefact: str
+    artefact: str  # serial of the artefact; empty where the job says nothing of it
     kind: str
     origin: str
     day: dt.date
     recorded: dt.datetime
-    adjusted_since: dt.date | None
+    adjusted_since: dt.date | None  # last adjustment of the machine before the recording, as the job or an entry says
     state: str
     decision: str
-    diagnosis: str
-    interim: bool
-    folder: str
-    version: str
+    diagnosis: str  # verdict of the diagnosis; empty where there is none
+    interim: bool  # whether it is an interim check and no certificate
+    folder: str  # where its files are
+    version: str  # of the package that made it
     results_sha256: str
     number: str
-    command: str
-    artefact_due: dt.date | None = None
+    command: str  # that made it: report or diagnose
+    artefact_due: dt.date | None = None  # day by which the artefact was to be calibrated again, as the job said
     values: tuple[RecordedValue, ...] = ()
     covariance: tuple[tuple[str, ...], tuple[float, ...]] | None = None
 
@@ -131,38 +105,29 @@ class ReleaseSignature:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One value of one machine over its certificates and interim checks, by day; each array is (n,).
-
-    ``limit``: that the newest certificate with one sets; ``day``: of the measurement, proleptic Gregorian ordinal;
-    ``adjusted_since``: day of the last adjustment before, ordinal; 0 where none is known; ``interim``: whether it is
-    of an interim check.
-    """
+    """One value of one machine over its certificates and interim checks, by day; each array is (n,)."""
 
     name: str
     quantity: str
     unit: str
-    limit: float | None
-    day: NDArray[np.int64]
+    limit: float | None  # that the newest certificate with one sets
+    day: NDArray[np.int64]  # of the measurement, proleptic Gregorian ordinal
     value: NDArray[np.float64]
     u: NDArray[np.float64]
     u_artefact: NDArray[np.float64]
     artefact: NDArray[np.str_]
     entry: NDArray[np.int64]
-    adjusted_since: NDArray[np.int64]
-    interim: NDArray[np.bool_]
+    adjusted_since: NDArray[np.int64]  # day of the last adjustment before, ordinal; 0 where none is known
+    interim: NDArray[np.bool_]  # whether it is of an interim check
 
 
 @dataclass(frozen=True, slots=True)
 class ChainFinding:
-    """Something that is not as it was recorded.
+    """Something that is not as it was recorded."""
 
-    ``kind``: chain, index, file or missing: a file that is not there any more may only have been moved; ``entry``:
-    number of the entry that it is about.
-    """
-
-    kind: str
+    kind: str  # chain, index, file or missing: a file that is not there any more may only have been moved
     problem: str
-    entry: int | None = None
+    entry: int | None = None  # number of the entry that it is about
 
 
 BY_NAME = "name:"  # what begins the key of something without a serial number

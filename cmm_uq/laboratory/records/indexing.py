@@ -98,7 +98,6 @@ class Indexer:
             })  # fmt: skip
 
     def _machine(self, facts: Mapping[str, Any], day: str, entry: int) -> Row:
-        """The machine's row, with the facts of its newest day."""
         key = machine_key(facts)
         row = self._known(machines, self._machines, key)
         said = {name: called(facts, name) for name in ("name", "manufacturer", "model", "place")}
@@ -214,7 +213,6 @@ class Indexer:
         return first is not None and row["id"] >= first
 
     def _next(self, table: Table) -> int:
-        """The next number of a table's rows."""
         if table not in self._counts:
             self._counts[table] = self.connection.execute(select(func.coalesce(func.max(table.c.id), 0))).scalar_one()
         self._counts[table] += 1

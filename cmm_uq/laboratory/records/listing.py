@@ -22,10 +22,7 @@ from cmm_uq.laboratory.records.tables import artefacts, certificates, entries, f
 
 
 class ListedCertificate(NamedTuple):
-    """A certificate, interim check or diagnosis in a list; fields as in ``RecordedCertificate``.
-
-    A tuple, as the others here are: ten thousand of them are made in a tenth of the time of dataclasses.
-    """
+    """In a list, fields as in ``RecordedCertificate``; a tuple is made in a tenth of a dataclass's time."""
 
     entry: int
     job: str
@@ -63,24 +60,18 @@ class Newest(NamedTuple):
 
 @dataclass(frozen=True)
 class CertificateFilter:
-    """Which certificates are listed; what is empty or ``None`` leaves all.
+    """Which certificates are listed; what is empty or ``None`` leaves all."""
 
-    ``text``: in the job's id, the certificate's number, or the machine's serial or name; capitals do not matter;
-    ``machine, artefact``: as they are called in the records; ``states, decisions, verdicts``: of the certificate, its
-    statements, its diagnosis; ``interim``: whether interim checks, or certificates; ``since, until``: first and last
-    day.
-    """
-
-    text: str = ""
-    machine: str = ""
+    text: str = ""  # in the job's id, the certificate's number, or the machine's serial or name; capitals do not matter
+    machine: str = ""  # and artefact: as they are called in the records
     artefact: str = ""
     origin: str = "measured"
     command: str = "report"
-    states: Collection[str] = ()
+    states: Collection[str] = ()  # and decisions, verdicts: of the certificate, its statements, its diagnosis
     decisions: Collection[str] = ()
     verdicts: Collection[str] = ()
-    interim: bool | None = None
-    since: dt.date | None = None
+    interim: bool | None = None  # whether interim checks, or certificates
+    since: dt.date | None = None  # and until: first and last day
     until: dt.date | None = None
 
 
@@ -180,21 +171,16 @@ def _with_text(connection: Connection, text: str) -> list[ColumnElement[bool]]:
 
 
 class CourseValue(NamedTuple):
-    """One value as one certificate or interim check states it.
-
-    ``value, lower, upper``: with the ends of the stated interval; ``limit``: of its amount; ``None`` where none is
-    set; ``interim``: whether it is of an interim check; ``adjusted_since``: the last adjustment of the machine before
-    it.
-    """
+    """One value as one certificate or interim check states it."""
 
     entry: int
     day: dt.date
-    value: float
+    value: float  # and lower, upper: with the ends of the stated interval
     lower: float
     upper: float
-    limit: float | None
-    interim: bool
-    adjusted_since: dt.date | None
+    limit: float | None  # of its amount; ``None`` where none is set
+    interim: bool  # whether it is of an interim check
+    adjusted_since: dt.date | None  # the last adjustment of the machine before it
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,10 +194,7 @@ class Course:
 
 
 def courses(records: Records, machine: RecordedMachine, most: int) -> list[Course]:
-    """What a machine's measured certificates and interim checks state, as far as they stand.
-
-    Gives in the order of the newest certificate, then what only older ones state.
-    """
+    """What a machine's measured certificates and checks state, as far as they stand, in the order of the newest."""
     newest = (
         select(_C.entry, _C.day, _C.interim, _C.adjusted_since)
         .where(_C.machine == select(machines.c.id).where(machines.c.called == machine.serial).scalar_subquery(),

@@ -170,7 +170,6 @@ def check_revision(state: str, place: str | Path) -> None:
 
 
 def _make(records: Records) -> None:
-    """Make the tables, in one transaction."""
     from sqlalchemy import text
 
     from cmm_uq.laboratory.records.tables import META, TRIGGERS

@@ -98,14 +98,7 @@ class RecordQueries:
     ) -> list[RecordedCertificate]:  # fmt: skip
         """Certificates and interim checks, by day, then entry; ``None`` for all.
 
-        Parameters
-        ----------
-        machine, artefact : serials, however they are spelled.
-        origin, states, command, job : of the recording, of the certificate, report or diagnose, id of the job.
-        since : first day.
-        limit, offset : at most so many, the newest, and newest that are left out, for pages.
-        values : whether what they state is read too.
-        newest_first : in reverse order.
+        ``since``: first day; ``limit, offset``: at most so many, the newest, and newest that are left out, for pages.
         """
         where = [
             column == v for column, v in ((_C.command, command), (_C.origin, origin), (_C.job, job)) if v is not None
@@ -132,10 +125,7 @@ class RecordQueries:
         return found[0]
 
     def named(self, certificate: str) -> list[RecordedCertificate]:
-        """Certificates by their number, id of the job, folder, hash of results.json, or number of the entry; by day.
-
-        Values are not read.
-        """
+        """Certificates by number, id of the job, folder, hash of results.json, or entry; by day, without values."""
         ways = [column == certificate for column in (_C.number, _C.job, _C.results_sha256, _C.folder)]
         if certificate.isascii() and certificate.isdigit() and len(certificate) < 16:
             ways.insert(0, _C.entry == int(certificate))
@@ -147,10 +137,7 @@ class RecordQueries:
         return []
 
     def latest(self, until: dt.date | None = None, *, values: bool = True) -> list[RecordedCertificate]:
-        """Newest measured certificate, not withdrawn nor replaced, of each machine, by serial; interim checks are none.
-
-        What is dated later than ``until`` does not count.
-        """
+        """Newest measured and standing certificate of each machine, none later than a day, by serial; no checks."""
         rows: list[RecordedCertificate] = []
         with self.reading() as connection:
             found = connection.execute(select(newest_of_machine(until)).select_from(machines)).scalars()
@@ -220,13 +207,7 @@ class RecordQueries:
         return found
 
     def all_series(self, names: Collection[str] | None = None, origin: str = "measured") -> pd.DataFrame:
-        """Values of all machines, a row each.
-
-        Returns
-        -------
-        columns machine, model, place, day (ordinal), name, value, u, u_artefact, artefact, limit, entry,
-        adjusted_since (ordinal, 0 where unknown), interim; by machine, name, day, entry.
-        """
+        """Values of all machines, a row each, by machine, name, day, entry; days are ordinals, 0 where unknown."""
         import pandas as pd
 
         with self.reading() as connection:
@@ -315,7 +296,6 @@ def _machine(row: Mapping[Any, Any], adjusted: Iterable[dt.date]) -> RecordedMac
 
 
 def _machine_id(connection: Connection, serial: str) -> int:
-    """Number of the machine of a serial, or of a name."""
     m, key = machines.c, spelled(serial)
     for way in (m.called == serial, m.spelled == key, m.named == key):
         rows = connection.execute(select(m.id, m.called).where(way)).all()
@@ -358,7 +338,6 @@ def _covariances(
 
 
 def _adjusted(connection: Connection, of: Collection[int]) -> dict[int, list[str]]:
-    """Days on which machines were adjusted, sorted."""
     found: dict[int, list[str]] = defaultdict(list)
     a = adjustments.c
     for block in blocks(sorted(of)):

@@ -38,15 +38,7 @@ _BLOCK = 5000  # entries that are written together
 
 
 class Records(RecordQueries):
-    """The history, opened; see :func:`~cmm_uq.laboratory.records.opening.open_records`.
-
-    Parameters
-    ----------
-    engine : connections to the database.
-    place : file or URL.
-    read_only : whether nothing may be written.
-    clock : says what time it is.
-    """
+    """The history, opened; see :func:`~cmm_uq.laboratory.records.opening.open_records`."""
 
     def __init__(
         self, engine: Engine, place: str | Path, *, read_only: bool = False, clock: Callable[[], dt.datetime] = now
@@ -74,12 +66,7 @@ class Records(RecordQueries):
         return shown(self.place)
 
     def signed(self, certificate: int) -> dict[str, str]:
-        """SHA-256 by name of the files of a certificate that were signed since, as they are now.
-
-        Parameters
-        ----------
-        certificate : number of its entry.
-        """
+        """SHA-256 by name of the files of a certificate (its entry) that were signed since, as they are now."""
         found: dict[str, str] = {}
         for entry in self.entries(certificate, kind="signed"):
             if entry.data.get("certificate") == certificate:
@@ -92,13 +79,7 @@ class Records(RecordQueries):
             return last(connection)
 
     def entries(self, first: int = 1, kind: str | None = None) -> Iterator[Entry]:
-        """Entries in their order, read block by block.
-
-        Parameters
-        ----------
-        first : number.
-        kind : of entries that are wanted; ``None`` for all.
-        """
+        """Entries in their order, of one kind or all, read block by block."""
         number = first
         while True:
             wanted = select(entries).where(entries.c.number >= number).order_by(entries.c.number).limit(_BLOCK)
@@ -113,19 +94,7 @@ class Records(RecordQueries):
             number = rows[-1].number + 1
 
     def append(self, kind: str, content: Mapping[str, Any], *, at: dt.datetime | None = None) -> Entry:
-        """Add an entry.
-
-        Parameters
-        ----------
-        kind : of the entry.
-        content : JSON.
-        at : moment; now by default.
-
-        Raises
-        ------
-        CmmUqError : it says something that no entry before it allows.
-        OutputError : the records cannot be written to.
-        """
+        """Add an entry; refused where no entry before it allows what it says."""
         return self.append_all([(kind, content, at)])[-1]
 
     def append_all(self, new: Iterable[New]) -> list[Entry]:
@@ -174,27 +143,11 @@ class Records(RecordQueries):
                 writing.forget(row.token)
 
     def ledger(self, kind: str, content: Mapping[str, Any]) -> Ledger:
-        """For a set of files that is to be recorded as it is put in place.
-
-        Parameters
-        ----------
-        kind : of the entry.
-        content : of the entry; its ``results_sha256`` is recorded once, however often the same results are written.
-        """
+        """For a set of files that is to be recorded as it is put in place; the same results are recorded once."""
         return Intended(self, kind, content)
 
     def verify(self, head: str | None = None, *, files: bool = True) -> list[ChainFinding]:
-        """Compare everything with the chain; see :mod:`cmm_uq.laboratory.records.verifying`.
-
-        Parameters
-        ----------
-        head : hash of an entry that was filed elsewhere.
-        files : whether the files of the reports are compared too.
-
-        Returns
-        -------
-        what is wrong; empty where nothing is.
-        """
+        """What is wrong of everything against the chain, and the hash of an entry that was filed elsewhere."""
         from cmm_uq.laboratory.records.verifying import verified
 
         return verified(self, head, files=files)

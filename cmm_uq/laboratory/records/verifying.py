@@ -152,6 +152,5 @@ def _of_folder(folder: Path, entry: int, results: str) -> Iterator[ChainFinding]
 
 
 def _removed(connection: Connection) -> set[int]:
-    """Certificates whose files a retention removed."""
     query = select(entries).where(entries.c.kind == "retained")
     return {int(number) for row in connection.execute(query) for number in Entry(*row).data.get("certificates", ())}

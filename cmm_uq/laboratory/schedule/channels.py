@@ -54,20 +54,15 @@ LONGEST_SUBJECT = 150
 
 @dataclass(frozen=True)
 class Mail:
-    """An SMTP server and whom it is to reach.
-
-    ``server, port``: where it listens; ``login``: user and password, asked for when they are needed; ``None`` where
-    the server wants none; ``ca_file``: certificates to trust beside none other; those of the system where it is
-    ``None``.
-    """
+    """An SMTP server and whom it is to reach; a login is asked for when it is needed."""
 
     to: tuple[str, ...]
     sender: str
-    server: str
+    server: str  # and port: where it listens
     port: int
     security: str
     login: Callable[[], tuple[str, str]] | None
-    ca_file: Path | None
+    ca_file: Path | None  # certificates to trust beside none other; those of the system where it is ``None``
     timeout_s: float
     events: frozenset[str]
 
@@ -145,20 +140,15 @@ SIGNATURE, TIMESTAMP, REPETITION = "X-CMM-UQ-Signature", "X-CMM-UQ-Timestamp", "
 
 @dataclass(frozen=True)
 class Webhook:
-    """An address that takes messages.
+    """An address that takes messages."""
 
-    ``address``: gives the URL, which may be a secret itself; ``secret``: gives the key of the signature; ``None``
-    where there is none; ``ca_file``: certificates to trust; those of the system where it is ``None``; ``name``: what
-    tells it from others; ``clock``: seconds since 1970.
-    """
-
-    address: Callable[[], str]
-    secret: Callable[[], str] | None
-    ca_file: Path | None
+    address: Callable[[], str]  # gives the URL, which may be a secret itself
+    secret: Callable[[], str] | None  # gives the key of the signature; ``None`` where there is none
+    ca_file: Path | None  # certificates to trust; those of the system where it is ``None``
     timeout_s: float
     events: frozenset[str]
-    name: str
-    clock: Callable[[], float] = time.time
+    name: str  # what tells it from others
+    clock: Callable[[], float] = time.time  # seconds since 1970
 
     def send(self, message: OutgoingMessage) -> str:
         body = json.dumps({"schema": SCHEMA, **message.as_data()}, ensure_ascii=False).encode()
@@ -195,10 +185,7 @@ class _StayHere(urllib.request.HTTPRedirectHandler):
 
 
 def signature(secret: str, stamp: str, body: bytes) -> str:
-    """HMAC-SHA-256 over the time stamp, a full stop and the body, as the header has it.
-
-    ``stamp``: seconds since 1970, as its header has it; ``body``: bytes of the JSON.
-    """
+    """HMAC-SHA-256 over the time stamp (seconds since 1970), a full stop and the body, as the header has it."""
     return "sha256=" + hmac.new(secret.encode(), f"{stamp}.".encode() + body, hashlib.sha256).hexdigest()
 
 

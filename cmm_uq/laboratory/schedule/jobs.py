@@ -1,7 +1,5 @@
 """Job folders of a schedule: found, whether they changed, reported where nobody else is at them, and what came of it.
 
-Job folders found below the folders of a schedule, whether they changed, and whether they are still being copied.
-
 Whether a job changed is decided by the content of job.toml and of every file that it names. Times of files say only whether
 somebody is at them: they may lie, and where they cannot be right two looks at the folder decide.
 """
@@ -43,18 +41,13 @@ _HEAD = 200  # bytes of a recording that say whether it is a plan still to be me
 
 @dataclass(frozen=True)
 class JobFolder:
-    """A job folder.
-
-    ``root``: folder of the schedule that it lies in; ``id``: of the job; empty where job.toml cannot be read, which
-    its report will say; ``recording``: name of the file that is recorded; empty where none is named; ``planned``:
-    whether the recording is still to be made.
-    """
+    """A job folder."""
 
     folder: Path
-    root: Path
-    id: str = ""
-    recording: str = ""
-    planned: bool = False
+    root: Path  # folder of the schedule that it lies in
+    id: str = ""  # of the job; empty where job.toml cannot be read, which its report will say
+    recording: str = ""  # name of the file that is recorded; empty where none is named
+    planned: bool = False  # whether the recording is still to be made
 
 
 def job_folders(root: Path, leave_out: Path | None = None) -> Iterator[JobFolder]:
@@ -72,10 +65,7 @@ def job_folders(root: Path, leave_out: Path | None = None) -> Iterator[JobFolder
 
 
 def differing(job: JobFolder, inputs: Mapping[str, str]) -> list[str]:
-    """Names of the files that are not what they were.
-
-    ``inputs``: SHA-256 of every file that was read, by name.
-    """
+    """Names of the files that are not what they were, by the SHA-256 of every file that was read."""
     changed = [name for name, digest in inputs.items() if sha256_of(job.folder / name) != digest]
     if job.recording:
         beside = provenance_name(job.recording)
@@ -100,10 +90,7 @@ def snapshot(folder: Path) -> Snapshot:
 
 
 def quiet_since(seen: Snapshot, now_s: float) -> float:
-    """Seconds for which no file of a folder was changed, by their own times; negative where one lies in the future.
-
-    ``now_s``: seconds since 1970.
-    """
+    """Seconds for which no file of a folder was changed, by their own times; negative where one lies in the future."""
     newest = max((max(changed, moved) for _, _, changed, moved in seen), default=0)
     return now_s - newest / 1e9
 
@@ -150,18 +137,14 @@ REFUSED, FAILED, WOULD = "refused", "failed", "would report"  # what came of a j
 
 @dataclass(frozen=True)
 class JobOutcome:
-    """What came of a job, or of a folder.
-
-    ``state``: one of the words above; ``results``: contents of results.json where it was reported; ``notices``: of
-    what a person must hear of the certificate.
-    """
+    """What came of a job, or of a folder."""
 
     job: JobFolder
-    state: str
+    state: str  # one of the words above
     why: str = ""
     error: CmmUqError | None = None
-    results: Mapping[str, Any] = field(default_factory=dict)
-    notices: Sequence[Notice] = ()
+    results: Mapping[str, Any] = field(default_factory=dict)  # contents of results.json where it was reported
+    notices: Sequence[Notice] = ()  # of what a person must hear of the certificate
     seconds: float = 0.0
 
     @classmethod
@@ -201,16 +184,12 @@ class JobOutcome:
 
 @dataclass(frozen=True)
 class JobReporting:
-    """How jobs are reported.
+    """How jobs are reported."""
 
-    ``out``: folder with a folder for each job; ``state``: what earlier runs have done; ``queue``: lets notices go
-    out, before a job counts as done; ``further``: what the history of its machine says of a new certificate.
-    """
-
-    out: Path
-    state: State
+    out: Path  # folder with a folder for each job
+    state: State  # what earlier runs have done
     report: Report
-    queue: Callable[[Sequence[Notice]], object]
+    queue: Callable[[Sequence[Notice]], object]  # lets notices go out, before a job counts as done
     further: Callable[[JobFolder], Iterable[Notice]] = lambda job: ()
 
     def lock_of(self, job: JobFolder) -> Path:

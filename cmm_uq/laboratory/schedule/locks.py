@@ -22,16 +22,12 @@ _ATTEMPTS = 20  # at a file that others lock and remove at the same time
 
 @dataclass(eq=False)
 class Turn:
-    """The lock of a file, held.
-
-    ``resumed``: whether a run ended before it was through with what the lock is of; ``through``: whether this one is,
-    so that it may be forgotten.
-    """
+    """The lock of a file, held."""
 
     path: Path
     descriptor: int
-    resumed: bool
-    through: bool = True
+    resumed: bool  # whether a run ended before it was through with what the lock is of
+    through: bool = True  # whether this one is, so that it may be forgotten
 
     def end(self) -> None:
         if self.through:

@@ -29,18 +29,14 @@ _CONTRADICTS = say("the recording contradicts its model")
 
 @dataclass(frozen=True)
 class Notice:
-    """Something that a person must hear of, once.
-
-    ``about``: job, machine, artefact or folder that it is about; ``title``: in a few words; the subject of an e-mail;
-    ``state``: which state of it: another state is told again, the same is not; ``where``: folder in which to look.
-    """
+    """Something that a person must hear of, once."""
 
     event: Event
-    about: str
-    title: Text
+    about: str  # job, machine, artefact or folder that it is about
+    title: Text  # in a few words; the subject of an e-mail
     text: Text
-    state: str = ""
-    where: str = ""
+    state: str = ""  # which state of it: another state is told again, the same is not
+    where: str = ""  # folder in which to look
 
     @property
     def key(self) -> str:
@@ -71,19 +67,13 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
 
 
 def of_error(error: CmmUqError, about: str, since: str) -> Notice:
-    """What has to be said of a job or a folder that could not be reported.
-
-    ``since``: moment at which it was first met; where it was mended in between and comes back, it is told again.
-    """
+    """Of a job or a folder that could not be reported; what was mended and comes back later is told again."""
     title = say("error: {about}", about=Verbatim(about))
     return Notice("error", about, title, Verbatim(str(error)), f"{error} since {since}", error.where or "")
 
 
 def of_due(item: str, called: str, due: dt.date, on: dt.date, why: Text, *, beyond: bool = False) -> Notice:
-    """What has to be said of a machine or an artefact that is to be calibrated: once before its day, and once after it.
-
-    ``due``: day by which it is to be calibrated.
-    """
+    """Of a machine or an artefact that is to be calibrated by a day: once before it, and once after it."""
     overdue = beyond or due < on
     state = say("overdue since {due}", due=day(due)) if overdue else say("due on {due}", due=day(due))
     title = say("{state}: {item} {called}", state=state, item=Verbatim(item), called=Verbatim(called))
@@ -121,19 +111,15 @@ class UndeliveredError(Exception):
 
 @dataclass(frozen=True)
 class OutgoingMessage:
-    """What is sent of a notice; of texts only, so that it can wait in a file.
+    """What is sent of a notice; of texts only, so that it can wait in a file."""
 
-    ``key``: the same whenever the same is sent the same way, so that a receiver knows a repetition; ``at``: moment at
-    which it was found, UTC, ISO 8601.
-    """
-
-    key: str
+    key: str  # the same whenever the same is sent the same way, so that a receiver knows a repetition
     event: str
     about: str
     title: str
     text: str
     where: str
-    at: str
+    at: str  # moment at which it was found, UTC, ISO 8601
 
     def as_data(self) -> dict[str, str]:
         """For a file, or a webhook."""

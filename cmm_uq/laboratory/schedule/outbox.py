@@ -34,15 +34,12 @@ _ABANDONED_S = 3600.0  # age at which nobody writes a file any more that takes m
 
 @dataclass(frozen=True)
 class Delivery:
-    """What came of a message.
-
-    ``problem``: why it did not go out; empty where it did; ``remark``: on one that went out.
-    """
+    """What came of a message."""
 
     message: OutgoingMessage
     channel: str
-    problem: str = ""
-    remark: str = ""
+    problem: str = ""  # why it did not go out; empty where it did
+    remark: str = ""  # on one that went out
 
 
 @dataclass(frozen=True)
@@ -149,7 +146,6 @@ class Outbox:
                     path.unlink()
 
     def _wait(self, message: OutgoingMessage, channel: str) -> bool:
-        """Whether the message was new."""
         place = self.folder / f"{message.key}{_WAITING}"
         if self.state.sent(message.key) or place.exists() or place.with_suffix(_SENT).exists():
             return False

@@ -1,14 +1,9 @@
 """Numbered tasks answered by processes of this machine, as many at once as asked for.
 
-A process that answers tasks one after the other, and whoever asks it: begun anew when it dies, stopped when it hangs.
-
 A process imports once and computes on one thread, whatever the machine has, so that an answer depends neither on how many
-processes there are nor on whose they are. It is asked through its standard input and answers on its standard output.
-
-Numbered tasks answered by processes of this machine, as many at once as asked for.
-
-Tasks are taken as they are needed and answers given as they come, so that memory does not grow with their number: whoever
-does not take answers is not sent more.
+processes there are nor on whose they are. It is asked through its standard input and answers on its standard output, begun
+anew when it dies and stopped when it hangs. Tasks are taken as they are needed and answers given as they come, so that
+memory does not grow with their number: whoever does not take answers is not sent more.
 """
 
 from __future__ import annotations
@@ -43,30 +38,22 @@ BEGINNING_S = 300.0
 
 @dataclass(frozen=True)
 class WorkerTask:
-    """What processes are begun for.
+    """What processes are begun for."""
 
-    ``program``: module that a process runs; see :func:`serve`; ``setting``: what every process is told first;
-    ``seconds``: that one task may take; without one, as long as it takes; ``tries``: processes that a task may end
-    before it is given up.
-    """
-
-    program: str
-    setting: Any
-    seconds: float | None = None
-    tries: int = 3
+    program: str  # module that a process runs; see :func:`serve`
+    setting: Any  # what every process is told first
+    seconds: float | None = None  # that one task may take; without one, as long as it takes
+    tries: int = 3  # processes that a task may end before it is given up
 
 
 @dataclass(frozen=True)
 class TaskAnswer:
-    """What came of a task.
-
-    ``ended``: how each process ended that ended over it, such as "signal 9".
-    """
+    """What came of a task."""
 
     number: int
     value: Any = None
     failure: CmmUqError | None = None
-    ended: tuple[str, ...] = ()
+    ended: tuple[str, ...] = ()  # how each process ended that ended over it, such as "signal 9"
 
 
 @dataclass(frozen=True)
@@ -140,7 +127,6 @@ class WorkerProcess:
         return process
 
     def _said(self, process: subprocess.Popen[bytes], value: Any, seconds: float | None) -> Any:
-        """What the process says to something."""
         late = threading.Event()
 
         def stop() -> None:
@@ -193,11 +179,7 @@ def put(stream: BinaryIO, value: Any) -> None:
 
 
 def serve(begin: Callable[[Any], Callable[[int, Any], Any]]) -> None:
-    """Be such a process: read the setting, say that it is understood, then answer tasks until nobody asks any more.
-
-    ``begin``: makes, of the setting, what answers a task by number and content. A :class:`CmmUqError` of it ends the
-    run; one of an answer, or a fault, is the answer.
-    """
+    """Be such a process: ``begin`` makes, of the setting, what answers a task; its own error ends the run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides
     asked, told = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever a library prints is no answer
@@ -271,11 +253,7 @@ def processes() -> int:
 
 
 def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) -> Generator[TaskAnswer, None, None]:
-    """Have every task answered, in the order in which they are done.
-
-    ``tasks``: each with its number; taken in the caller's thread; ``workers``: processes at once; none is begun
-    without a task.
-    """
+    """Have every numbered task answered, in the order in which they are done; no process is begun without a task."""
     todo = iter(tasks)
     waiting: _Waiting = queue.SimpleQueue()
     done: _Answers = queue.SimpleQueue()
@@ -309,7 +287,6 @@ def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) ->
 
 
 def _converse(talk: WorkerProcess, waiting: _Waiting, done: _Answers) -> None:
-    """Give one process its tasks, one after the other."""
     try:
         while (task := waiting.get()) is not None:
             done.put(talk.ask(*task))

@@ -15,10 +15,7 @@ from cmm_uq.laboratory.schedule.locks import turn
 
 
 class Pace:
-    """Counts what is done of a number of jobs.
-
-    ``clock``: seconds, never going back.
-    """
+    """Counts what is done of a number of jobs, by a clock that never goes back."""
 
     def __init__(self, count: int, clock: Callable[[], float] = time.monotonic) -> None:
         self.count = count
@@ -71,13 +68,10 @@ _PATIENCE_S = 2.0  # how long to wait for another run that writes its line
 
 @dataclass(frozen=True)
 class Log:
-    """A file of lines.
+    """A file of lines."""
 
-    ``path``: of the file; ``None`` for no log; ``largest``: bytes at which a new one is begun.
-    """
-
-    path: Path | None
-    largest: int
+    path: Path | None  # of the file; ``None`` for no log
+    largest: int  # bytes at which a new one is begun
     kept: int
 
     def write(self, text: str) -> None:

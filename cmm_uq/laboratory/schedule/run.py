@@ -40,15 +40,11 @@ _PATIENCE_S = 60.0  # how long to wait for another run that sends messages
 
 @dataclass(frozen=True)
 class RunClock:
-    """Time, as a run knows it.
+    """Time, as a run knows it."""
 
-    ``now``: the moment, UTC; it may jump; ``passed``: seconds from some moment on; they do not; ``sleep``: waits so
-    many seconds.
-    """
-
-    now: Callable[[], dt.datetime]
-    passed: Callable[[], float]
-    sleep: Callable[[float], None]
+    now: Callable[[], dt.datetime]  # the moment, UTC; it may jump
+    passed: Callable[[], float]  # seconds from some moment on; they do not
+    sleep: Callable[[float], None]  # waits so many seconds
 
     def moment(self) -> str:
         """ISO 8601, to the second."""
@@ -57,30 +53,22 @@ class RunClock:
 
 @dataclass(frozen=True)
 class ScheduledRun:
-    """What a scheduled run goes by.
+    """What a scheduled run goes by."""
 
-    ``folders``: with job folders in them; ``work``: how a job is reported; ``due``: what is due, or drifts, on a day;
-    ``tell``: takes a line for a program; ``log``: takes a line for a person; ``dry``: say what would happen, and do
-    nothing.
-    """
-
-    folders: Sequence[Path]
+    folders: Sequence[Path]  # with job folders in them
     settings: RunTable
-    work: JobReporting
+    work: JobReporting  # how a job is reported
     outbox: Outbox
-    due: Callable[[dt.date], Iterable[Notice]]
-    tell: Callable[[dict[str, Any]], None]
-    log: Callable[[str], None]
+    due: Callable[[dt.date], Iterable[Notice]]  # what is due, or drifts, on a day
+    tell: Callable[[dict[str, Any]], None]  # takes a line for a program
+    log: Callable[[str], None]  # takes a line for a person
     clock: RunClock
-    dry: bool = False
+    dry: bool = False  # say what would happen, and do nothing
     counted: dict[str, int] = field(default_factory=dict)
     codes: set[int] = field(default_factory=lambda: {0})
 
     def through(self) -> int:
-        """Do all of it; the exit code.
-
-        0: all is well. 1: something needs a person. 2: bad input. 3: output impossible.
-        """
+        """The exit code: 0 all is well, 1 something needs a person, 2 bad input, 3 output impossible."""
         problems = Problems(self.work.out)
         jobs = self._distinct(self._found(problems), problems)
         if self.dry:
@@ -96,7 +84,6 @@ class ScheduledRun:
         return self._conclude()
 
     def _found(self, problems: Problems) -> list[JobFolder]:
-        """Every job folder once; what is wrong with a folder of the schedule is told."""
         found: dict[Path, JobFolder] = {}
         for root in self.folders:
             try:
@@ -128,7 +115,6 @@ class ScheduledRun:
         return sorted(alone, key=self.work.was_left)
 
     def _would(self, job: JobFolder) -> JobOutcome:
-        """What would come of a job."""
         if job.planned:
             return JobOutcome(job, WAITING, "not measured yet")
         try:

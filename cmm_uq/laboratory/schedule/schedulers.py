@@ -19,22 +19,16 @@ _NAMESPACE = "http://schemas.microsoft.com/windows/2004/02/mit/task"
 
 @dataclass(frozen=True)
 class ScheduledCall:
-    """A scheduled run, as a scheduler starts it.
+    """A scheduled run, as a scheduler starts it."""
 
-    ``program``: that runs the command, and what comes before the subcommand; ``folders``: with job folders in them;
-    absolute; ``schedule``: the file schedule.toml; ``None`` where there is none; ``home``: folder that it works in;
-    ``hour, minute``: of the day; ``days``: of the week, as in :data:`DAYS`; empty for every day; ``user``: who it
-    runs as, on systems with units.
-    """
-
-    program: tuple[str, ...]
-    folders: tuple[PurePath, ...]
-    schedule: PurePath | None
-    home: PurePath
-    hour: int
+    program: tuple[str, ...]  # that runs the command, and what comes before the subcommand
+    folders: tuple[PurePath, ...]  # with job folders in them; absolute
+    schedule: PurePath | None  # the file schedule.toml; ``None`` where there is none
+    home: PurePath  # folder that it works in
+    hour: int  # and minute: of the day
     minute: int
-    days: tuple[str, ...] = ()
-    user: str = ""
+    days: tuple[str, ...] = ()  # of the week, as in :data:`DAYS`; empty for every day
+    user: str = ""  # who it runs as, on systems with units
 
     def line(self, *further: str) -> list[str]:
         """The command line, word by word."""

@@ -34,12 +34,7 @@ def _variable(text: str) -> str:
 
 
 def web_address(text: str) -> str:
-    """An address of the web without a secret in it.
-
-    Raises
-    ------
-    ValueError : it is none.
-    """
+    """An address of the web without a secret in it."""
     parts = urlsplit(text)
     if parts.scheme not in ("http", "https") or not parts.hostname:
         raise ValueError("is no web address, as https://example.org/cmm")
@@ -161,15 +156,6 @@ class ScheduleFile(JobTable):
 
 
 def read_schedule(path: Path) -> ScheduleFile:
-    """The contents of a ``schedule.toml``.
-
-    Parameters
-    ----------
-    path : of the file.
-
-    Raises
-    ------
-    CmmUqError : it is missing, or says something unknown or contradictory; with line and key.
-    """
+    """The contents of a ``schedule.toml``."""
     content = content_of(path, JOB_BYTES, "cmm-uq schedule new FILE writes one with every key explained")
     return checked(content, path, ScheduleFile)

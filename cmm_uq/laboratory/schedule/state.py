@@ -1,7 +1,5 @@
 """What earlier runs have done: which inputs a job was last reported from, which messages were sent, which problems stand.
 
-What earlier runs have done: which inputs a job was last reported from, and which messages were sent.
-
 The records of the laboratory keep it, or the folder of the reports where there are none: the manifest of a report says that
 it is whole, its results.json what it was made from.
 """
@@ -34,12 +32,9 @@ COMMAND = "report"
 
 @dataclass(frozen=True)
 class ReportedInputs:
-    """A certificate that was written.
+    """A certificate that was written."""
 
-    ``inputs``: SHA-256 of every file that it was made from, by name.
-    """
-
-    inputs: Mapping[str, str]
+    inputs: Mapping[str, str]  # SHA-256 of every file that it was made from, by name
 
 
 class State(Protocol):

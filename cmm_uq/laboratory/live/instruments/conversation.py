@@ -16,13 +16,9 @@ PAUSE = SECOND // 2
 
 
 class Conversation:
-    """Questions to one instrument, one after the other, a round every so often.
+    """Questions to one instrument, one after the other, a round every so often; moments are of the monotonic clock, ns.
 
-    ``send``: what the instrument is sent; ``now``: monotonic clock, ns; ``replayed``: whether the answers come from a
-    file, where nothing is asked.
-    ``asked``: which question waits for its answer, or was answered last; −1 before the first; ``waiting``: whether an
-    answer is waited for; ``gap``: whether the instrument is silent: it is then asked without regard to the rounds, so
-    that its return is noticed.
+    A silent instrument (``gap``) is asked without regard to the rounds, so that its return is noticed.
     """
 
     def __init__(self, send: Send, now: int, *, replayed: bool = False) -> None:
@@ -59,10 +55,6 @@ class Conversation:
         return self._polls[following]
 
     def heard(self, now: int, *, answer: bool) -> None:
-        """A message came.
-
-        ``now``: monotonic clock, ns.
-        """
         self._heard_at = now
         if answer:
             self.waiting = self.gap = False

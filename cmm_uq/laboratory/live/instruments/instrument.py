@@ -52,11 +52,7 @@ class Stamp:
 
 
 class LiveInstrument:
-    """An instrument at a port.
-
-    ``identity``: what the job says of it; ``reopen_when_silent``: whether the connection is made anew where nothing
-    comes: one over a network may be dead unnoticed.
-    """
+    """An instrument at a port; a silent connection over a network is made anew: it may be dead unnoticed."""
 
     def __init__(
         self, identity: Identity, profile: ProfileFile, opened: PortOpener, clock: Clock, *, reopen_when_silent: bool = False
@@ -114,7 +110,6 @@ class LiveInstrument:
         yield from self._rest()
 
     def _step(self, port: Port) -> Iterator[Event]:
-        """Ask what is due, read what came, notice what did not."""
         now = self._clock.monotonic_ns()
         question = self._conversation.question(now)
         if question is not None:
@@ -212,7 +207,6 @@ class LiveInstrument:
         yield from self._silent(why)
 
     def _reconnected(self) -> Iterator[Event]:
-        """Try to open the port once."""
         try:
             port = self._opened()
         except CmmUqError:
@@ -279,7 +273,6 @@ class LiveInstrument:
 
 
 def _completed(found: Identity, declared: Identity) -> Identity:
-    """What the instrument says, and what only the job says."""
     said = {key: value for key, value in vars(found).items() if value is not None}
     return replace(declared, **(said | {"name": declared.name, "certificate": declared.certificate}))
 

@@ -65,20 +65,15 @@ _FOUND = re.compile(r"(?:[-+]\s*|(?<![\w.]))\d+(?:\.\d+)?(?:[Ee][-+]?\d+)?|(?<=[
 
 @dataclass(frozen=True)
 class ProfileDraft:
-    """What a new profile says.
-
-    ``line``: an example, as it comes, with or without its end; ``quantities``: name of the quantity for each number
-    of the line that is one, by its place, counted from 1; ``ranges``: least and largest plausible value by quantity;
-    ``ask``: what is sent to get a line; empty where they come by themselves; ``every_s``: how often it is asked.
-    """
+    """What a new profile says; quantities by the place of their number in the line, from 1."""
 
     name: str
     title: str
-    line: str
+    line: str  # an example, as it comes, with or without its end
     quantities: Mapping[int, str]
-    ranges: Mapping[str, Sequence[float]]
-    ask: str = ""
-    every_s: float = 1.0
+    ranges: Mapping[str, Sequence[float]]  # least and largest plausible value by quantity
+    ask: str = ""  # what is sent to get a line; empty where they come by themselves
+    every_s: float = 1.0  # how often it is asked
     settings: Mapping[str, str | int] | None = None
 
 
@@ -164,7 +159,6 @@ def _lines(wanted: ProfileDraft, pattern: str, values: Mapping[str, float]) -> l
 
 
 def _plain_name(name: str) -> str:
-    """A name as profiles have it."""
     return re.sub(r"[^a-z0-9.-]+", "-", name.lower()).strip("-.") or "instrument"
 
 

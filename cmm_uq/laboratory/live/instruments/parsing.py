@@ -27,15 +27,11 @@ from cmm_uq.laboratory.live.instruments.profile import (
 
 @dataclass(frozen=True)
 class FramedMessage:
-    """Bytes that belong together.
-
-    ``body``: without terminator, first and last byte; ``whole``: whether it is a message; else bytes between
-    messages, or a message without its end.
-    """
+    """Bytes that belong together."""
 
     raw: bytes
-    body: bytes
-    whole: bool = True
+    body: bytes  # without terminator, first and last byte
+    whole: bool = True  # whether it is a message; else bytes between messages, or a message without its end
 
 
 class Framer:
@@ -94,7 +90,6 @@ class Framer:
         return place + len(end)
 
     def _taken(self, size: int) -> FramedMessage:
-        """Bytes that are no message."""
         raw = bytes(self._waiting[:size])
         del self._waiting[:size]
         self._looked = 0
@@ -146,11 +141,7 @@ def value_of(name: str, raw: float, quantity: ProfileQuantity, said: str = "") -
 
 @cache
 def conversion(given: str, wanted: str) -> Callable[[float], float]:
-    """From one unit into another.
-
-    ``given``: as pint spells it; empty where it is the wanted one; ``wanted``: as printed; empty for a quantity whose
-    name has none.
-    """
+    """From one unit, as pint spells it, into another as printed; nothing to do where either is empty or both are the same."""
     target = _PINT.get(wanted, wanted)
     if given in ("", target):
         return float
@@ -172,15 +163,11 @@ _NOTHING = Parse(pattern="(?!)")  # understands nothing
 
 @dataclass(frozen=True)
 class Understood:
-    """What a message says.
+    """What a message says."""
 
-    ``values``: by quantity; empty where it says none; ``status``: what is wrong; ``None``: nothing; ``answers``:
-    whether it is an answer: it has values, or says that something is wrong with the instrument.
-    """
-
-    values: Mapping[str, float] = field(default_factory=dict)
-    status: Text | None = None
-    answers: bool = False
+    values: Mapping[str, float] = field(default_factory=dict)  # by quantity; empty where it says none
+    status: Text | None = None  # what is wrong; ``None``: nothing
+    answers: bool = False  # whether it is an answer: it has values, or says that something is wrong with the instrument
 
 
 class Parser:

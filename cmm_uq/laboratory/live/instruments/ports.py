@@ -1,8 +1,7 @@
 """Ports: serial lines, plain TCP, RFC 2217 device servers, VISA and files, all read alike and lost alike.
 
-Instruments that speak only GPIB or USB-TMC, by pyvisa, which is installed with ``cmm-uq[visa]``.
-
-Nothing is read before something was asked: many instruments take a reading without a question for an error.
+VISA (GPIB, USB-TMC) is by pyvisa, installed with ``cmm-uq[visa]``; there nothing is read before something was asked: many
+instruments take a reading without a question for an error.
 """
 
 from __future__ import annotations
@@ -243,11 +242,7 @@ class EndOfFileError(PortLostError):
 
 
 class ReplayedFile:
-    """A file as a port; what is written to it goes nowhere.
-
-    ``port``: ``file:NAME``, with ``?every_s=S`` where each line is to take that time; ``folder``: in which the file
-    lies.
-    """
+    """A file as a port, ``file:NAME?every_s=S`` a line in that time; what is written to it goes nowhere."""
 
     def __init__(self, port: str, folder: Path, clock: Clock) -> None:
         path = file_named(port, folder)

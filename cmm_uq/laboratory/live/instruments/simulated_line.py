@@ -22,16 +22,12 @@ _TICK_S = 0.01
 
 @dataclass
 class Mischief:
-    """What the instrument does wrong; all may be changed while it runs.
-
-    ``halves``: leaves out the second half of each message; ``noise``: sends these bytes before each message;
-    ``garbled``: sends other bytes than it means, as at a wrong baud rate.
-    """
+    """What the instrument does wrong; all may be changed while it runs."""
 
     hangs: bool = False
-    halves: bool = False
-    noise: bytes = b""
-    garbled: bool = False
+    halves: bool = False  # leaves out the second half of each message
+    noise: bytes = b""  # sends these bytes before each message
+    garbled: bool = False  # sends other bytes than it means, as at a wrong baud rate
     a_byte_at_a_time: bool = False
 
     def spoiled(self, data: bytes) -> bytes:
@@ -58,11 +54,7 @@ class _Wire(Protocol):
 
 
 class SimulatedLine:
-    """An instrument that speaks from a thread of its own until it is closed.
-
-    ``way``: at what it is connected; ``folder``: where the name of a pseudo-terminal is put, which stays the same
-    when it is unplugged and plugged in again; ``tcp_port``: of a socket; 0 takes a free one.
-    """
+    """An instrument that speaks from a thread of its own until closed; a pseudo-terminal keeps its name in ``folder``."""
 
     def __init__(self, speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0) -> None:
         self.speaker, self.mischief, self._way = speaker, Mischief(), way
@@ -139,7 +131,6 @@ class SimulatedLine:
         self.sent += bool(data) and spoiled == data
 
     def _accepted(self) -> _Wire | None:
-        """The next connection, where one comes soon."""
         if self._listening is None or not select.select([self._listening], [], [], 5 * _TICK_S)[0]:
             return None
         connection, _ = self._listening.accept()

@@ -13,24 +13,16 @@ from cmm_uq.base.messages import Text
 
 @dataclass(frozen=True)
 class Reading:
-    """One message of an instrument, as received and as understood.
+    """One message of an instrument, as received and as understood; values by the quantity's name with its unit."""
 
-    ``source``: the name in the job, unique; ``number``: counts the messages of this source since it was opened, from
-    1; ``utc_ns``: wall clock when its last byte arrived, ns since 1970; ``monotonic_ns``: monotonic clock at the same
-    moment, ns; ``raw``: bytes as received, framing included; ``values``: by the quantity's name with its unit,
-    ``{"temp_c": 20.01}``; empty where the message was not understood; ``status``: what the instrument says is wrong
-    with it, or what is wrong with the message; ``None``: sound; ``point``: for a CMM what was measured (``PtMeas``),
-    else ``None``.
-    """
-
-    source: str
-    number: int
-    utc_ns: int
-    monotonic_ns: int
-    raw: bytes
+    source: str  # the name in the job, unique
+    number: int  # counts the messages of this source since it was opened, from 1
+    utc_ns: int  # wall clock when its last byte arrived, ns since 1970
+    monotonic_ns: int  # monotonic clock at the same moment, ns
+    raw: bytes  # bytes as received, framing included
     values: Mapping[str, float]
     status: Text | None = None
-    point: str | None = None
+    point: str | None = None  # for a CMM what was measured (``PtMeas``), else ``None``
 
 
 @dataclass(frozen=True)
@@ -78,11 +70,7 @@ class LiveSource(Protocol):
         ...
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
-        """What happens, as it happens; ends when ``stop`` is set.
-
-        It blocks in between, reconnects by itself within 2 s of the instrument's return, and never raises for what the
-        line does.
-        """
+        """What happens, as it happens; it reconnects within 2 s and never raises for what the line does."""
         ...
 
     def close(self) -> None: ...

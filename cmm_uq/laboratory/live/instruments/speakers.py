@@ -8,11 +8,7 @@ from types import MappingProxyType
 
 
 class Speaker:
-    """An instrument that is asked, or that speaks by itself.
-
-    ``readings``: what it measures now, in the unit that it sends; ``ill``: whether something is wrong with it;
-    ``every_s``: time between messages that it sends by itself; 0: it is asked.
-    """
+    """An instrument that is asked, or that speaks by itself every so often, of readings in the unit that it sends."""
 
     ends = b"\r"
     """What ends a command; CR and LF are both taken for it where it is CR."""

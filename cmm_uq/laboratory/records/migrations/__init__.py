@@ -20,10 +20,7 @@ if TYPE_CHECKING:
 
 
 def migrate(place: str | Path, *, to: str = REVISION) -> tuple[str, str]:
-    """Bring records to a revision.
-
-    Gives revision before, and after.
-    """
+    """Bring records to a revision; revision before, and after."""
     engine = engine_of(place)
     try:
         with told(place), engine.connect() as connection:

@@ -31,13 +31,7 @@ Position = tuple[float, float, float]
 
 
 class Client(Transactions):
-    """A client of one server.
-
-    Parameters
-    ----------
-    port, clock, within_s : see :class:`Transactions`.
-    confirm : asked before each command that moves the machine, with the command; ``None``: nothing ever moves.
-    """
+    """A client of one server; ``confirm`` is asked before each command that moves the machine, else nothing moves."""
 
     def __init__(
         self, port: Port, clock: Clock, *, confirm: Callable[[str], bool] | None = None, within_s: float = ANSWER_WITHIN_S
@@ -48,12 +42,7 @@ class Client(Transactions):
     # --- session and errors ------------------------------------------------------------
 
     def start_session(self, *, take_over: bool = False) -> None:
-        """Begin.
-
-        Parameters
-        ----------
-        take_over : end a session that is active, such as one's own that was cut off.
-        """
+        """Begin; with ``take_over`` after ending one that is active, such as one's own that was cut off."""
         if take_over:
             self.call("EndSession()")
         self.call("StartSession()")
@@ -123,12 +112,7 @@ class Client(Transactions):
         return str(_arguments(answer, "Tool.Name")[0])
 
     def find_tool(self, name: str) -> None:
-        """Look for a tool.
-
-        Raises
-        ------
-        FaultError : 1502, there is none of this name.
-        """
+        """Look for a tool; error 1502 where there is none of this name."""
         self.call(f"FindTool({_quoted(name)})")
 
     def part_temperature(self) -> float | None:
@@ -150,17 +134,7 @@ class Client(Transactions):
     # --- what moves the machine ------------------------------------------------------------
 
     def pt_meas(self, position: Position, normal: Position | None = None) -> HeardLine:
-        """Measure a point: the machine moves.
-
-        Parameters
-        ----------
-        position : nominal, mm.
-        normal : of the surface, outward; without it, the direction from the last position.
-
-        Raises
-        ------
-        CmmUqError : moving was not allowed, or not confirmed.
-        """
+        """Measure a point, mm: the machine moves; without an outward normal in the direction from the last position."""
         where = ", ".join(f"{axis}({number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
         towards = f", IJK({', '.join(map(number_text, normal))})" if normal else ""
         (answer,) = self._moving(f"PtMeas({where}{towards})")

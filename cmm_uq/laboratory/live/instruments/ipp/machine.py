@@ -99,7 +99,6 @@ class IppMachine:
                     yield from self._lost(say("the connection was lost: {why}", why=Verbatim(str(error))))
 
     def _begin(self, *, take_over: bool) -> None:
-        """A session with all that is asked for."""
         client = self.client
         client.start_session(take_over=take_over)
         version, kind = client.version(), client.machine_class()
@@ -113,7 +112,6 @@ class IppMachine:
         self._ask_at = self._alive_at = self._clock.monotonic_ns()
 
     def _step(self) -> Iterator[Event]:
-        """Ask what is due, and tell what came."""
         now = self._clock.monotonic_ns()
         if self._clear.is_set():
             self._clear.clear()

@@ -1,9 +1,7 @@
 """I++ DME (VDMA 8722): its lines, and transactions, one command after the other, each to the end of its answer.
 
-Lines of I++ DME by the syntax of specification 1.4.3, section 6.1.4: responses with tags, and terms such as ``X(12.5)``.
-
-The sign of a response stands at its seventh place: ``&`` accepts a command, ``#`` brings data, ``!`` an error, ``%`` ends the
-transaction.
+Lines are by the syntax of specification 1.4.3, section 6.1.4: terms such as ``X(12.5)``, and responses with tags and a sign:
+``&`` accepts a command, ``#`` brings data, ``!`` an error, ``%`` ends the transaction.
 """
 
 from __future__ import annotations
@@ -58,15 +56,11 @@ class ServerLine:
 
 @dataclass(frozen=True)
 class Fault:
-    """An error of the server (section 8).
+    """An error of the server (section 8)."""
 
-    ``severity``: 0 info, 1 warning, 2 error that the client may repair, 3 error that needs the user, 9 fatal;
-    ``number``: by the table of the specification; ``cause``: method that it comes from.
-    """
-
-    severity: int
-    number: int
-    cause: str
+    severity: int  # 0 info, 1 warning, 2 error that the client may repair, 3 error that needs the user, 9 fatal
+    number: int  # by the table of the specification
+    cause: str  # method that it comes from
     text: str
 
     @property
@@ -189,23 +183,16 @@ class NoAnswerError(Exception):
 
 @dataclass(frozen=True)
 class HeardLine:
-    """A line that came, with its time, ns by both clocks.
-
-    ``response``: what it is; ``None`` where it is none of the protocol.
-    """
+    """A line that came, with its time, ns by both clocks."""
 
     raw: bytes
-    response: ServerLine | None
+    response: ServerLine | None  # what it is; ``None`` where it is none of the protocol
     utc_ns: int
     monotonic_ns: int
 
 
 class Transactions:
-    """Transactions with one server.
-
-    ``unasked``: lines that answer no command: events, reports of daemons, errors by themselves, and what is no
-    response; ``sent``: the last lines that were sent.
-    """
+    """Transactions with one server; ``unasked`` are lines that answer no command, or are no response."""
 
     def __init__(self, port: Port, clock: Clock, within_s: float = ANSWER_WITHIN_S) -> None:
         self._port, self._clock, self.within_s = port, clock, within_s
@@ -216,11 +203,7 @@ class Transactions:
         self.sent: deque[str] = deque(maxlen=_KEPT)
 
     def call(self, command: str, *, event: bool = False, within_s: float | None = None) -> list[HeardLine]:
-        """Send a command and wait for the end of its transaction.
-
-        ``within_s``: time to each line of the answer; the usual one where it is left out.
-        Gives its lines of data.
-        """
+        """Send a command and wait for the end of its transaction; its lines of data."""
         tag = self._next_event() if event else self._next_tag()
         self._port.write(f"{tag} {command}\r\n".encode("ascii"))
         self.sent.append(f"{tag} {command}")
@@ -255,7 +238,6 @@ class Transactions:
         return bool(self.unasked)
 
     def _answer(self, tag: str, command: str, within_s: float) -> HeardLine:
-        """The next line with this tag; others are kept."""
         until = self._clock.monotonic_ns() + round(within_s * SECOND)
         while True:
             while self._came:

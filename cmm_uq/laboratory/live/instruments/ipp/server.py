@@ -1,7 +1,5 @@
 """A simulated CMM behind an I++ DME server on a real socket: one that keeps to specification 1.4.3, or one that does not.
 
-A simulated CMM behind an I++ DME server on a real socket: one that keeps to specification 1.4.3, or one that does not.
-
 It follows the sections of the specification that its methods name. It is for trying clients: it moves nothing.
 """
 
@@ -60,11 +58,7 @@ class MethodError(Exception):
 
 
 class Methods:
-    """A CMM: each method gives its data, if any, and is named ``_do_`` and its name in small letters.
-
-    ``part_c``: temperature of the part, °C; ``None``: no such property; ``version``: that it says; ``None``: it does
-    not know the question.
-    """
+    """A CMM: each method gives its data, if any, and is named ``_do_`` and its name in small letters."""
 
     tools = ("RefTool", "NoTool", "Probe1", "Probe2")
 
@@ -226,27 +220,19 @@ _TICK_S = 0.02
 
 @dataclass
 class IppMischief:
-    """What a server does wrong; all may be changed while it runs.
-
-    ``exchanged``: sends ``%`` where ``&`` belongs and the reverse, as some published programs do; ``halves``: cuts
-    each line of data; ``noise``: bytes before each line.
-    """
+    """What a server does wrong; all may be changed while it runs."""
 
     hangs: bool = False
     no_ack: bool = False
-    exchanged: bool = False
+    exchanged: bool = False  # sends ``%`` where ``&`` belongs and the reverse, as some published programs do
     wrong_tag: bool = False
-    halves: bool = False
-    noise: bytes = b""
+    halves: bool = False  # cuts each line of data
+    noise: bytes = b""  # bytes before each line
     delay_s: float = 0.0
 
 
 class SimulatedIppServer(Methods):
-    """A server, listening until it is closed.
-
-    ``tcp_port``: 0 takes a free one; ``part_c``: temperature of the part, °C; ``None``: no such property;
-    ``version``: that it says; ``None``: it does not know the question.
-    """
+    """A server, listening at a port (0: a free one) until it is closed."""
 
     def __init__(self, tcp_port: int = 0, *, part_c: float | None = 20.13, version: str | None = "1.4.3") -> None:
         super().__init__(part_c=part_c, version=version)
