@@ -15,6 +15,7 @@ import signal
 import sys
 import tempfile
 import time
+from itertools import accumulate
 from pathlib import Path
 
 from cmm_uq.app.commands.laboratory import acquire
@@ -95,7 +96,7 @@ def killed(folder: Path, dice: random.Random) -> list[tuple[int, ...]]:
 def cut(folder: Path, dice: random.Random, kept: int) -> int:
     """Cut the end of the last journal of events behind its ``kept`` first whole lines; how many bytes that took."""
     path = sessions_in(folder / "acquisition")[-1]
-    ends = [line.start for line in lines_in(path)] + [path.stat().st_size]
+    ends = list(accumulate((len(line.text) for line in lines_in(path)), initial=0))
     start = ends[min(kept, len(ends) - 1)]
     place = dice.randint(start, ends[-1])
     os.truncate(path, place)
@@ -117,7 +118,7 @@ def main(folder: Path, kills: int, seed: int) -> None:
         said = killed(job, dice)
         if sessions_in(job / "acquisition"):
             last = sessions_in(job / "acquisition")[-1]
-            torn += any(not line.whole for line in lines_in(last))
+            torn += any(not line.text.endswith(b"\n") for line in lines_in(last))
             if number % 5 == 4 and said:  # else the last journal may be that of an earlier session
                 marks = [i for i, line in enumerate(lines_in(last), 1) if line.record and line.record.kind == "point"
                          and tuple(line.record.data["place"]) in set(said)]  # fmt: skip

@@ -39,14 +39,6 @@ class Predicted:
     factor: float  # of the interval at :data:`LEVEL`
     sigma: float  # standard deviation of a coordinate, µm
 
-    @property
-    def outside(self) -> Floats:
-        """(m,) how far outside its interval each lies, in units of the interval's half; 0 inside."""
-        half = self.factor * self.u
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = np.abs(self.measured - self.expected) / half
-        return np.where(np.isfinite(ratio) & (ratio > 1), ratio, 0.0)
-
 
 def predicted(model: RecordingModel) -> Predicted | None:
     """Every observation as all others predict it; ``None`` where neither the job nor the recording says what the noise is."""
@@ -67,11 +59,8 @@ def predicted(model: RecordingModel) -> Predicted | None:
     seen = free > _DETERMINED
     left = np.where(seen, (observed - fitted[:m]) / np.where(seen, free, 1.0), np.nan)
     scale = linear.noise_scale / MICROMETRE
-    factor = (
-        float(special.stdtrit(degrees, 0.5 + LEVEL / 2))
-        if np.isfinite(degrees)
-        else float(special.ndtri(0.5 + LEVEL / 2))
-    )
+    upper = 0.5 + LEVEL / 2
+    factor = float(special.stdtrit(degrees, upper) if np.isfinite(degrees) else special.ndtri(upper))
     measured = whitened * scale
     u = np.where(seen, sigma / np.sqrt(np.where(seen, free, 1.0)), np.inf) * scale
     return Predicted(measured, measured - left * scale, u, factor, sigma / MICROMETRE)

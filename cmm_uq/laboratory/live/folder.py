@@ -61,12 +61,31 @@ def sessions_in(folder: Path) -> list[Path]:
 
 def begin(folder: Path, said: Mapping[str, Any], moment: Moment, *, skip_damaged: bool = False) -> Journals:
     """Begin a session: take the lock, read what earlier ones left, cut what was never finished, and open new journals."""
-    lock = _taken(folder)
-    try:
-        return _begun(folder, said, moment, skip_damaged, lock)
-    except BaseException:
-        os.close(lock)
-        raise
+    with contextlib.ExitStack() as failed:
+        lock = _taken(folder)
+        failed.callback(os.close, lock)
+        story, following, torn, damaged = _read(folder, skip_damaged)
+        known = {line for session in story.sessions for line in session.said.get("damaged", [])}
+        number = 1 + max((int(path.name[:4]) for path in sessions_in(folder)), default=0)
+        streams = folder / STREAMS.format(number - 1)
+        torn += [(streams, tail)] if (tail := _torn_end(streams)) else []
+        events = RecordingJournal(folder / EVENTS.format(number), first=following)
+        journals = Journals(folder, events, RecordingJournal(folder / STREAMS.format(number)), story, lock)
+        fresh = [line for line in damaged if line not in known]
+        journals.say("session", {"session": number, **said, **({"damaged": fresh} if fresh else {})}, moment)
+        for path, tail in torn:
+            journals.say("cut", {"file": path.name, "bytes": len(tail), "text": tail.decode("latin-1")}, moment)
+        journals.commit()  # before anything is cut, it is kept here
+        for path, tail in torn:
+            try:
+                with path.open("rb+") as file:
+                    file.truncate(path.stat().st_size - len(tail))
+                    file.flush()
+                    os.fsync(file.fileno())
+            except OSError as error:
+                raise _refused(path, error) from None
+        failed.pop_all()
+    return journals
 
 
 def read_story(folder: Path, *, skip_damaged: bool = False) -> Story:
@@ -76,36 +95,17 @@ def read_story(folder: Path, *, skip_damaged: bool = False) -> Story:
 
 def _read(folder: Path, skip_damaged: bool) -> tuple[Story, int, list[tuple[Path, bytes]], list[str]]:
     """The story, the number of the next record, what was torn off which file, and damaged lines."""
-    story, following, torn, damaged = Story(), 1, [], []
+    story, following, torn, damaged = Story(), 1, list[tuple[Path, bytes]](), list[str]()
     for path in sessions_in(folder):
-        found = opened(path, first=following)
+        content = opened(path, first=following)
         if not skip_damaged:
-            refuse_damaged(path, found)
-        damaged += [f"{path.name} line {number}" for number in found.damaged]
-        for record in found.records:
+            refuse_damaged(path, content)
+        damaged += [f"{path.name} line {number}" for number in content.damaged]
+        for record in content.records:
             story.take(record)
-        following = max(following, *(record.number + 1 for record in found.records), 1)
-        if found.torn:
-            torn.append((path, found.torn))
+        following = max(following, *(record.number + 1 for record in content.records), 1)
+        torn += [(path, content.torn)] if content.torn else []
     return story, following, torn, damaged
-
-
-def _begun(folder: Path, said: Mapping[str, Any], moment: Moment, skip_damaged: bool, lock: int) -> Journals:
-    story, following, torn, damaged = _read(folder, skip_damaged)
-    known = {line for session in story.sessions for line in session.said.get("damaged", [])}
-    number = 1 + max((int(path.name[:4]) for path in sessions_in(folder)), default=0)
-    streams = folder / STREAMS.format(number - 1)
-    torn += [(streams, tail)] if (tail := _torn_end(streams)) else []
-    events = RecordingJournal(folder / EVENTS.format(number), first=following)
-    journals = Journals(folder, events, RecordingJournal(folder / STREAMS.format(number)), story, lock)
-    fresh = [line for line in damaged if line not in known]
-    journals.say("session", {"session": number, **said, **({"damaged": fresh} if fresh else {})}, moment)
-    for path, tail in torn:
-        journals.say("cut", {"file": path.name, "bytes": len(tail), "text": tail.decode("latin-1")}, moment)
-    journals.commit()  # before anything is cut, it is kept here
-    for path, tail in torn:
-        _cut(path, len(tail))
-    return journals
 
 
 def _torn_end(path: Path) -> bytes:
@@ -125,16 +125,6 @@ def _torn_end(path: Path) -> bytes:
         return b""
 
 
-def _cut(path: Path, count: int) -> None:
-    try:
-        with path.open("rb+") as file:
-            file.truncate(path.stat().st_size - count)
-            file.flush()
-            os.fsync(file.fileno())
-    except OSError as error:
-        raise OutputError(f"cannot be written: {error.strerror}", where=str(path), fix="Mend its permissions") from None
-
-
 def _taken(folder: Path) -> int:
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -142,10 +132,12 @@ def _taken(folder: Path) -> int:
             pass
         lock = locked(folder / LOCK, create=False)
     except OSError as error:
-        raise OutputError(
-            f"cannot be written: {error.strerror}", where=str(folder), fix="Mend its permissions"
-        ) from None
+        raise _refused(folder, error) from None
     if lock is None:
         raise CmmUqError("this job is being recorded by another program", where=str(folder),
                          fix="End it there; a program that was killed holds no lock")  # fmt: skip
     return lock
+
+
+def _refused(path: Path, error: OSError) -> OutputError:
+    return OutputError(f"cannot be written: {error.strerror}", where=str(path), fix="Mend its permissions")

@@ -70,35 +70,28 @@ class Stream:
 
     def at(self, moment_ns: int, now_ns: int | None) -> Joined | Text | None:
         """Value at a moment, or why there is none; ``None`` while a reading may come (never where ``now_ns`` is ``None``)."""
-        after = bisect_left(self._times, moment_ns)
+        after, source = bisect_left(self._times, moment_ns), Verbatim(self.source)
         if after == len(self._times):
             if now_ns is None:
-                return say("the session ended before {source} gave another reading", source=Verbatim(self.source))
-            waited = (now_ns - moment_ns) * NS - self.latency_s
-            return None if waited <= self.max_gap_s else self._silent(after)
+                return say("the session ended before {source} gave another reading", source=source)
+            if (now_ns - moment_ns) * NS - self.latency_s <= self.max_gap_s:
+                return None
+            if after == 0:
+                return say("{source} gave nothing", source=source)
+            return say("{source} gave nothing for {gap:g} s after the point", source=source, gap=self.max_gap_s)
         if self._times[after] == moment_ns:
             return Joined(self._values[after], self._u(after, moment_ns))
         if after == 0:
-            return say("{source} gave nothing before the point", source=Verbatim(self.source))
+            return say("{source} gave nothing before the point", source=source)
         gap = (self._times[after] - self._times[after - 1]) * NS
         if gap > self.max_gap_s:
-            return self._too_long(gap)
+            return say(
+                "{source} gave nothing for {gap:.3g} s about the point, and {most:g} s are the most that is interpolated over",
+                source=source, gap=gap, most=self.max_gap_s,
+            )  # fmt: skip
         part = (moment_ns - self._times[after - 1]) / (self._times[after] - self._times[after - 1])
         before = self._values[after - 1]
         return Joined(before + part * (self._values[after] - before), self._u(after, moment_ns))
-
-    def _silent(self, after: int) -> Text:
-        if after == 0:
-            return say("{source} gave nothing", source=Verbatim(self.source))
-        return say(
-            "{source} gave nothing for {gap:g} s after the point", source=Verbatim(self.source), gap=self.max_gap_s
-        )
-
-    def _too_long(self, gap: float) -> Text:
-        return say(
-            "{source} gave nothing for {gap:.3g} s about the point, and {most:g} s are the most that is interpolated over",
-            source=Verbatim(self.source), gap=gap, most=self.max_gap_s,
-        )  # fmt: skip
 
     def _u(self, after: int, moment_ns: int) -> float:
         times = [(self._times[i] - moment_ns) * NS for i in range(max(0, after - _BEFORE), after + 1)]

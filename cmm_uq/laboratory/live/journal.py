@@ -14,7 +14,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 
@@ -58,24 +58,19 @@ def record_of(line: bytes) -> Record | None:
     return Record(number, kind, Moment(utc_ns, monotonic_ns), data)
 
 
-@dataclass(frozen=True)
-class JournalLine:
+class JournalLine(NamedTuple):
     """A line of a file, read."""
 
     number: int  # in the file, from 1
-    start: int
+    text: bytes  # only the last may lack its line feed
     record: Record | None  # ``None`` where it is damaged, or was never finished
-    whole: bool  # whether it ends with a line feed; only the last may not
 
 
 def lines_in(path: Path) -> Iterator[JournalLine]:
     """Every line of a journal, one at a time."""
-    start = 0
     with path.open("rb") as file:
         for number, line in enumerate(file, 1):
-            whole = line.endswith(b"\n")
-            yield JournalLine(number, start, record_of(line[:-1]) if whole else None, whole)
-            start += len(line)
+            yield JournalLine(number, line, record_of(line[:-1]) if line.endswith(b"\n") else None)
 
 
 @dataclass(frozen=True)
@@ -89,20 +84,17 @@ class JournalContent:
 
 def opened(path: Path, *, first: int | None = None) -> JournalContent:
     """Read a journal; nothing of it is changed."""
-    records: list[Record] = []
-    damaged, torn_at, expected = [], None, first
-    for line in lines_in(path):
-        if not line.whole:
-            torn_at = line.start
-        elif line.record is None:
-            damaged.append(line.number)
-            expected = None if expected is None else expected + 1
-        else:
-            if expected is not None and line.record.number != expected:
-                damaged.append(line.number)
-            records.append(line.record)
-            expected = line.record.number + 1
-    torn = b"" if torn_at is None else path.read_bytes()[torn_at:]
+    records, damaged, torn, expected = list[Record](), list[int](), b"", first
+    for number, text, record in lines_in(path):
+        if not text.endswith(b"\n"):
+            torn = text
+            continue
+        if record is None or (expected is not None and record.number != expected):
+            damaged.append(number)
+        if record is not None:
+            records.append(record)
+            expected = record.number
+        expected = None if expected is None else expected + 1
     return JournalContent(tuple(records), torn, tuple(damaged))
 
 
@@ -125,10 +117,8 @@ class RecordingJournal:
     """A journal that is written, from record ``first`` on, in a file that does not exist yet."""
 
     def __init__(self, path: Path, *, first: int = 1) -> None:
-        self.path, self.next = path, first
-        self.written = 0
+        self.path, self.next, self.written, self._bytes = path, first, 0, 0
         self._waiting: list[bytes] = []
-        self._bytes = 0
         try:
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
             _keep_name(path.parent)
@@ -149,18 +139,15 @@ class RecordingJournal:
         self._bytes += len(line)
         return record
 
-    @property
-    def waiting(self) -> int:
-        """Records that are not on the disk yet."""
-        return len(self._waiting)
-
     def commit(self) -> None:
         """Put everything that waits on the disk."""
         if not self._waiting:
             return
         text = b"".join(self._waiting)
         try:
-            _write(self._file, text)
+            left = memoryview(text)
+            while left:
+                left = left[os.write(self._file, left) :]
             os.fsync(self._file)
         except OSError as error:
             with contextlib.suppress(OSError):
@@ -168,7 +155,7 @@ class RecordingJournal:
             if error.errno not in _NO_ROOM:
                 raise _refused("cannot be written", error, self.path) from None
             raise NoRoomError(
-                f"there is no room on the disk ({error.strerror}): {self.waiting} records wait in memory, not accepted",
+                f"there is no room on the disk ({error.strerror}): {len(self._waiting)} records wait in memory, not accepted",
                 where=str(self.path), fix="Make room; they are written as soon as there is some",
             ) from None  # fmt: skip
         self.written += len(text)
@@ -183,12 +170,6 @@ class RecordingJournal:
 
 def _refused(what: str, error: OSError, path: Path) -> OutputError:
     return OutputError(f"{what}: {error.strerror}", where=str(path), fix="Make room, or mend the folder's permissions")
-
-
-def _write(file: int, text: bytes) -> None:
-    left = memoryview(text)
-    while left:
-        left = left[os.write(file, left) :]
 
 
 def _keep_name(folder: Path) -> None:

@@ -52,19 +52,34 @@ class Judge:
 
     def point(self, step: PlannedPoint, story: Story, lead: Lead) -> PointJudgement:
         """Of a point that was just accepted."""
-        place, taken = step.place, story.by_place
-        own = taken[place]
-        points = self.points([Row(own, step)])
-        warnings = [finding.why for finding in impossible_values(points)]
-        if (copied := _copied(own, story)) is not None:
-            warnings.append(say(
-                "its coordinates are those of measurement {m}, point {p}, repeat {r} to the last digit: a copied reading, or "
-                "the machine did not measure", m=copied[0], p=copied[1], r=copied[2],
-            ))  # fmt: skip
-        steps = lead.steps((place[0], place[2]))
-        if (other := _exchanged(step, steps, taken)) is not None:
-            warnings.append(say("points {own} and {other} seem exchanged against the plan", own=place[1], other=other))
-        return PointJudgement(self._live(step, steps, story), tuple(warnings))
+        taken = story.by_place
+        own = taken[step.place]
+        warnings = [finding.why for finding in impossible_values(self.points([Row(own, step)]))]
+        figures = [own.columns.get(name) for name in COORDINATES]
+        for other in story.points.values():
+            if other.place != own.place and [other.columns.get(name) for name in COORDINATES] == figures:
+                m, p, r = other.place
+                warnings.append(say(
+                    "its coordinates are those of measurement {m}, point {p}, repeat {r} to the last digit: a copied reading, "
+                    "or the machine did not measure", m=m, p=p, r=r,
+                ))  # fmt: skip
+                break
+        steps = lead.steps(step.run)
+        if (exchanged := _exchanged(step, steps, taken)) is not None:
+            warnings.append(
+                say("points {own} and {other} seem exchanged against the plan", own=step.place[1], other=exchanged)
+            )
+        first = taken.get(steps[0].place)
+        shown: tuple[Text, ...] = ()
+        if first is not None and first is not own:
+            length = float(np.linalg.norm(_xyz(own) - _xyz(first)))
+            nominal = float(np.linalg.norm(step.xyz - steps[0].xyz))
+            shown = (say(
+                "{length} mm from point {first}; the plan has {nominal} mm: {off} µm",
+                length=number(length, ".4f"), first=steps[0].place[1], nominal=number(nominal, ".4f"),
+                off=signed((length - nominal) / MICROMETRE, "+.1f"),
+            ),)  # fmt: skip
+        return PointJudgement(shown, tuple(warnings))
 
     def run(self, run: Run, rows: Sequence[Row], *, repeats_most: int) -> PointJudgement:
         """Of a set-up that is complete, with all that are."""
@@ -85,15 +100,16 @@ class Judge:
 
     def points(self, rows: Sequence[Row]) -> Points:
         """Rows as points, with the columns that all of them have."""
-        columns: dict[str, list[float]] = {name: [] for name in _columns(rows)}
-        for row in rows:
-            own = {**row.step.columns, **row.point.columns, **{k: v.value for k, v in row.point.joined.items()}}
-            for name, values in columns.items():
-                values.append(row.point.time_s if name == "time_s" else own[name])
-        places = np.array([row.point.place for row in rows], dtype=np.int64)
+        known = [
+            {**row.step.columns, **row.point.columns, **{name: one.value for name, one in row.point.joined.items()},
+             **({"time_s": row.point.time_s} if row.point.timed else {})}
+            for row in rows
+        ]  # fmt: skip
+        names = sorted(set(known[0]).intersection(*known) - {*COORDINATES})
+        measurement, point, repeat = np.array([row.point.place for row in rows], dtype=np.int64).T.copy()
         return Points(
-            np.array([_xyz(row.point) for row in rows]), places[:, 0], places[:, 1], places[:, 2], self.machine,
-            {name: np.array(values, dtype=np.float64) for name, values in columns.items()},
+            np.array([_xyz(row.point) for row in rows]), measurement, point, repeat, self.machine,
+            {name: np.array([values[name] for values in known], dtype=np.float64) for name in names},
         )  # fmt: skip
 
     def _expected(self, run: Run, points: Points, repeats_most: int) -> tuple[tuple[Text, ...], Text | None]:
@@ -103,37 +119,18 @@ class Judge:
         artefact = self.observe(self.facts, points, where=self.where)
         acting = tuple(one for one in self.effects if set(one.columns) <= set(points.columns) and not one.shape)
         model = RecordingModel(artefact, acting, self.sigma)
+        prediction = predicted(model)
+        if prediction is None:
+            unknown = say(
+                "what to expect is said once repeats show the scatter, or with u_coordinate_um in [recording]"
+            )
+            return (unknown,), None
         own = (artefact.measurement == run[0]) & (artefact.repeat == run[1])
-        found = predicted(model)
-        if found is None:
-            return (
-                say("what to expect is said once repeats show the scatter, or with u_coordinate_um in [recording]"),
-            ), None
-        shown, odd = _against(found, np.flatnonzero(own))
-        again = None
-        if run[1] < repeats_most:
-            spread = scatter(model, run[0])
-            again = odd if spread is None else spread.words
-        return shown, again
-
-    def _live(self, step: PlannedPoint, steps: Sequence[PlannedPoint], story: Story) -> tuple[Text, ...]:
-        first = story.by_place.get(steps[0].place)
-        own = story.by_place[step.place]
-        if first is None or first is own:
-            return ()
-        length = float(np.linalg.norm(_xyz(own) - _xyz(first)))
-        nominal = float(np.linalg.norm(step.xyz - steps[0].xyz))
-        return (say(
-            "{length} mm from point {first}; the plan has {nominal} mm: {off} µm",
-            length=number(length, ".4f"), first=steps[0].place[1], nominal=number(nominal, ".4f"),
-            off=signed((length - nominal) / MICROMETRE, "+.1f"),
-        ),)  # fmt: skip
-
-
-def _columns(rows: Sequence[Row]) -> list[str]:
-    every = [{*row.step.columns, *row.point.columns, *row.point.joined} - {*COORDINATES} for row in rows]
-    timed = {"time_s"} if all(row.point.timed for row in rows) else set()
-    return sorted(set.intersection(*every) | timed)
+        shown, odd = _against(prediction, np.flatnonzero(own))
+        if run[1] >= repeats_most:
+            return shown, None
+        spread = scatter(model, run[0])
+        return shown, odd if spread is None else spread.words
 
 
 def _against(found: Predicted, own: Ints) -> tuple[tuple[Text, ...], Text | None]:
@@ -157,19 +154,6 @@ def _against(found: Predicted, own: Ints) -> tuple[tuple[Text, ...], Text | None
         "it lies {off} µm from what all else says, and chance does that once in {times:.0f} set-ups: measure it once more",
         off=signed(value - expected, "+.1f"), times=min(1 / max(chance, 1e-6), 1e6),
     )  # fmt: skip
-
-
-def _copied(own: Point, story: Story) -> Place | None:
-    """The place of another point with the same figures."""
-    figures = tuple(own.columns.get(name) for name in COORDINATES)
-    for other in story.points.values():
-        if (
-            other is not own
-            and other.place != own.place
-            and tuple(other.columns.get(n) for n in COORDINATES) == figures
-        ):
-            return other.place
-    return None
 
 
 def _exchanged(step: PlannedPoint, steps: Sequence[PlannedPoint], taken: Mapping[Place, Point]) -> int | None:

@@ -6,6 +6,7 @@ at two looks :data:`STILL_S` apart. What was there before the session is read to
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 from collections.abc import Callable, Sequence
@@ -23,6 +24,11 @@ from cmm_uq.laboratory.live.screen import SessionView
 
 STILL_S = 1.0  # for which a file must not change
 _UNFINISHED = (".tmp", ".part", ".crdownload", ".swp", "~")
+COMMIT_S = 0.04
+"""Between two commits, and two pictures: what came is on the disk after 100 ms at the latest, and seen after 50."""
+
+_LOOK_S = 0.5
+_AT_ONCE = 2000  # events that are taken before the disk and the screen have their turn again
 
 
 @dataclass(frozen=True)
@@ -38,30 +44,29 @@ class WatchedFolder:
     def __init__(self, folder: Path, clock: Clock) -> None:
         if not folder.is_dir():
             raise CmmUqError("is no folder", where=str(folder), fix="Make it, or mend folder in [acquire] of job.toml")
-        self.folder, self._clock = folder, clock
-        self._seen: dict[str, tuple[int, int, int]] = {}
+        self.folder, self._clock, self._readable = folder, clock, True
+        self._seen: dict[str, tuple[int, int, int]] = {}  # size, time of change, and since when both are so
         self._done: dict[str, tuple[int, int]] = {}
-        self._readable = True
         self.trouble: list[Text] = []
 
     def look(self) -> list[DroppedFile]:
         """Files that stand still since the last looks, oldest first."""
-        now, found = self._clock.monotonic_ns(), list[DroppedFile]()
+        now, still = self._clock.monotonic_ns(), list[DroppedFile]()
         for path in self._files():
             try:
-                state = path.stat()
+                status = path.stat()
             except OSError:
                 continue
-            size, changed = state.st_size, state.st_mtime_ns
-            if self._done.get(path.name) == (size, changed):
+            state = (status.st_size, status.st_mtime_ns)
+            if self._done.get(path.name) == state:
                 continue
-            before = self._seen.get(path.name)
-            if before is None or before[:2] != (size, changed):
-                self._seen[path.name] = (size, changed, now)
-            elif now - before[2] >= STILL_S * 1e9:
-                self._done[path.name] = (size, changed)
-                found += self._content(path, size, changed)
-        return sorted(found, key=lambda one: (one.utc_ns, one.path.name))
+            *before, since = self._seen.get(path.name, (-1, -1, now))
+            if tuple(before) != state:
+                self._seen[path.name] = (*state, now)
+            elif now - since >= STILL_S * 1e9:
+                self._done[path.name] = state
+                still += self._content(path, *state)
+        return sorted(still, key=lambda file: (file.utc_ns, file.path.name))
 
     def again(self, path: Path) -> None:
         """A file could not be kept: read it again."""
@@ -69,18 +74,18 @@ class WatchedFolder:
 
     def _files(self) -> list[Path]:
         try:
-            found = [
+            paths = [
                 path for path in self.folder.iterdir()
                 if path.is_file() and not path.name.startswith(".") and not path.name.endswith(_UNFINISHED)
             ]  # fmt: skip
-            self._readable = True
-            return found
         except OSError as error:
             if self._readable:
                 self.trouble.append(say("the folder {folder} cannot be read: {why}", folder=Verbatim(str(self.folder)),
                                         why=Verbatim(str(error.strerror))))  # fmt: skip
-            self._readable = False
-            return []
+            paths, self._readable = [], False
+        else:
+            self._readable = True
+        return paths
 
     def _content(self, path: Path, size: int, changed: int) -> list[DroppedFile]:
         try:
@@ -89,16 +94,9 @@ class WatchedFolder:
             self.trouble.append(Verbatim(str(error)))
             return []
         if len(content) != size:  # it went on growing between the look and the reading
-            del self._done[path.name]
+            self.again(path)
             return []
         return [DroppedFile(path, content, changed)]
-
-
-COMMIT_S = 0.04
-"""Between two commits, and two pictures: what came is on the disk after 100 ms at the latest, and seen after 50."""
-
-_LOOK_S = 0.5
-_AT_ONCE = 2000  # events that are taken before the disk and the screen have their turn again
 
 
 class Screen(Protocol):
@@ -153,79 +151,47 @@ def run(
     conductor: Conductor, listening: Listening, items: queue.Queue[Item], screen: Screen, clock: Clock, *,
     watched: WatchedFolder | None = None, dropped: Callable[[DroppedFile], None] | None = None,
 ) -> None:  # fmt: skip
-    """Run a session to its end."""
-    turns = _Turns(conductor, screen, clock, watched, dropped)
+    """Run a session to its end; between events each thing is done in its own time."""
+    kept = looked = drawn = clock.monotonic_ns()
     listening.start()
     try:
         while not conductor.ended:
-            _taken(conductor, items)
-            turns.turn(listening.sources)
+            _take(conductor, items)
+            now = clock.monotonic_ns()
+            if watched is not None and dropped is not None and now - looked >= _LOOK_S * 1e9:
+                looked = now
+                for file in watched.look():
+                    dropped(file)
+                while watched.trouble:
+                    conductor.tell(watched.trouble.pop(0))
+            if now - kept >= COMMIT_S * 1e9:
+                kept = now
+                for source in listening.sources:
+                    conductor.recorder.identified(source.identity())
+                conductor.tick()
+            if conductor.said or now - drawn >= COMMIT_S * 1e9:
+                drawn = now
+                _show(conductor, screen)
     finally:
         listening.stop()
     while not items.empty():
-        _taken(conductor, items)
+        _take(conductor, items)
     conductor.finish()
-    turns.show()
+    _show(conductor, screen)
 
 
-class _Turns:
-    """What is done between events, each in its own time."""
-
-    def __init__(
-        self, conductor: Conductor, screen: Screen, clock: Clock, watched: WatchedFolder | None,
-        dropped: Callable[[DroppedFile], None] | None,
-    ) -> None:  # fmt: skip
-        self._conductor, self._screen, self._clock, self._watched, self._dropped = (
-            conductor,
-            screen,
-            clock,
-            watched,
-            dropped,
-        )
-        self._kept = self._looked = self._drawn = clock.monotonic_ns()
-
-    def turn(self, sources: Sequence[LiveSource]) -> None:
-        now, wait = self._clock.monotonic_ns(), COMMIT_S * 1e9
-        if now - self._looked >= _LOOK_S * 1e9:
-            self._looked = now
-            self._look()
-        if now - self._kept >= wait:
-            self._kept = now
-            for source in sources:
-                self._conductor.recorder.identified(source.identity())
-            self._conductor.tick()
-        if self._conductor.said or now - self._drawn >= wait:
-            self._drawn = now
-            self.show()
-
-    def show(self) -> None:
-        """Say what happened, and how it stands."""
-        while self._conductor.said:
-            self._screen.tell(self._conductor.said.popleft())
-        self._screen.show(self._conductor.view())
-
-    def _look(self) -> None:
-        if self._watched is None or self._dropped is None:
-            return
-        for file in self._watched.look():
-            self._dropped(file)
-        while self._watched.trouble:
-            self._conductor.tell(self._watched.trouble.pop(0))
+def _show(conductor: Conductor, screen: Screen) -> None:
+    while conductor.said:
+        screen.tell(conductor.said.popleft())
+    screen.show(conductor.view())
 
 
-def _taken(conductor: Conductor, items: queue.Queue[Item]) -> None:
+def _take(conductor: Conductor, items: queue.Queue[Item]) -> None:
     """Everything that is there by now, or the first that comes."""
-    try:
-        item: Item | None = items.get(timeout=COMMIT_S)
-        for _ in range(_AT_ONCE):
-            if item is None:
-                break
-            if not isinstance(item, OperatorLine):
-                conductor.event(item)
-            elif item.text is None:
-                conductor.line("quit")
+    with contextlib.suppress(queue.Empty):
+        for number in range(_AT_ONCE):
+            item = items.get_nowait() if number else items.get(timeout=COMMIT_S)
+            if isinstance(item, OperatorLine):
+                conductor.line("quit" if item.text is None else item.text)
             else:
-                conductor.line(item.text)
-            item = None if items.empty() else items.get_nowait()
-    except queue.Empty:
-        return
+                conductor.event(item)

@@ -97,8 +97,7 @@ def coming(step: PlannedPoint | None, lead: Lead) -> Text:
 
 WIDTH, HEIGHT = 30, 9  # characters of each of the two views, without its frame
 _VIEWS = ((0, 1, "from above: x right, y up"), (0, 2, "from the front: x right, z up"))
-_MOST = 36  # points that are drawn with their number; 1 to 9, then letters
-_MARKS = "123456789abcdefghijklmnopqrstuvwxyz*"
+_MARKS = "123456789abcdefghijklmnopqrstuvwxyz*"  # of points by their number, the last of all further ones
 
 
 def picture(machine: Machine, steps: Sequence[PlannedPoint], ahead: PlannedPoint | None) -> tuple[str, ...]:
@@ -106,38 +105,28 @@ def picture(machine: Machine, steps: Sequence[PlannedPoint], ahead: PlannedPoint
     if not steps:
         return ()
     readings = np.array([step.xyz for step in steps]) + machine.origin_mm
-    drawn = [_view(machine, readings, steps, ahead, view) for view in _VIEWS]
-    return tuple(f"{left}  {right}" for left, right in zip(*drawn, strict=True))
-
-
-def _view(
-    machine: Machine,
-    readings: Floats,
-    steps: Sequence[PlannedPoint],
-    ahead: PlannedPoint | None,
-    view: tuple[int, int, str],
-) -> list[str]:
-    across, up, title = view
-    cells = [[" "] * WIDTH for _ in range(HEIGHT)]
-    low, high = _frame(machine, readings)
-    part = (readings - low) / np.where(high > low, high - low, 1.0)
-    columns = np.clip(np.round(part[:, across] * (WIDTH - 1)), 0, WIDTH - 1).astype(int)
-    rows = np.clip(np.round((1 - part[:, up]) * (HEIGHT - 1)), 0, HEIGHT - 1).astype(int)
-    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
-    for t in np.linspace(0, 1, 4 * WIDTH):
-        at = part[0] + t * (part[far] - part[0])
-        row, column = round((1 - float(at[up])) * (HEIGHT - 1)), round(float(at[across]) * (WIDTH - 1))
-        if 0 <= row < HEIGHT and 0 <= column < WIDTH:
-            cells[row][column] = "·"
-    for step, row, column in zip(steps, rows, columns, strict=True):
-        cells[row][column] = _MARKS[min(step.place[1] - 1, _MOST - 1)] if step.place[1] > 0 else "*"
-    for step, row, column in zip(steps, rows, columns, strict=True):
-        if ahead is not None and step.place == ahead.place:
-            cells[row][column] = "X"
-    return [title.ljust(WIDTH + 2), f"┌{'─' * WIDTH}┐", *(f"│{''.join(row)}│" for row in cells), f"└{'─' * WIDTH}┘"]
-
-
-def _frame(machine: Machine, readings: Floats) -> tuple[Floats, Floats]:
     low, high = machine.travel_mm.T
     known = ~(np.isnan(low) | np.isnan(high))
-    return np.where(known, low, readings.min(axis=0) - 1.0), np.where(known, high, readings.max(axis=0) + 1.0)
+    low, high = np.where(known, low, readings.min(axis=0) - 1.0), np.where(known, high, readings.max(axis=0) + 1.0)
+    part = (readings - low) / np.where(high > low, high - low, 1.0)
+    far = int(np.argmax(np.linalg.norm(readings - readings[0], axis=1)))
+    line = part[0] + np.linspace(0, 1, 4 * WIDTH)[:, None] * (part[far] - part[0])
+    marks = [_MARKS[min(step.place[1], len(_MARKS)) - 1] if step.place[1] > 0 else "*" for step in steps]
+    if ahead is not None:
+        marks = ["X" if step.place == ahead.place else mark for step, mark in zip(steps, marks, strict=True)]
+    views = [_view(part[:, [across, up]], line[:, [across, up]], marks, title) for across, up, title in _VIEWS]
+    return tuple(f"{left}  {right}" for left, right in zip(*views, strict=True))
+
+
+def _view(points: Floats, line: Floats, marks: Sequence[str], title: str) -> list[str]:
+    """Points and a line through them, (n, 2) parts of the frame across and up."""
+    cells = [[" "] * WIDTH for _ in range(HEIGHT)]
+    for across, up in line.tolist():
+        row, column = round((1 - up) * (HEIGHT - 1)), round(across * (WIDTH - 1))
+        if 0 <= row < HEIGHT and 0 <= column < WIDTH:
+            cells[row][column] = "·"
+    columns = np.clip(np.round(points[:, 0] * (WIDTH - 1)), 0, WIDTH - 1).astype(int)
+    rows = np.clip(np.round((1 - points[:, 1]) * (HEIGHT - 1)), 0, HEIGHT - 1).astype(int)
+    for i in sorted(range(len(marks)), key=lambda i: marks[i] == "X"):  # nothing hides what comes next
+        cells[rows[i]][columns[i]] = marks[i]
+    return [title.ljust(WIDTH + 2), f"┌{'─' * WIDTH}┐", *(f"│{''.join(row)}│" for row in cells), f"└{'─' * WIDTH}┘"]

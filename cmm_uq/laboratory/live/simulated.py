@@ -5,6 +5,7 @@ Nothing of it is ever taken for a measurement: a session with them runs only in 
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import threading
 from collections.abc import Iterator, Sequence
@@ -48,19 +49,14 @@ class SimulatedThermometer:
             wait = number / self._rate - (self._clock.monotonic_ns() - begin) * 1e-9
             if wait > 0:
                 self._clock.sleep(wait)
-            yield self._reading(number)
+            wave = 0.1 * np.sin(2 * np.pi * number / self._rate / 1800)
+            off = wave + 1e-3 * self._random.standard_normal(len(self._quantities))
+            values = {name: round(_USUAL.get(name, 20.0) + float(e), 3)
+                      for name, e in zip(self._quantities, off, strict=True)}  # fmt: skip
+            raw = " ".join(f"{value:.3f}" for value in values.values()).encode() + b"\r\n"
+            yield Reading(self.name, number, self._clock.utc_ns(), self._clock.monotonic_ns(), raw, values)
 
     def close(self) -> None: ...
-
-    def _reading(self, number: int) -> Reading:
-        wave = 0.1 * np.sin(2 * np.pi * number / self._rate / 1800)
-        noise = 1e-3 * self._random.standard_normal(len(self._quantities))
-        values = {
-            name: round(_USUAL.get(name, 20.0) + float(wave + e), 3)
-            for name, e in zip(self._quantities, noise, strict=True)
-        }
-        raw = " ".join(f"{value:.3f}" for value in values.values()).encode() + b"\r\n"
-        return Reading(self.name, number, self._clock.utc_ns(), self._clock.monotonic_ns(), raw, values)
 
 
 class SimulatedMachine:
@@ -79,11 +75,8 @@ class SimulatedMachine:
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
         while not stop.is_set():
-            try:
-                step = self._asked.get(timeout=0.1)
-            except queue.Empty:
-                continue
-            yield self._probed(step)
+            with contextlib.suppress(queue.Empty):
+                yield self._probed(self._asked.get(timeout=0.1))
 
     def close(self) -> None: ...
 
@@ -104,15 +97,11 @@ def simulated(
     declared: Sequence[DeclaredSource], *, clock: Clock, seed: int, noise_mm: float = NOISE_MM
 ) -> tuple[list[SimulatedThermometer | SimulatedMachine], SimulatedMachine]:
     """In place of what a job declares, and the machine among them; a thermometer and a machine where it declares nothing."""
-    found: list[SimulatedThermometer | SimulatedMachine] = []
-    taken = {source.name for source in declared}
-    machine = SimulatedMachine(
-        "machine" if "machine" not in taken else "simulated-machine", clock=clock, seed=seed, noise_mm=noise_mm
-    )
-    for source in declared:
-        streams = [name for name in source.values if name not in COORDINATES]
-        if streams:
-            found.append(SimulatedThermometer(source.name, streams, clock=clock, seed=seed))
-    if not found:
-        found.append(SimulatedThermometer("thermometer", ["temp_artefact_c", "temp_air_c"], clock=clock, seed=seed))
-    return [*found, machine], machine
+    streams = {one.name: [name for name in one.values if name not in COORDINATES] for one in declared}
+    name = "simulated-machine" if "machine" in streams else "machine"
+    machine = SimulatedMachine(name, clock=clock, seed=seed, noise_mm=noise_mm)
+    if not any(streams.values()):
+        streams = {"thermometer": ["temp_artefact_c", "temp_air_c"]}
+    thermometers = [SimulatedThermometer(name, columns, clock=clock, seed=seed)
+                    for name, columns in streams.items() if columns]  # fmt: skip
+    return [*thermometers, machine], machine

@@ -6,7 +6,6 @@ It is within the limit with twice its standard uncertainty, by the straight line
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -67,6 +66,11 @@ class Soak:
         return abs(change[0]) + 2 * change[1] <= self.limit_k_per_h
 
     @property
+    def unsettled(self) -> bool:
+        """Whether there is a criterion that it does not keep, or of which that cannot be said yet."""
+        return self.limit_k_per_h is not None and self.settled is not True
+
+    @property
     def words(self) -> Text:
         """Temperature, change and what is asked of it."""
         if self._latest is None:
@@ -79,16 +83,5 @@ class Soak:
         told = say("{now}, {slope} K/h over {over:g} min", now=now, slope=signed(change[0], "+.2f"), over=self.over_min)
         if self.limit_k_per_h is None:
             return told
-        if self.settled:
-            return say("{told}: within {limit:g} K/h", told=told, limit=self.limit_k_per_h)
-        return say("{told}: NOT within {limit:g} K/h", told=told, limit=self.limit_k_per_h)
-
-
-def is_temperature(column: str) -> bool:
-    """Whether a column of the recording is a temperature, by its name."""
-    return column.endswith("_c")
-
-
-def unsettled(soaks: Mapping[str, Soak]) -> list[str]:
-    """Columns that do not keep the criterion, or of which that cannot be said yet."""
-    return [name for name, soak in soaks.items() if soak.limit_k_per_h is not None and soak.settled is not True]
+        within = say("{told}: within {limit:g} K/h", told=told, limit=self.limit_k_per_h)
+        return within if self.settled else say("{told}: NOT within {limit:g} K/h", told=told, limit=self.limit_k_per_h)

@@ -46,23 +46,16 @@ class Session:
 
 @dataclass
 class Story:
-    """All sessions of a job, record by record.
-
-    ``points``: that count, by the number of their record, in the order in which they were accepted; ``identities``:
-    what is known of each instrument, by its name; ``gaps``: when instruments were silent: source, s since the start of
-    the job, for how long (``None``: to the end), why; ``clocks``: jumps of the wall clock: s since the start of the
-    job, by how much, s; ``skipped, asked``: set-ups that the operator left out, and repeats more that were asked for;
-    ``notes``: of the operator, and everything else that was said, each with its time.
-    """
+    """All sessions of a job, record by record; times are in s since its start."""
 
     sessions: list[Session] = field(default_factory=list)
-    points: dict[int, Point] = field(default_factory=dict)
+    points: dict[int, Point] = field(default_factory=dict)  # that count, by their records, as they were accepted
     undone: list[tuple[Point, str]] = field(default_factory=list)  # points that were taken back, each with the reason
     identities: dict[str, Mapping[str, Any]] = field(default_factory=dict)
-    gaps: list[tuple[str, float, float | None, str]] = field(default_factory=list)
-    clocks: list[tuple[float, float]] = field(default_factory=list)
-    skipped: list[tuple[int, int]] = field(default_factory=list)
-    asked: list[tuple[int, int]] = field(default_factory=list)
+    gaps: list[tuple[str, float, float | None, str]] = field(default_factory=list)  # instrument, since, how long, why
+    clocks: list[tuple[float, float]] = field(default_factory=list)  # jumps of the wall clock: when, by how much, s
+    skipped: list[tuple[int, int]] = field(default_factory=list)  # set-ups that the operator left out
+    asked: list[tuple[int, int]] = field(default_factory=list)  # repeats more that were asked for
     notes: list[tuple[float, str]] = field(default_factory=list)
     files: dict[str, str] = field(default_factory=dict)  # that were read, by SHA-256, with their names
     damaged: list[str] = field(default_factory=list)  # lines of journals that are not in it
@@ -80,68 +73,57 @@ class Story:
 
     def take(self, record: Record) -> None:
         """Go on with a record; kinds that say nothing here are passed over."""
+        data, time_s = record.data, 0.0
         if self.sessions:
-            self.session.end_s = max(self.session.end_s, self.session.time_s(record.moment))
-        told = getattr(self, f"_{record.kind}", None)
-        if told is not None:
-            told(record)
-            self.changes += 1
+            time_s = self.session.time_s(record.moment)
+            self.session.end_s = max(self.session.end_s, time_s)
+        match record.kind:
+            case "session" | "point" | "joined" | "undone" | "returned":
+                getattr(self, f"_{record.kind}")(record, data)
+            case "identity":
+                self.identities[data["name"]] = data
+            case "gap":
+                self.gaps.append((data["source"], time_s, None, data["why"]))
+            case "clock":
+                self.clocks.append((time_s, data["by_s"]))
+            case "skip" | "repeat":
+                runs = self.skipped if record.kind == "skip" else self.asked
+                runs.append((data["measurement"], data["repeat"]))
+            case "note":
+                self.notes.append((time_s, data["text"]))
+            case "file":
+                self.files[data["sha256"]] = data["name"]
+            case _:
+                return
+        self.changes += 1
 
-    def _session(self, record: Record) -> None:
+    def _session(self, record: Record, data: Mapping[str, Any]) -> None:
         offset = 0.0
         if self.sessions:
-            first = self.sessions[0].start
+            first, end_s = self.sessions[0].start, self.session.end_s
             # where the clock was set back between two sessions, time goes on behind what was measured already
-            offset = max((record.moment.utc_ns - first.utc_ns) * NS, self.session.end_s)
-        self.gaps = [gap if gap[2] is not None else (*gap[:2], self._lasted(gap[1]), gap[3]) for gap in self.gaps]
-        self.sessions.append(Session(record.data["session"], record.moment, offset, record.data, offset))
-        self.damaged += record.data.get("damaged", [])
+            offset = max((record.moment.utc_ns - first.utc_ns) * NS, end_s)
+            self.gaps = [(source, since, max(0.0, end_s - since) if lasted is None else lasted, why)
+                         for source, since, lasted, why in self.gaps]  # fmt: skip
+        self.sessions.append(Session(data["session"], record.moment, offset, data, offset))
+        self.damaged += data.get("damaged", [])
 
-    def _lasted(self, since: float) -> float:
-        return max(0.0, self.session.end_s - since)
-
-    def _point(self, record: Record) -> None:
-        data = record.data
-        moment = Moment(*data["moment"])
-        measurement, number, repeat = data["place"]
+    def _point(self, record: Record, data: Mapping[str, Any]) -> None:
+        moment, (measurement, number, repeat) = Moment(*data["moment"]), data["place"]
         self.points[record.number] = Point(
             record.number, (measurement, number, repeat), data["columns"], moment, self.session.time_s(moment),
             self.session.number, data["how"], timed=data.get("timed", True),
         )  # fmt: skip
 
-    def _joined(self, record: Record) -> None:
-        point = self.points.get(record.data["of"])
-        if point is not None:
-            values = {name: Joined(*pair) for name, pair in record.data["values"].items()}
-            self.points[point.record] = replace(point, joined=values, missing=record.data["missing"], settled=True)
+    def _joined(self, record: Record, data: Mapping[str, Any]) -> None:
+        if (point := self.points.get(data["of"])) is not None:
+            values = {name: Joined(*pair) for name, pair in data["values"].items()}
+            self.points[point.record] = replace(point, joined=values, missing=data["missing"], settled=True)
 
-    def _undone(self, record: Record) -> None:
-        for number in record.data["of"]:
-            if number in self.points:
-                self.undone.append((self.points.pop(number), record.data["reason"]))
+    def _undone(self, record: Record, data: Mapping[str, Any]) -> None:
+        gone = [self.points.pop(number) for number in data["of"] if number in self.points]
+        self.undone += [(point, data["reason"]) for point in gone]
 
-    def _identity(self, record: Record) -> None:
-        self.identities[record.data["name"]] = record.data
-
-    def _gap(self, record: Record) -> None:
-        self.gaps.append((record.data["source"], self.session.time_s(record.moment), None, record.data["why"]))
-
-    def _returned(self, record: Record) -> None:
-        for i, (source, since, lasted, why) in enumerate(self.gaps):
-            if source == record.data["source"] and lasted is None:
-                self.gaps[i] = (source, since, record.data["after_s"], why)
-
-    def _clock(self, record: Record) -> None:
-        self.clocks.append((self.session.time_s(record.moment), record.data["by_s"]))
-
-    def _skip(self, record: Record) -> None:
-        self.skipped.append((record.data["measurement"], record.data["repeat"]))
-
-    def _repeat(self, record: Record) -> None:
-        self.asked.append((record.data["measurement"], record.data["repeat"]))
-
-    def _note(self, record: Record) -> None:
-        self.notes.append((self.session.time_s(record.moment), record.data["text"]))
-
-    def _file(self, record: Record) -> None:
-        self.files[record.data["sha256"]] = record.data["name"]
+    def _returned(self, record: Record, data: Mapping[str, Any]) -> None:
+        self.gaps = [(source, since, data["after_s"] if source == data["source"] and lasted is None else lasted, why)
+                     for source, since, lasted, why in self.gaps]  # fmt: skip
