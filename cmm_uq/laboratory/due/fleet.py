@@ -124,8 +124,8 @@ def fit_fleet(
 ) -> Fleet:  # fmt: skip
     """Learn from a fleet: hyper-parameters from machines drawn by lot where there are more than ``learnt_from``."""
     if not members:
-        raise CmmUqError("no machine has a certificate that states this value",
-                         fix="Record certificates, or choose another --name")  # fmt: skip
+        fix = "Record certificates, or choose another --name"
+        raise CmmUqError("no machine has a certificate that states this value", fix=fix)
     machines = side_by_side([each.history for each in members])
     limits = [each.limit for each in members if each.limit]
     unit = limit_for(float(np.median(limits)) if limits else None, np.concatenate([m.history.u for m in members]))

@@ -202,9 +202,8 @@ class FleetPrior:
         except (KeyError, TypeError, ValueError):
             sound = False
         if not sound:
-            raise CmmUqError(
-                "is no prior of a fleet that this version reads", where=where, fix="Make it again: cmm-uq fleet"
-            )
+            fix = "Make it again: cmm-uq fleet"
+            raise CmmUqError("is no prior of a fleet that this version reads", where=where, fix=fix)
         return found
 
     def data(self) -> dict[str, Any]:

@@ -184,8 +184,8 @@ def reliability_regression(data: ReliabilityData, target: float) -> ReliabilityR
     ]  # fmt: skip
     fit = [found for found in ranked if found.accepted and found.interval]
     if not fit:
-        raise CmmUqError(say("no model of the reliability both fits the intervals and meets the target"),
-                         fix="Take a lower reliability, or a fixed interval")  # fmt: skip
+        fix = "Take a lower reliability, or a fixed interval"
+        raise CmmUqError(say("no model of the reliability both fits the intervals and meets the target"), fix=fix)
     best = max(fit, key=lambda found: found.merit)
     others = sorted((found for found in ranked if found is not best), key=lambda found: -found.merit)
     low, high = _range(best, data, target)

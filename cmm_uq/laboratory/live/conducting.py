@@ -213,8 +213,8 @@ class Conductor:
                 self._machine(step)
         elif typed.word == "take":
             if not any(name in self.recorder.streams for name in COORDINATES):
-                raise CmmUqError("no instrument reads coordinates",
-                                 fix="Type them: x y z, or a distance from the first point")  # fmt: skip
+                fix = "Type them: x y z, or a distance from the first point"
+                raise CmmUqError("no instrument reads coordinates", fix=fix)
             self._accept([(step, self.recorder.latest(COORDINATES))], now, "scales", {})
         elif len(typed.numbers) == 3:
             pasted = now.monotonic_ns - self._typed_ns <= _PASTED_S * 1e9  # faster than they can be measured

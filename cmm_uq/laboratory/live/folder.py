@@ -134,8 +134,8 @@ def _taken(folder: Path) -> int:
     except OSError as error:
         raise _refused(folder, error) from None
     if lock is None:
-        raise CmmUqError("this job is being recorded by another program", where=str(folder),
-                         fix="End it there; a program that was killed holds no lock")  # fmt: skip
+        fix = "End it there; a program that was killed holds no lock"
+        raise CmmUqError("this job is being recorded by another program", where=str(folder), fix=fix)
     return lock
 
 

@@ -103,9 +103,8 @@ class Lead:
                 return run
         numbers = self.plan.measurement
         problem = f"measurement {measurement} is complete" if runs else f"the plan has no measurement {measurement}"
-        raise CmmUqError(
-            problem, fix=f"It has {numbers.min()} to {numbers.max()}; repeat asks for one more of the last"
-        )
+        fix = f"It has {numbers.min()} to {numbers.max()}; repeat asks for one more of the last"
+        raise CmmUqError(problem, fix=fix)
 
     def places(
         self, story: Story, ahead: PlannedPoint | None, numbers: Sequence[Place | None]
@@ -132,8 +131,8 @@ class Lead:
         length = float(np.linalg.norm(far))
         beside = about - np.outer(about @ far, far) / (length**2 or 1.0)
         if length == 0 or float(np.linalg.norm(beside, axis=1).max()) > _ON_LINE * length:
-            raise CmmUqError("the points of this set-up lie on no line, so a distance does not say where",
-                             fix="Type three coordinates: x y z")  # fmt: skip
+            fix = "Type three coordinates: x y z"
+            raise CmmUqError("the points of this set-up lie on no line, so a distance does not say where", fix=fix)
         begun = story.by_place.get(first.place)
         start = first.xyz if begun is None else np.array([begun.columns[f"{axis}_mm"] for axis in "xyz"])
         target = step if step.place != first.place else steps[1]

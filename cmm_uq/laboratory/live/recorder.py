@@ -199,8 +199,8 @@ class Recorder:
             age = stream.age_s(now) if stream is not None else None
             if stream is None or stream.latest is None or age is None or age > self._max_gap_s:
                 silent = "" if age is None else f" for {age:.3g} s"
-                raise CmmUqError(f"no reading of {column}{silent}: the point was not taken",
-                                 fix="Look at its instrument, then take the point again")  # fmt: skip
+                fix = "Look at its instrument, then take the point again"
+                raise CmmUqError(f"no reading of {column}{silent}: the point was not taken", fix=fix)
             values[column] = stream.latest
         return values
 

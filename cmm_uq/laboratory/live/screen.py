@@ -58,9 +58,8 @@ def understood(line: str) -> OperatorInput:
 
 def _numbers(parts: list[str]) -> tuple[float, ...]:
     if len(parts) not in (1, 3):
-        raise CmmUqError(
-            f"{len(parts)} numbers", fix="Type three coordinates x y z, or one distance from the first point, in mm"
-        )
+        fix = "Type three coordinates x y z, or one distance from the first point, in mm"
+        raise CmmUqError(f"{len(parts)} numbers", fix=fix)
     for part in parts:
         if problem := number_problem(part):
             raise CmmUqError(problem[0], fix=problem[1])

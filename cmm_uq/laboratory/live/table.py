@@ -88,8 +88,8 @@ class LiveRecording:
         except (OSError, ValueError):
             own = []
         if path.exists() and (self._last is None or self._last not in own):
-            raise CmmUqError("was not written by cmm-uq acquire, or was changed since", where=str(path),
-                             fix="Move it away, or name another file in [recording]; nothing is overwritten")  # fmt: skip
+            fix = "Move it away, or name another file in [recording]; nothing is overwritten"
+            raise CmmUqError("was not written by cmm-uq acquire, or was changed since", where=str(path), fix=fix)
 
     def write(self, story: Story, lead: Lead) -> None:
         """Write both where the points changed; beside with the hash of what it was, lest a power cut leave them apart."""

@@ -87,8 +87,8 @@ def _checked(path: Path) -> tuple[int, str]:
         with told(path), records.engine.connect() as connection:
             found = chain(connection)
         if found:
-            raise CmmUqError(f"entry {found[0].entry}: {found[0].problem}", where=str(path),
-                             fix="cmm-uq records verify says all; a backup with a broken chain is none")  # fmt: skip
+            fix = "cmm-uq records verify says all; a backup with a broken chain is none"
+            raise CmmUqError(f"entry {found[0].entry}: {found[0].problem}", where=str(path), fix=fix)
         return records.head()
 
 

@@ -107,10 +107,8 @@ def _check_file(path: Path, create: bool) -> None:
     try:
         if not path.exists():
             if not create:
-                raise CmmUqError(
-                    "there are no records", where=str(path),
-                    fix=f"Name them with --records or {ENVIRONMENT}, or begin them: cmm-uq records import FOLDER",
-                )  # fmt: skip
+                fix = f"Name them with --records or {ENVIRONMENT}, or begin them: cmm-uq records import FOLDER"
+                raise CmmUqError("there are no records", where=str(path), fix=fix)
             path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot be opened: {error.strerror}", where=str(path), fix="Mend the permissions") from error
@@ -126,18 +124,18 @@ def _server(url: str, read_only: bool) -> Engine:
         if made.get_backend_name() == "postgresql" and "+" not in made.drivername:
             made = made.set(drivername="postgresql+psycopg")
         if made.get_backend_name() != "postgresql":
-            raise CmmUqError(f"{made.get_backend_name()} is no database for records", where=shown(url),
-                             fix="Name a file, or postgresql://…")  # fmt: skip
+            fix = "Name a file, or postgresql://…"
+            raise CmmUqError(f"{made.get_backend_name()} is no database for records", where=shown(url), fix=fix)
         options: dict[str, Any] = {"connect_args": {"connect_timeout": 10}}
         if read_only:
             options["connect_args"]["options"] = "-c default_transaction_read_only=on"
         return create_engine(made, pool_pre_ping=True, **options)
     except ModuleNotFoundError as error:
-        raise CmmUqError(f"the driver {error.name} is not installed", where=shown(url),
-                         fix='pip install "cmm-uq[postgres]"') from error  # fmt: skip
+        fix = 'pip install "cmm-uq[postgres]"'
+        raise CmmUqError(f"the driver {error.name} is not installed", where=shown(url), fix=fix) from error
     except (ArgumentError, NoSuchModuleError, ValueError) as error:
-        raise CmmUqError("is no URL of a database", where=shown(url),
-                         fix="postgresql://USER@HOST/DATABASE, or a file") from error  # fmt: skip
+        fix = "postgresql://USER@HOST/DATABASE, or a file"
+        raise CmmUqError("is no URL of a database", where=shown(url), fix=fix) from error
 
 
 def state_of(connection: Connection) -> str:
@@ -151,8 +149,8 @@ def state_of(connection: Connection) -> str:
     if not names and application in (None, 0, APPLICATION):
         return ""
     if not ours or "alembic_version" not in names:
-        raise CmmUqError("is the database of another program", where=where_of(connection),
-                         fix="Name another file or database for the records")  # fmt: skip
+        fix = "Name another file or database for the records"
+        raise CmmUqError("is the database of another program", where=where_of(connection), fix=fix)
     return str(connection.exec_driver_sql("SELECT version_num FROM alembic_version").scalar() or "")
 
 
@@ -163,10 +161,10 @@ def check_revision(state: str, place: str | Path) -> None:
     if state == "":
         raise CmmUqError("holds no records", where=shown(place), fix="Begin them: cmm-uq records import FOLDER")
     if state in KNOWN:
-        raise CmmUqError("the records are of an older version", where=shown(place),
-                         fix="Back them up, then: cmm-uq records migrate")  # fmt: skip
-    raise CmmUqError(f"the records are of a newer version (revision {state})", where=shown(place),
-                     fix="Update cmm-uq; nothing was changed")  # fmt: skip
+        fix = "Back them up, then: cmm-uq records migrate"
+        raise CmmUqError("the records are of an older version", where=shown(place), fix=fix)
+    fix = "Update cmm-uq; nothing was changed"
+    raise CmmUqError(f"the records are of a newer version (revision {state})", where=shown(place), fix=fix)
 
 
 def _make(records: Records) -> None:

@@ -33,8 +33,8 @@ def of_variable(name: str, key: str) -> str:
     """A secret in the environment."""
     secret = os.environ.get(name, "")
     if not secret:
-        raise CmmUqError(f"the variable {name} is not set", where=key,
-                         fix="Set it where the run is started, as in EnvironmentFile= of systemd")  # fmt: skip
+        fix = "Set it where the run is started, as in EnvironmentFile= of systemd"
+        raise CmmUqError(f"the variable {name} is not set", where=key, fix=fix)
     return secret
 
 
@@ -126,8 +126,8 @@ def trusted(ca_file: Path | None) -> ssl.SSLContext:
     try:
         return ssl.create_default_context(cafile=None if ca_file is None else str(ca_file))
     except (OSError, ssl.SSLError) as error:
-        raise CmmUqError(f"holds no certificates to trust: {error}", where=str(ca_file),
-                         fix="Give a file in PEM") from None  # fmt: skip
+        fix = "Give a file in PEM"
+        raise CmmUqError(f"holds no certificates to trust: {error}", where=str(ca_file), fix=fix) from None
 
 
 def _text(answer: bytes | str) -> str:
@@ -234,8 +234,8 @@ def _webhook(table: WebhookTable, folder: Path) -> Webhook:
         try:
             return web_address(url)
         except ValueError:
-            raise CmmUqError(f"the variable {table.url_variable} holds no web address", where=key,
-                             fix="Put one into it, as https://example.org/cmm") from None  # fmt: skip
+            fix = "Put one into it, as https://example.org/cmm"
+            raise CmmUqError(f"the variable {table.url_variable} holds no web address", where=key, fix=fix) from None
 
     return Webhook(
         address, None if secret is None else lambda: of_variable(secret, "[[webhook]] secret_variable"),

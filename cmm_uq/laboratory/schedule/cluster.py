@@ -138,14 +138,14 @@ def _client(address: str) -> Any:
     try:
         distributed = import_module("distributed")
     except ModuleNotFoundError:
-        raise CmmUqError("a cluster needs Dask", where="--scheduler",
-                         fix="Install it: pip install 'cmm-uq[fleet]'") from None  # fmt: skip
+        fix = "Install it: pip install 'cmm-uq[fleet]'"
+        raise CmmUqError("a cluster needs Dask", where="--scheduler", fix=fix) from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
     try:
         return distributed.Client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TypeError) as error:
-        raise CmmUqError("no Dask scheduler answers", where=f"--scheduler {address}",
-                         fix="Start one (dask scheduler), or mend the address: tcp://HOST:8786") from error  # fmt: skip
+        fix = "Start one (dask scheduler), or mend the address: tcp://HOST:8786"
+        raise CmmUqError("no Dask scheduler answers", where=f"--scheduler {address}", fix=fix) from error
 
 
 def _threads(client: Any, address: str) -> int:
@@ -153,13 +153,13 @@ def _threads(client: Any, address: str) -> int:
     # a function without a name travels whole: a worker that lacks the package can run it, too
     found = client.run(lambda: __import__("cmm_uq").__version__, on_error="return")
     if not found:
-        raise CmmUqError("has no workers", where=f"--scheduler {address}",
-                         fix=f"Start some: dask worker {address} --nthreads 1") from None  # fmt: skip
+        fix = f"Start some: dask worker {address} --nthreads 1"
+        raise CmmUqError("has no workers", where=f"--scheduler {address}", fix=fix) from None
     for worker, version in found.items():
         if version != __version__:
             has = f"has cmm-uq {version}" if isinstance(version, str) else f"has no cmm-uq ({version})"
-            raise CmmUqError(f"{has}, and this is {__version__}", where=f"worker {worker}",
-                             fix="Install the same version everywhere: figures must not depend on it")  # fmt: skip
+            fix = "Install the same version everywhere: figures must not depend on it"
+            raise CmmUqError(f"{has}, and this is {__version__}", where=f"worker {worker}", fix=fix)
     return max(1, sum(map(int, client.nthreads().values())))
 
 

@@ -268,5 +268,5 @@ def _fault(error: Exception, job: JobFolder) -> CmmUqError:
     told = told_with_package(error)
     if told is not None:
         return told
-    return CmmUqError(f"a fault of the program: {type(error).__name__}: {error}", where=str(job.folder),
-                      fix="Please report it with the input")  # fmt: skip
+    fix = "Please report it with the input"
+    return CmmUqError(f"a fault of the program: {type(error).__name__}: {error}", where=str(job.folder), fix=fix)

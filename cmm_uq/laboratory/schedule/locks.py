@@ -55,8 +55,8 @@ def turn_at(path: Path) -> Turn | None:
         if not resumed:
             os.write(descriptor, _BEGUN)
     except OSError as error:
-        raise OutputError(f"cannot be locked: {error.strerror}", where=str(path),
-                          fix="Free the disk, or mend the permissions") from error  # fmt: skip
+        fix = "Free the disk, or mend the permissions"
+        raise OutputError(f"cannot be locked: {error.strerror}", where=str(path), fix=fix) from error
     return Turn(path, descriptor, resumed)
 
 

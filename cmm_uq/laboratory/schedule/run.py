@@ -89,8 +89,8 @@ class ScheduledRun:
             try:
                 inside = list(job_folders(root, self.work.out))
                 if not inside and not self.settings.may_be_empty:
-                    raise CmmUqError("holds no job", where=str(root),
-                                     fix="A job is a folder with a job.toml; [run] may_be_empty allows none")  # fmt: skip
+                    fix = "A job is a folder with a job.toml; [run] may_be_empty allows none"
+                    raise CmmUqError("holds no job", where=str(root), fix=fix)
             except CmmUqError as error:
                 self._end(JobOutcome.refused(JobFolder(root, root), error), problems)
                 continue

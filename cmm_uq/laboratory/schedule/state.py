@@ -87,8 +87,8 @@ class FolderState:
             marker.parent.mkdir(parents=True, exist_ok=True)
             marker.write_text(json.dumps(content, ensure_ascii=False), encoding="utf-8")
         except OSError as error:
-            raise OutputError(f"cannot be written: {error.strerror}", where=str(marker),
-                              fix="Free the disk, or mend the permissions") from error  # fmt: skip
+            fix = "Free the disk, or mend the permissions"
+            raise OutputError(f"cannot be written: {error.strerror}", where=str(marker), fix=fix) from error
 
     def _marker(self, key: str) -> Path:
         return self.out / PRIVATE / "sent" / f"{key}.json"

@@ -71,9 +71,8 @@ class LiveInstrument:
         try:
             self._held = list(self._introduced(self._port, profile.send.answer_within_s))
         except PortLostError as lost:
-            raise CmmUqError(
-                f"the port was lost at once: {lost}", where=self.name, fix="Check cable and power"
-            ) from None
+            fix = "Check cable and power"
+            raise CmmUqError(f"the port was lost at once: {lost}", where=self.name, fix=fix) from None
         except CmmUqError:
             self._port.close()
             raise

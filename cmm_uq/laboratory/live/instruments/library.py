@@ -114,12 +114,11 @@ def drafted(wanted: ProfileDraft) -> bytes:
             raise CmmUqError(f"the line has {len(found)} numbers, so none with the number {place}", where="--quantity",
                              fix="Count them from 1")  # fmt: skip
         if problem := column_problem(name) or ("" if name.isidentifier() else "letters, digits and _ only"):
-            raise CmmUqError(f"{name!r} cannot name a quantity: {problem}", where="--quantity",
-                             fix="Name it as temp_c or x_mm, with its unit at its end")  # fmt: skip
+            fix = "Name it as temp_c or x_mm, with its unit at its end"
+            raise CmmUqError(f"{name!r} cannot name a quantity: {problem}", where="--quantity", fix=fix)
     if not wanted.quantities:
-        raise CmmUqError(
-            "no quantity is named", where="--quantity", fix="Name one as temp_c=1, the line's first number"
-        )
+        fix = "Name one as temp_c=1, the line's first number"
+        raise CmmUqError("no quantity is named", where="--quantity", fix=fix)
     pattern, place = "^", 0
     for number, one in enumerate(found, 1):
         pattern += _literal(line[place : one.start()])

@@ -261,8 +261,8 @@ def check_profile(profile: ProfileFile, where: str) -> None:
     if profile.protocol == "ipp":
         return
     if profile.parse is None:
-        raise CmmUqError("is missing: it says what a message means", where=f"{where}: [parse]",
-                         fix="Give pattern, or fields with separator or struct")  # fmt: skip
+        fix = "Give pattern, or fields with separator or struct"
+        raise CmmUqError("is missing: it says what a message means", where=f"{where}: [parse]", fix=fix)
     if profile.frame.length and not profile.frame.start and not profile.send.poll:
         raise CmmUqError("is for instruments that are asked: nothing else ends a message that is cut",
                          where=f"{where}: [frame] length", fix="Give start, or [send] poll")  # fmt: skip

@@ -36,8 +36,8 @@ class VisaPort:
         try:
             import pyvisa
         except ImportError:
-            raise CmmUqError("needs pyvisa, which is not installed", where=port,
-                             fix='Install it: pip install "cmm-uq[visa]"') from None  # fmt: skip
+            fix = 'Install it: pip install "cmm-uq[visa]"'
+            raise CmmUqError("needs pyvisa, which is not installed", where=port, fix=fix) from None
         self._failures = (pyvisa.errors.VisaIOError, pyvisa.errors.InvalidSession, OSError, ValueError)
         self._timed_out = pyvisa.constants.StatusCode.error_timeout
         self._asked = False
@@ -46,8 +46,8 @@ class VisaPort:
                 port.removeprefix(SCHEME), timeout=TICK_S * 1e3
             )
         except self._failures as error:
-            raise CmmUqError(f"cannot be opened: {error}", where=port,
-                             fix="Check address and cable; pyvisa-info says which VISA is there") from None  # fmt: skip
+            fix = "Check address and cable; pyvisa-info says which VISA is there"
+            raise CmmUqError(f"cannot be opened: {error}", where=port, fix=fix) from None
 
     def read(self) -> bytes:
         if not self._asked:
@@ -106,8 +106,8 @@ def opener(port: str, connection: Connection, *, tcp_port: int | None = None) ->
         return lambda: TcpPort(address["host"].strip("[]"), int(address["port"]), port)
     if port.startswith(RFC2217):
         return lambda: SerialPort(port, connection)
-    raise CmmUqError(f"{address['scheme']}:// is no way to an instrument", where=port,
-                     fix="Known: a serial port, socket://, tcp://, rfc2217://, visa://, file:")  # fmt: skip
+    fix = "Known: a serial port, socket://, tcp://, rfc2217://, visa://, file:"
+    raise CmmUqError(f"{address['scheme']}:// is no way to an instrument", where=port, fix=fix)
 
 
 class SerialPort:
@@ -196,8 +196,8 @@ def _refused(port: str, error: Exception) -> CmmUqError:
     code = getattr(error, "errno", None)
     text = str(error)
     if "exclusively lock" in text or code in (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK):
-        return CmmUqError("the port is busy: another program has it", where=port,
-                          fix="Close that program; one port is for one program")  # fmt: skip
+        fix = "Close that program; one port is for one program"
+        return CmmUqError("the port is busy: another program has it", where=port, fix=fix)
     if code in (errno.EACCES, errno.EPERM) or "Access is denied" in text or "PermissionError" in text:
         group = "" if os.name == "nt" else ": on Linux, join the group that owns it (ls -l), often dialout"
         return CmmUqError("the port may not be opened by this user", where=port, fix=f"Ask for the permission{group}")
@@ -208,8 +208,8 @@ def _refused(port: str, error: Exception) -> CmmUqError:
     if isinstance(error, ConnectionRefusedError) or "refused" in text:
         return CmmUqError("nobody listens at this address", where=port, fix="Check host, port number and power")
     if isinstance(error, TimeoutError) or "timed out" in text:
-        return CmmUqError(f"no connection within {CONNECT_WITHIN_S:g} s", where=port,
-                          fix="Check address, cable and firewall")  # fmt: skip
+        fix = "Check address, cable and firewall"
+        return CmmUqError(f"no connection within {CONNECT_WITHIN_S:g} s", where=port, fix=fix)
     if isinstance(error, socket.gaierror):
         return CmmUqError("no computer of this name is known", where=port, fix="Check the address")
     return CmmUqError(f"cannot be opened: {text}", where=port, fix="Check port, cable and settings")

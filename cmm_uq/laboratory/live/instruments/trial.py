@@ -62,13 +62,13 @@ class Trial:
             raise CmmUqError(f"nothing came{like}", where=self.port, fix=f"Check {', '.join(self._silent())}")
         seen = shown(self.received[:60])
         if self.answers:
-            raise CmmUqError(f"the instrument answers, but gives no value: {self.told}", where=self.port,
-                             fix="See its display and manual")  # fmt: skip
+            fix = "See its display and manual"
+            raise CmmUqError(f"the instrument answers, but gives no value: {self.told}", where=self.port, fix=fix)
         if sum(byte >= 0x80 or byte == 0 for byte in self.received) > len(self.received) / 4:
-            raise CmmUqError(f"what comes is no text: {seen}{like}", where=self.port,
-                             fix=f"Check baud rate, data bits and parity: the profile has {self.settings}")  # fmt: skip
-        raise CmmUqError(f"what comes is not understood: {seen}{like}", where=self.port,
-                         fix="Check that it is this instrument, and its settings")  # fmt: skip
+            fix = f"Check baud rate, data bits and parity: the profile has {self.settings}"
+            raise CmmUqError(f"what comes is no text: {seen}{like}", where=self.port, fix=fix)
+        fix = "Check that it is this instrument, and its settings"
+        raise CmmUqError(f"what comes is not understood: {seen}{like}", where=self.port, fix=fix)
 
     @property
     def settings(self) -> str:

@@ -151,9 +151,8 @@ class Client(Transactions):
 
     def _moving(self, command: str) -> list[HeardLine]:
         if self._confirm is None:
-            raise CmmUqError(
-                f"{command} moves the machine, which was not allowed", fix="Allow it and confirm each move"
-            )
+            fix = "Allow it and confirm each move"
+            raise CmmUqError(f"{command} moves the machine, which was not allowed", fix=fix)
         if not self._confirm(command):
             raise CmmUqError(f"{command} was not confirmed: the machine was not moved")
         return self.call(command, within_s=MOVED_WITHIN_S)

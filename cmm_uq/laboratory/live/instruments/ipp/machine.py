@@ -48,8 +48,8 @@ _REPORTED = ("X", "Y", "Z")
 def open_machine(identity: Identity, profile: ProfileFile, port: str, clock: Clock) -> IppMachine:
     """A CMM at a port."""
     if not port.startswith(NETWORK):
-        raise CmmUqError("a CMM by I++ DME is reached over the network", where=port or identity.name,
-                         fix=f'Give port = "tcp://host:{PORT}"')  # fmt: skip
+        fix = f'Give port = "tcp://host:{PORT}"'
+        raise CmmUqError("a CMM by I++ DME is reached over the network", where=port or identity.name, fix=fix)
     return IppMachine(identity, profile.ipp, opener(port, Connection(), tcp_port=PORT), clock)
 
 
@@ -220,10 +220,10 @@ class IppMachine:
 
 def _no_server(name: str, error: Exception) -> CmmUqError:
     if isinstance(error, FaultError):
-        return CmmUqError(f"the server refuses: {error}", where=name,
-                          fix="End the session of the other program, and clear the machine's errors")  # fmt: skip
-    return CmmUqError(f"no I++ DME server answers: {error}", where=name,
-                      fix="Check that the port is that of the I++ DME server, usually 1294")  # fmt: skip
+        fix = "End the session of the other program, and clear the machine's errors"
+        return CmmUqError(f"the server refuses: {error}", where=name, fix=fix)
+    fix = "Check that the port is that of the I++ DME server, usually 1294"
+    return CmmUqError(f"no I++ DME server answers: {error}", where=name, fix=fix)
 
 
 def _ill(error: FaultError) -> Text:
