@@ -18,7 +18,7 @@ from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, d
 from cmm_uq.certificate.origin import BANNERS
 from cmm_uq.certificate.results.reissue import Reissue
 from cmm_uq.certificate.sections.traceability import claimed
-from cmm_uq.jobs.dcc.administrative import (
+from cmm_uq.jobs.dcc.certificate import (
     CalibrationLaboratory,
     Contact,
     CoreData,
@@ -34,9 +34,9 @@ from cmm_uq.jobs.dcc.administrative import (
     ReplacedReport,
     Rich,
     Somebody,
+    StatementMetadata,
     Words,
 )
-from cmm_uq.jobs.dcc.certificate import StatementMetadata
 from cmm_uq.jobs.dcc.quantities import RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import MEASURED

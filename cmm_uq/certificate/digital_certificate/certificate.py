@@ -44,8 +44,7 @@ from cmm_uq.certificate.digital_certificate.quantities import (
 )
 from cmm_uq.certificate.origin import file_name
 from cmm_uq.certificate.results.plain import as_json
-from cmm_uq.jobs.dcc.administrative import Attached
-from cmm_uq.jobs.dcc.certificate import Administrative, Certificate, Data, DccQuantity, DccResult, Measurement
+from cmm_uq.jobs.dcc.certificate import Administrative, Attached, Certificate, Data, DccQuantity, DccResult, Measurement
 from cmm_uq.jobs.dcc.quantities import CovarianceColumn, CovarianceElement, EllipsoidalRegion, ExpandedList, RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.verdicts import Verdicts

@@ -41,8 +41,7 @@ from cmm_uq.certificate.digital_certificate.quantities import (
     without_unit,
 )
 from cmm_uq.certificate.effect_words import effect_of, parameter_title, title_of
-from cmm_uq.jobs.dcc.administrative import Characters
-from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata
+from cmm_uq.jobs.dcc.certificate import Characters, DccQuantity, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.quantities import IntervalList, Real, RealList
 
 Path = tuple[str, ...]

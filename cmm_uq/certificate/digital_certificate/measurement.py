@@ -20,14 +20,19 @@ from cmm_uq.certificate.digital_certificate.administration import (
 from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.chain import holds_on, right
-from cmm_uq.jobs.dcc.administrative import Hash, IdentificationNumber, PrimitiveQuantity, Rich, Software, Somebody
 from cmm_uq.jobs.dcc.certificate import (
     Data,
     DccQuantity,
     Equipment,
     Equipments,
+    Hash,
+    IdentificationNumber,
     InfluenceCondition,
     Method,
+    PrimitiveQuantity,
+    Rich,
+    Software,
+    Somebody,
     StatementMetadata,
 )
 from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Real

@@ -1,14 +1,9 @@
 """How a class of the DCC stands in XML: its fields as attributes, elements, choices or text, and the simple types of these.
 
-Simple types of the schemas: what the text of an element or an attribute may be, and what it is in Python.
-
-Numbers are :class:`~decimal.Decimal`, so that a certificate keeps the digits it was printed with.
-
-How the fields of a class stand in XML: as an attribute, an element, several, one of a choice, or the text itself.
-
-A class of the model is a :class:`Part` whose fields, in the order of the schema, are annotated so. A field without a default
-has to be there. Parts are made without :mod:`dataclasses`, which would take longer to make seventy classes than it takes to
-write a certificate.
+A class of the model is an :class:`Element` whose fields stand in the order of the schema; one without a default has to be
+there. A field is an element of its name in camelCase, and simple by its Python type, where its annotation says nothing else.
+Classes are made without :mod:`dataclasses`, which would take longer to make seventy of them than it takes to write a
+certificate. Numbers are :class:`~decimal.Decimal`, so that a certificate keeps the digits it was printed with.
 """
 
 from __future__ import annotations
@@ -22,65 +17,60 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from types import MappingProxyType, NoneType
-from typing import Any, ClassVar, NoReturn, Self, dataclass_transform, get_args, get_type_hints
+from typing import Any, ClassVar, NoReturn, Self, dataclass_transform, get_args, get_origin, get_type_hints
 
 from cmm_uq.base.files.limits import NUMERAL
 
 
 @dataclass(frozen=True, eq=False)
 class Simple:
-    """A simple type.
-
-    what : it is, after "is not": "a date".
-    read : value of a text; raises ``ValueError`` where it is none.
-    write : text of a value; what ``read`` refuses is not written.
-    """
+    """What the text of an element or an attribute may be: ``what`` follows "is not", ``read`` raises ValueError."""
 
     what: str
+    plural: str
     read: Callable[[str], Any]
     write: Callable[[Any], str] = str
 
 
-def _matching(what: str, pattern: str) -> Simple:
-    wanted = re.compile(pattern)
+def matching(what: str, pattern: str, plural: str = "") -> Simple:
+    form = re.compile(pattern)
 
     def read(text: str) -> str:
-        if wanted.fullmatch(text) is None:
+        if form.fullmatch(text) is None:
             raise ValueError(text)
         return text
 
-    return Simple(what, read)
+    return Simple(what, plural, read)
 
 
-def one_of(*words: str) -> Simple:
-    return _matching(f"one of {', '.join(words)}", "|".join(words))
+def one_of(*words: str, plural: str = "") -> Simple:
+    return matching(f"one of {', '.join(words)}", "|".join(words), plural)
 
 
-def listed(simple: Simple, plural: str) -> Simple:
+def listed(simple: Simple) -> Simple:
     """A list of them, with spaces between."""
     return Simple(
-        f"a list of {plural}",
+        f"a list of {simple.plural}",
+        "",
         lambda text: tuple(simple.read(part) for part in text.split()),
         lambda values: " ".join(simple.write(value) for value in values),
     )
 
 
-def _number(what: str, pattern: str, write: Callable[[Decimal], str] = str) -> Simple:
-    wanted = re.compile(pattern)
+def _number(what: str, plural: str, pattern: str, write: Callable[[Decimal], str] = str) -> Simple:
+    form = re.compile(pattern)
 
     def read(text: str) -> Decimal:
         text = text.strip()
-        if len(text) > NUMERAL.most or wanted.fullmatch(text) is None:
-            raise ValueError(text)
         try:
-            value = Decimal(text)
+            value = Decimal(text) if len(text) <= NUMERAL.most and form.fullmatch(text) else Decimal("NaN")
         except InvalidOperation:
             raise ValueError(text) from None
         if not math.isfinite(float(value)):
             raise ValueError(text)
         return value
 
-    return Simple(what, read, write)
+    return Simple(what, plural, read, write)
 
 
 def _plain(value: Decimal) -> str:
@@ -106,60 +96,49 @@ def _bytes(text: str) -> bytes:
 
 _UNSIGNED = r"((\d*\.\d+)|(\d+\.\d*)|(\d+\.?))([Ee][-+]?\d+)?"
 
-STRING = Simple("a text", str)
-NOT_EMPTY = Simple("a text without spaces at its ends", _not_empty)
-BOOLEAN = Simple("true or false", _boolean, lambda value: "true" if value else "false")
-DATE = Simple("a date", lambda text: dt.date.fromisoformat(text.strip()[:10]), dt.date.isoformat)
-DATE_TIME = Simple("a date with time", lambda text: dt.datetime.fromisoformat(text.strip()), dt.datetime.isoformat)
-BYTES = Simple("base64", _bytes, lambda data: b64encode(data).decode())
-COUNTRY = _matching("a country of ISO 3166-1, two capital letters", "[A-Z]{2}")
-LANGUAGE = _matching("a language of ISO 639-1, two small letters", "[a-z]{2}")
-NAME = _matching("a name that XML takes as an id", r"[^\W\d][\w.\-]*")
-DECIMAL = _number("a number", rf"[-+]?{_UNSIGNED}")
-UNCERTAINTY = _number("a number, 0 or more", rf"\+?{_UNSIGNED}")
-FACTOR = _number("a coverage factor, 1 or more", r"\+?(([1-9]\d*\.\d*)|([1-9]\d*))", _plain)
-PROBABILITY = _number("a probability", r"\+?((0(\.\d*)?)|(1(\.0*)?))", _plain)
+STRING = Simple("a text", "words", str)
+NOT_EMPTY = Simple("a text without spaces at its ends", "words", _not_empty)
+COUNTRY = matching("a country of ISO 3166-1, two capital letters", "[A-Z]{2}")
+LANGUAGE = matching("a language of ISO 639-1, two small letters", "[a-z]{2}")
+NAME = matching("a name that XML takes as an id", r"[^\W\d][\w.\-]*", "ids")
+DECIMAL = _number("a number", "numbers", rf"[-+]?{_UNSIGNED}")
+UNCERTAINTY = _number("a number, 0 or more", "numbers, 0 or more", rf"\+?{_UNSIGNED}")
+FACTOR = _number(
+    "a coverage factor, 1 or more", "coverage factors, 1 or more", r"\+?(([1-9]\d*\.\d*)|([1-9]\d*))", _plain
+)
+PROBABILITY = _number("a probability", "probabilities", r"\+?((0(\.\d*)?)|(1(\.0*)?))", _plain)
+_BY_TYPE: Mapping[type, Simple] = {
+    str: NOT_EMPTY, Decimal: DECIMAL,
+    bool: Simple("true or false", "true and false", _boolean, lambda value: "true" if value else "false"),
+    bytes: Simple("base64", "", _bytes, lambda data: b64encode(data).decode()),
+    dt.date: Simple("a date", "", lambda text: dt.date.fromisoformat(text.strip()[:10]), dt.date.isoformat),
+    dt.datetime: Simple("a date with time", "dates with times", lambda text: dt.datetime.fromisoformat(text.strip()),
+                        dt.datetime.isoformat),
+}  # fmt: skip
 
-NAMES = listed(NAME, "ids")
-STRINGS = listed(NOT_EMPTY, "words")
-BOOLEANS = listed(BOOLEAN, "true and false")
-DATE_TIMES = listed(DATE_TIME, "dates with times")
-DECIMALS = listed(DECIMAL, "numbers")
-UNCERTAINTIES = listed(UNCERTAINTY, "numbers, 0 or more")
-FACTORS = listed(FACTOR, "coverage factors, 1 or more")
-PROBABILITIES = listed(PROBABILITY, "probabilities")
-
-
-_LAST = ("id", "ref_id", "ref_type")
-"""Fields that stand behind all others of a class, in this order."""
-
-
-class _Missing:
-    """In place of a default."""
+_LAST = ("id", "ref_id", "ref_type")  # fields that stand behind all others of a class, in this order
+_MISSING = object()  # in place of a default
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 class Element:
-    """A part of a certificate: a frozen record, equal to another of its class with the same fields.
-
-    SPACE : prefix of the namespace of its elements.
-    UNORDERED : whether these may stand in any order.
-    """
+    """A frozen record of a certificate; ``SPACE`` is the namespace's prefix, ``UNORDERED`` whether elements have no order."""
 
     SPACE: ClassVar[str] = "dcc"
-    UNORDERED: ClassVar[bool] = False
+    UNORDERED: ClassVar[bool]
     FIELDS: ClassVar[Mapping[str, Any]] = MappingProxyType({})
 
-    def __init_subclass__(cls, *, kw_only: bool = True) -> None:
-        own = [name for name, hint in cls.__annotations__.items() if not hint.startswith("ClassVar")]
-        fields = {**cls.FIELDS, **{name: cls.__dict__.get(name, _Missing) for name in own}}
+    def __init_subclass__(cls, *, kw_only: bool = True, unordered: bool = False) -> None:
+        cls.UNORDERED = unordered
+        names = [name for name, hint in cls.__annotations__.items() if not hint.startswith("ClassVar")]
+        fields = {**cls.FIELDS, **{name: cls.__dict__.get(name, _MISSING) for name in names}}
         last = {name: fields.pop(name) for name in _LAST if name in fields}
         cls.FIELDS = MappingProxyType(fields | last)
 
-    def __init__(self, *given: Any, **named: Any) -> None:
-        values = {**self.FIELDS, **dict(zip(self.FIELDS, given, strict=False)), **named}
-        if len(values) > len(self.FIELDS) or _Missing in values.values():
-            unknown, lacking = values.keys() - self.FIELDS.keys(), [name for name in values if values[name] is _Missing]
+    def __init__(self, *positional: Any, **named: Any) -> None:
+        values = {**self.FIELDS, **dict(zip(self.FIELDS, positional, strict=False)), **named}
+        if len(values) > len(self.FIELDS) or any(value is _MISSING for value in values.values()):
+            unknown, lacking = values.keys() - self.FIELDS.keys(), [name for name in values if values[name] is _MISSING]
             raise TypeError(f"{type(self).__name__} takes no {sorted(unknown)} and needs {lacking}")
         self.__dict__.update(values)
 
@@ -173,11 +152,10 @@ class Element:
         return hash((type(self), *self.__dict__.values()))
 
     def __repr__(self) -> str:
-        said = (f"{name}={value!r}" for name, value in self.__dict__.items() if value != self.FIELDS[name])
-        return f"{type(self).__name__}({', '.join(said)})"
+        changed = (f"{name}={value!r}" for name, value in self.__dict__.items() if value != self.FIELDS[name])
+        return f"{type(self).__name__}({', '.join(changed)})"
 
     def with_changes(self, **changes: Any) -> Self:
-        """The same with other values of some fields."""
         return type(self)(**{**self.__dict__, **changes})
 
 
@@ -191,27 +169,12 @@ class Attribute:
 
 @dataclass(frozen=True)
 class Child:
-    """An element; of the class that is annotated, or simple."""
+    """An element; one of several, in the order of the classes annotated; ``many`` times, in an element ``within``."""
 
-    tag: str
+    tag: str | tuple[str, ...] = ""
     simple: Simple | None = None
-
-
-@dataclass(frozen=True)
-class Many:
-    """Elements one after the other; in an element of their own where ``within`` names it."""
-
-    tag: str
-    simple: Simple | None = None
-    within: str | None = None
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One of several elements; their names, in the order of the classes that are annotated."""
-
-    tags: tuple[str, ...]
     many: bool = False
+    within: str = ""
 
 
 @dataclass(frozen=True)
@@ -226,68 +189,47 @@ class ForeignElements:
     """Elements of other namespaces, as they stand."""
 
 
-Place = Attribute | Child | Many | Choice | Content | ForeignElements
-
-
 @dataclass(frozen=True)
 class Field:
-    """A field of a class.
-
-    name : of it.
-    place : in XML.
-    tags : of its elements, with prefix, and the class of each; none of a simple one.
-    required : whether it has to be there.
-    """
+    """A field of a class: ``tags`` of its elements with the class of each, ``outer`` of the element that they stand in."""
 
     name: str
-    place: Place
+    place: Attribute | Child | Content | ForeignElements
     tags: Mapping[str, type[Element] | None]
+    outer: tuple[str, ...]
+    simple: Simple | None
+    repeated: bool
     required: bool
 
-    @property
-    def repeated(self) -> bool:
-        return isinstance(self.place, Many | ForeignElements) or (isinstance(self.place, Choice) and self.place.many)
 
-    @property
-    def outer(self) -> tuple[str, ...]:
-        """Tags by which it is known among the children."""
-        if isinstance(self.place, Many) and self.place.within:
-            return (prefixed(self.place.within, next(iter(self.tags)).partition(":")[0]),)
-        return tuple(self.tags)
-
-
-def prefixed(tag: str, space: str) -> str:
-    return tag if ":" in tag else f"{space}:{tag}"
+_FIELDS: dict[type[Element], tuple[Field, ...]] = {}
 
 
 def fields_of(cls: type[Element]) -> tuple[Field, ...]:
     """How a class stands in XML."""
     if cls not in _FIELDS:
-        hints = get_type_hints(cls, include_extras=True)
-        _FIELDS[cls] = tuple(
-            _field(name, hints[name], cls.SPACE, default is _Missing) for name, default in cls.FIELDS.items()
-        )
+        hints, space = get_type_hints(cls, include_extras=True), cls.SPACE
+        _FIELDS[cls] = tuple(_field(name, hints[name], space, cls.FIELDS[name] is _MISSING) for name in cls.FIELDS)
     return _FIELDS[cls]
 
 
-_FIELDS: dict[type[Element], tuple[Field, ...]] = {}
-"""What was asked for before."""
-
-
 def _field(name: str, hint: Any, space: str, required: bool) -> Field:
-    annotated, place = hint.__origin__, hint.__metadata__[0]
-    if isinstance(place, Choice):
-        tags: dict[str, type[Element] | None] = dict(
-            zip((prefixed(tag, space) for tag in place.tags), _classes(annotated), strict=True)
-        )
-    elif isinstance(place, Child | Many):
-        tags = {prefixed(place.tag, space): None if place.simple else _classes(annotated)[0]}
-    else:
-        tags = {}
-    return Field(name, place, tags, required)
+    annotated, place = (hint.__origin__, hint.__metadata__[0]) if hasattr(hint, "__metadata__") else (hint, Child())
+    if not isinstance(place, Child):
+        return Field(name, place, {}, (), None, isinstance(place, ForeignElements), required)
+    head, *rest = name.split("_")
+    named = place.tag or head + "".join(word.capitalize() for word in rest)
+    tags = tuple(tag if ":" in tag else f"{space}:{tag}" for tag in ((named,) if isinstance(named, str) else named))
+    classes, sequence = _classes(annotated), get_origin(annotated) is tuple
+    outer = (f"{tags[0].partition(':')[0]}:{place.within}",) if place.within else tags
+    if issubclass(classes[0], Element):
+        return Field(name, place, dict(zip(tags, classes, strict=True)), outer, None, sequence, required)
+    simple = place.simple or (STRING if space == "si" and classes[0] is str else _BY_TYPE[classes[0]])
+    simple = listed(simple) if sequence and not place.many else simple
+    return Field(name, place, {tags[0]: None}, outer, simple, place.many, required)
 
 
-def _classes(annotated: Any) -> list[type[Element]]:
+def _classes(annotated: Any) -> list[type[Any]]:
     """The classes of an annotation, without None and the tuple around them."""
     parts = get_args(annotated)
     if not parts:

@@ -1,52 +1,35 @@
 """Every quantity of a DCC as figures: where it stands, its values, units and uncertainties, in whichever form it is given.
 
 A DCC may state the same thing in many ways: a value by itself, a list in one element or in many, an uncertainty expanded, as
-standard uncertainty or as an interval. Here all are one: a :class:`Figures` for each quantity, numbers as they are printed.
+standard uncertainty or as an interval. Here all are one: a :class:`QuantityFigures` each, numbers as they are printed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
-from cmm_uq.jobs.dcc.administrative import Characters, Latex, Rich, Words
-from cmm_uq.jobs.dcc.certificate import Certificate, Data, DccQuantity, Measurement, QuantityList, StatementMetadata
-from cmm_uq.jobs.dcc.quantities import (
-    Complex,
-    Complexes,
-    Constant,
-    EllipsoidalRegion,
-    Expanded,
-    ExpandedList,
-    ExpandedListMU,
-    ExpandedMU,
-    Hybrid,
-    Interval,
-    IntervalList,
-    IntervalMU,
-    Lists,
-    Real,
-    RealInList,
-    RealList,
-    Reals,
-    RectangularRegion,
-    StandardListMU,
-    StandardMU,
-    Univariate,
-    UnivariateList,
+from cmm_uq.jobs.dcc import quantities as si
+from cmm_uq.jobs.dcc.certificate import (
+    Certificate,
+    Characters,
+    Data,
+    DccQuantity,
+    Latex,
+    Measurement,
+    QuantityList,
+    Rich,
+    StatementMetadata,
 )
+
+Covariance = tuple[tuple[tuple[Decimal, ...], ...], str]  # of the values, row by row, and its unit
 
 
 @dataclass(frozen=True)
 class ValueUncertainty:
-    """Uncertainty of one value.
-
-    expanded, factor, probability : U, k and p, where they are given.
-    standard : u, where it is given by itself.
-    low, high : ends of the interval, where one is given.
-    """
+    """U, k, p and u of one value, and the ends of its interval, as far as they are given."""
 
     expanded: Decimal | None = None
     factor: Decimal | None = None
@@ -68,18 +51,10 @@ NONE = ValueUncertainty()
 
 @dataclass(frozen=True)
 class QuantityFigures:
-    """A quantity.
+    """A quantity: units (in D-SI) and uncertainties one a value; no values of one in words.
 
-    place : names of the measurement, the result and the lists that it stands in.
-    name : of it.
-    ref_types : what it is by the vocabularies of good practice: ``basic_measuredValue``.
-    values : numbers as printed; none of a quantity in words.
-    units : in D-SI, one a value.
-    uncertainties : one a value.
-    labels : of the values, where they have some.
-    words : of a quantity that is no number.
-    covariance : of the values, row by row, where it is given, and its unit.
-    id : of the element.
+    ``place``: names of the measurement, the result and the lists that it stands in; ``ref_types``: what it is by the
+    vocabularies of good practice, ``basic_measuredValue``.
     """
 
     place: tuple[str, ...]
@@ -90,7 +65,7 @@ class QuantityFigures:
     uncertainties: tuple[ValueUncertainty, ...] = ()
     labels: tuple[str, ...] = ()
     words: tuple[str, ...] = ()
-    covariance: tuple[tuple[tuple[Decimal, ...], ...], str] | None = None
+    covariance: Covariance | None = None
     id: str | None = None
 
     @property
@@ -102,31 +77,30 @@ class QuantityFigures:
 def figures(certificate: Certificate) -> tuple[QuantityFigures, ...]:
     """Every quantity of the results, in the order of the certificate."""
     return tuple(
-        found
+        quantity
         for measurement in certificate.measurements
         for result in measurement.results
-        for found in of_data(result.data, (str(measurement.name), str(result.name)))
+        for quantity in of_data(result.data, (str(measurement.name), str(result.name)))
     )
 
 
 def of_data(data: Data, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
     """Of a result or an influence condition."""
     for part in data.parts:
-        if isinstance(part, (DccQuantity, QuantityList)):
+        if isinstance(part, DccQuantity | QuantityList):
             yield from _of(part, place)
-        elif isinstance(part, (Rich, Latex)):
+        elif isinstance(part, Rich | Latex):
             yield QuantityFigures(place, "", words=(_words(part),))
 
 
 def _of(part: DccQuantity | QuantityList, place: tuple[str, ...]) -> Iterator[QuantityFigures]:
-    name = _name(part.name)
+    name = str(part.name or "")
     if isinstance(part, QuantityList):
         for inner in part.parts:
             yield from _of(inner, (*place, name) if name else place)
-        return
-    own = QuantityFigures(place, name, part.ref_type, id=part.id)
-    for given in _numbers(part.value):
-        yield replace(own, **given)
+    else:
+        for numbers in _numbers(part.value):
+            yield QuantityFigures(place, name, part.ref_type, id=part.id, **numbers)
 
 
 def statements(measurement: Measurement) -> Iterator[StatementMetadata]:
@@ -134,7 +108,7 @@ def statements(measurement: Measurement) -> Iterator[StatementMetadata]:
     yield from measurement.metadata
     for result in measurement.results:
         for part in result.data.parts:
-            if isinstance(part, (DccQuantity, QuantityList)):
+            if isinstance(part, DccQuantity | QuantityList):
                 yield from _statements(part)
 
 
@@ -146,94 +120,88 @@ def _statements(part: DccQuantity | QuantityList) -> Iterator[StatementMetadata]
 
 def _numbers(value: Any) -> Iterator[dict[str, Any]]:
     """Values, units and uncertainties of whatever a quantity consists of; of a hybrid by its first unit."""
-    if isinstance(value, Hybrid):
-        yield from _numbers(value.values[0])
-    elif isinstance(value, (Real, Constant, RealInList)):
-        stated = _stated(value.uncertainty)
-        labels = (value.label,) if value.label else ()
-        yield {"values": (value.value,), "units": (value.unit or "",), "uncertainties": (stated,), "labels": labels}
-    elif isinstance(value, RealList):
-        yield _of_list(value)
-    elif isinstance(value, Reals):
-        yield _of_reals(value)
-    elif isinstance(value, Lists):
-        for inner in value.lists:
-            yield from _numbers(inner)
-    elif isinstance(value, Characters):
-        yield {"words": value.words}
-    elif isinstance(value, (Complex, Complexes)):
-        yield {"words": ("a complex quantity",)}
-    else:
-        yield {"words": (_words(value),)}
+    match value:
+        case si.Hybrid():
+            yield from _numbers(value.values[0])
+        case si.Real() | si.Constant() | si.RealInList():
+            labels = (value.label,) if value.label else ()
+            stated = (_stated(value.uncertainty),)
+            yield {"values": (value.value,), "units": (value.unit or "",), "uncertainties": stated, "labels": labels}
+        case si.RealList():
+            count = len(value.values)
+            yield {
+                "values": value.values,
+                "units": _each(value.units, count, ""),
+                "labels": value.labels,
+                "uncertainties": _stated_of_list(value.uncertainty, count),
+                "covariance": _covariance(value.region),
+            }
+        case si.Reals(values=reals):
+            common = _stated(value.uncertainty and value.uncertainty.stated)
+            yield {
+                "values": tuple(real.value for real in reals),
+                "uncertainties": tuple(common if r.uncertainty is None else _stated(r.uncertainty) for r in reals),
+                "units": tuple(real.unit or value.unit or "" for real in reals),
+                "labels": tuple(real.label or "" for real in reals) if any(real.label for real in reals) else (),
+                "covariance": _covariance(value.region),
+            }
+        case si.Lists():
+            for inner in value.lists:
+                yield from _numbers(inner)
+        case Characters():
+            yield {"words": value.words}
+        case si.Complex() | si.Complexes():
+            yield {"words": ("a complex quantity",)}
+        case _:
+            yield {"words": (_words(value),)}
 
 
-def _of_list(value: RealList) -> dict[str, Any]:
-    count = len(value.values)
-    return {
-        "values": value.values, "units": _each(value.units, count, ""), "labels": value.labels,
-        "uncertainties": _stated_of_list(value.uncertainty, count), "covariance": _covariance(value.region),
-    }  # fmt: skip
+def _stated(stated: object) -> ValueUncertainty:
+    match stated:
+        case si.Univariate():
+            return _stated(stated.stated)
+        case si.Expanded() | si.ExpandedMU():
+            return ValueUncertainty(stated.uncertainty, stated.factor, stated.probability)
+        case si.Interval():
+            return ValueUncertainty(None, None, stated.probability, stated.standard, stated.low, stated.high)
+        case si.StandardMU():
+            return ValueUncertainty(standard=stated.standard)
+        case Decimal():
+            return ValueUncertainty(standard=stated)
+    return NONE
 
 
-def _of_reals(value: Reals) -> dict[str, Any]:
-    common = _stated(None if value.uncertainty is None else value.uncertainty.stated)
-    stated = tuple(common if one.uncertainty is None else _stated(one.uncertainty) for one in value.values)
-    return {
-        "values": tuple(one.value for one in value.values), "uncertainties": stated,
-        "units": tuple(one.unit or value.unit or "" for one in value.values),
-        "labels": tuple(one.label or "" for one in value.values) if any(one.label for one in value.values) else (),
-        "covariance": _covariance(value.region),
-    }  # fmt: skip
-
-
-def _stated(given: object) -> ValueUncertainty:
-    if isinstance(given, Univariate):
-        return _stated(given.stated)
-    if isinstance(given, (Expanded, ExpandedMU)):
-        return ValueUncertainty(given.uncertainty, given.factor, given.probability)
-    if isinstance(given, (Interval, IntervalMU)):
-        return ValueUncertainty(probability=given.probability, standard=given.standard, low=given.low, high=given.high)
-    if isinstance(given, StandardMU):
-        return ValueUncertainty(standard=given.standard)
-    return ValueUncertainty(standard=given) if isinstance(given, Decimal) else NONE
-
-
-def _stated_of_list(given: object, count: int) -> tuple[ValueUncertainty, ...]:
+def _stated_of_list(stated: object, count: int) -> tuple[ValueUncertainty, ...]:
     """One a value, where the certificate may have one for all."""
-    if isinstance(given, UnivariateList):
-        return _stated_of_list(given.stated, count)
-    if isinstance(given, (ExpandedList, ExpandedListMU)):
-        columns = (given.uncertainties, given.factors, given.probabilities)
-        return tuple(
-            ValueUncertainty(*row) for row in zip(*(_each(column, count, None) for column in columns), strict=True)
-        )
-    if isinstance(given, StandardListMU):
-        return tuple(ValueUncertainty(standard=one) for one in _each(given.standards, count, None))
-    if isinstance(given, IntervalList):
-        lists = (given.probabilities, given.standards, given.lows, given.highs)
-        rows = zip(*(_each(column, count, None) for column in lists), strict=True)
-        return tuple(ValueUncertainty(None, None, *row) for row in rows)
-    return (NONE,) * count
+    columns: Sequence[Sequence[Any]]
+    match stated:
+        case si.UnivariateList():
+            return _stated_of_list(stated.stated, count)
+        case si.ExpandedList() | si.ExpandedListMU():
+            columns = (stated.uncertainties, stated.factors, stated.probabilities)
+        case si.StandardListMU():
+            columns = ((None,), (None,), (None,), stated.standards)
+        case si.IntervalList():
+            columns = ((None,), (None,), stated.probabilities, stated.standards, stated.lows, stated.highs)
+        case _:
+            return (NONE,) * count
+    rows = zip(*(_each(column, count, None) for column in columns), strict=True)
+    return tuple(ValueUncertainty(*row) for row in rows)
 
 
-def _each(given: Sequence[Any], count: int, otherwise: Any) -> tuple[Any, ...]:
+def _each(column: Sequence[Any], count: int, otherwise: Any) -> tuple[Any, ...]:
     """One a value; a list of another length than one or all says nothing that could be told apart."""
-    if len(given) == count:
-        return tuple(given)
-    return (given[0],) * count if len(given) == 1 else (otherwise,) * count
+    if len(column) == count:
+        return tuple(column)
+    return (column[0],) * count if len(column) == 1 else (otherwise,) * count
 
 
-def _covariance(
-    region: EllipsoidalRegion | RectangularRegion | None,
-) -> tuple[tuple[tuple[Decimal, ...], ...], str] | None:
+def _covariance(region: si.EllipsoidalRegion | None) -> Covariance | None:
     if region is None:
         return None
-    units = {one.unit for column in region.columns for one in column.covariances}
-    return tuple(tuple(one.value for one in column.covariances) for column in region.columns), " ".join(sorted(units))
-
-
-def _name(words: Words | None) -> str:
-    return "" if words is None else str(words)
+    units = {element.unit for column in region.columns for element in column.covariances}
+    matrix = tuple(tuple(element.value for element in column.covariances) for column in region.columns)
+    return matrix, " ".join(sorted(units))
 
 
 def _words(value: Any) -> str:

@@ -9,273 +9,228 @@ import datetime as dt
 from decimal import Decimal
 from typing import Annotated, ClassVar
 
-from cmm_uq.jobs.dcc.fields import (
-    DATE_TIME,
-    DATE_TIMES,
-    DECIMAL,
-    DECIMALS,
-    FACTOR,
-    FACTORS,
-    PROBABILITIES,
-    PROBABILITY,
-    STRING,
-    STRINGS,
-    UNCERTAINTIES,
-    UNCERTAINTY,
-    Child,
-    Choice,
-    Element,
-    Many,
-)
+from cmm_uq.jobs.dcc.fields import FACTOR, PROBABILITY, UNCERTAINTY, Child, Element
 
 Decimals = tuple[Decimal, ...]
-Label = Annotated[str | None, Child("label", STRING)]
-Time = Annotated[dt.datetime | None, Child("dateTime", DATE_TIME)]
-Distribution = Annotated[str | None, Child("distribution", STRING)]
-Distributions = Annotated[tuple[str, ...], Child("distributionXMLList", STRINGS)]
+Strings = tuple[str, ...]
+Time = Annotated[dt.datetime | None, Child("dateTime")]
+Factor = Annotated[Decimal, Child("coverageFactor", FACTOR)]
+Factors = Annotated[Decimals, Child("coverageFactorXMLList", FACTOR)]
+Probability = Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
+Probabilities = Annotated[Decimals, Child("coverageProbabilityXMLList", PROBABILITY)]
+Distributions = Annotated[Strings, Child("distributionXMLList")]
 
 
 class _Si(Element):
-    """Of the namespace of D-SI."""
-
     SPACE: ClassVar[str] = "si"
 
 
-class Expanded(_Si):
-    """Expanded uncertainty (``expandedUncType``)."""
-
-    uncertainty: Annotated[Decimal, Child("uncertainty", UNCERTAINTY)]
-    factor: Annotated[Decimal, Child("coverageFactor", FACTOR)]
-    probability: Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
-    distribution: Distribution = None
+class Expanded(_Si):  # expandedUncType
+    uncertainty: Annotated[Decimal, Child(simple=UNCERTAINTY)]
+    factor: Factor
+    probability: Probability
+    distribution: str | None = None
 
 
 class Interval(_Si):
     """Coverage interval, which need not be symmetric (``coverageIntervalType``)."""
 
     standard: Annotated[Decimal, Child("standardUnc", UNCERTAINTY)]
-    low: Annotated[Decimal, Child("intervalMin", DECIMAL)]
-    high: Annotated[Decimal, Child("intervalMax", DECIMAL)]
-    probability: Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
-    distribution: Distribution = None
+    low: Annotated[Decimal, Child("intervalMin")]
+    high: Annotated[Decimal, Child("intervalMax")]
+    probability: Probability
+    distribution: str | None = None
 
 
 class StandardMU(_Si):
-    """Standard uncertainty (D-SI 2.2)."""
+    """Standard uncertainty; it and the other classes whose names end in MU are of D-SI 2.2."""
 
     standard: Annotated[Decimal, Child("valueStandardMU", UNCERTAINTY)]
-    distribution: Distribution = None
+    distribution: str | None = None
 
 
 class ExpandedMU(_Si):
-    """Expanded uncertainty (D-SI 2.2)."""
-
     uncertainty: Annotated[Decimal, Child("valueExpandedMU", UNCERTAINTY)]
-    factor: Annotated[Decimal, Child("coverageFactor", FACTOR)]
-    probability: Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
-    distribution: Distribution = None
+    factor: Factor
+    probability: Probability
+    distribution: str | None = None
 
 
-class IntervalMU(_Si):
-    """Coverage interval (D-SI 2.2)."""
-
+class IntervalMU(Interval):
     standard: Annotated[Decimal, Child("valueStandardMU", UNCERTAINTY)]
-    low: Annotated[Decimal, Child("intervalMin", DECIMAL)]
-    high: Annotated[Decimal, Child("intervalMax", DECIMAL)]
-    probability: Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
-    distribution: Distribution = None
 
 
 class Univariate(_Si):
     """Uncertainty of one value (D-SI 2.2)."""
 
-    stated: Annotated[StandardMU | ExpandedMU | IntervalMU, Choice(("standardMU", "expandedMU", "coverageIntervalMU"))]
+    stated: Annotated[StandardMU | ExpandedMU | IntervalMU, Child(("standardMU", "expandedMU", "coverageIntervalMU"))]
 
 
 class Real(_Si):
     r"""A value (``realQuantityType``); units in D-SI, ``\micro\metre``."""
 
-    label: Label = None
-    value: Annotated[Decimal, Child("value", DECIMAL)]
-    unit: Annotated[str, Child("unit", STRING)]
+    label: str | None = None
+    value: Decimal
+    unit: str
     time: Time = None
     uncertainty: Annotated[
         Expanded | Interval | Univariate | None,
-        Choice(("expandedUnc", "coverageInterval", "measurementUncertaintyUnivariate")),
+        Child(("expandedUnc", "coverageInterval", "measurementUncertaintyUnivariate")),
     ] = None
 
 
 class Constant(_Si):
     """A constant (``constantQuantityType``); its uncertainty is a standard uncertainty."""
 
-    label: Label = None
-    value: Annotated[Decimal, Child("value", DECIMAL)]
-    unit: Annotated[str, Child("unit", STRING)]
+    label: str | None = None
+    value: Decimal
+    unit: str
     time: Time = None
-    uncertainty: Annotated[Decimal | None, Child("uncertainty", UNCERTAINTY)] = None
-    distribution: Distribution = None
+    uncertainty: Annotated[Decimal | None, Child(simple=UNCERTAINTY)] = None
+    distribution: str | None = None
 
 
 class CovarianceElement(_Si):
-    """An element of a covariance matrix."""
-
-    value: Annotated[Decimal, Child("value", DECIMAL)]
-    unit: Annotated[str, Child("unit", STRING)]
+    value: Decimal
+    unit: str
 
 
 class CovarianceColumn(_Si):
-    """A column of a covariance matrix."""
-
-    covariances: Annotated[tuple[CovarianceElement, ...], Many("covariance")]
+    covariances: Annotated[tuple[CovarianceElement, ...], Child("covariance")]
 
 
-class Region(_Si):
-    """A region of several values together (``ellipsoidalRegionType``, ``rectangularRegionType``)."""
+class EllipsoidalRegion(_Si):
+    """A region of several values together (``ellipsoidalRegionType``)."""
 
-    columns: Annotated[tuple[CovarianceColumn, ...], Many("column", within="covarianceMatrix")]
-    factor: Annotated[Decimal, Child("coverageFactor", FACTOR)]
-    probability: Annotated[Decimal, Child("coverageProbability", PROBABILITY)]
-    distribution: Distribution = None
-
-
-class EllipsoidalRegion(Region):
-    """An ellipsoid."""
+    columns: Annotated[tuple[CovarianceColumn, ...], Child("column", within="covarianceMatrix")]
+    factor: Factor
+    probability: Probability
+    distribution: str | None = None
 
 
-class RectangularRegion(Region):
-    """A rectangular region."""
+class RectangularRegion(EllipsoidalRegion):
+    """The same as a rectangular region (``rectangularRegionType``)."""
+
+
+Region = Annotated[EllipsoidalRegion | RectangularRegion | None, Child(("ellipsoidalRegion", "rectangularRegion"))]
 
 
 class Complex(_Si):
     """A complex value (``complexQuantityType``), by its parts or by magnitude and phase."""
 
-    label: Label = None
-    real: Annotated[Decimal | None, Child("valueReal", DECIMAL)] = None
-    imaginary: Annotated[Decimal | None, Child("valueImag", DECIMAL)] = None
-    magnitude: Annotated[Decimal | None, Child("valueMagnitude", DECIMAL)] = None
-    phase: Annotated[Decimal | None, Child("valuePhase", DECIMAL)] = None
-    unit: Annotated[str | None, Child("unit", STRING)] = None
-    phase_unit: Annotated[str | None, Child("unitPhase", STRING)] = None
+    label: str | None = None
+    real: Annotated[Decimal | None, Child("valueReal")] = None
+    imaginary: Annotated[Decimal | None, Child("valueImag")] = None
+    magnitude: Annotated[Decimal | None, Child("valueMagnitude")] = None
+    phase: Annotated[Decimal | None, Child("valuePhase")] = None
+    unit: str | None = None
+    phase_unit: Annotated[str | None, Child("unitPhase")] = None
     time: Time = None
-    region: Annotated[
-        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
-    ] = None
+    region: Region = None
 
 
 class ExpandedList(_Si):
     """Expanded uncertainties of a list: one a value, or one for all."""
 
-    uncertainties: Annotated[Decimals, Child("uncertaintyXMLList", UNCERTAINTIES)]
-    factors: Annotated[Decimals, Child("coverageFactorXMLList", FACTORS)]
-    probabilities: Annotated[Decimals, Child("coverageProbabilityXMLList", PROBABILITIES)]
+    uncertainties: Annotated[Decimals, Child("uncertaintyXMLList", UNCERTAINTY)]
+    factors: Factors
+    probabilities: Probabilities
     distributions: Distributions = ()
 
 
 class IntervalList(_Si):
-    """Coverage intervals of a list."""
-
-    standards: Annotated[Decimals, Child("standardUncXMLList", UNCERTAINTIES)]
-    lows: Annotated[Decimals, Child("intervalMinXMLList", DECIMALS)]
-    highs: Annotated[Decimals, Child("intervalMaxXMLList", DECIMALS)]
-    probabilities: Annotated[Decimals, Child("coverageProbabilityXMLList", PROBABILITIES)]
+    standards: Annotated[Decimals, Child("standardUncXMLList", UNCERTAINTY)]
+    lows: Annotated[Decimals, Child("intervalMinXMLList")]
+    highs: Annotated[Decimals, Child("intervalMaxXMLList")]
+    probabilities: Probabilities
     distributions: Distributions = ()
 
 
 class ExpandedListMU(_Si):
-    """Expanded uncertainties of a list (D-SI 2.2)."""
-
-    uncertainties: Annotated[Decimals, Child("valueExpandedMUXMLList", UNCERTAINTIES)]
-    factors: Annotated[Decimals, Child("coverageFactorXMLList", FACTORS)]
-    probabilities: Annotated[Decimals, Child("coverageProbabilityXMLList", PROBABILITIES)]
+    uncertainties: Annotated[Decimals, Child("valueExpandedMUXMLList", UNCERTAINTY)]
+    factors: Factors
+    probabilities: Probabilities
     distributions: Distributions = ()
 
 
 class StandardListMU(_Si):
-    """Standard uncertainties of a list (D-SI 2.2)."""
-
-    standards: Annotated[Decimals, Child("valueStandardMUXMLList", UNCERTAINTIES)]
+    standards: Annotated[Decimals, Child("valueStandardMUXMLList", UNCERTAINTY)]
     distributions: Distributions = ()
 
 
 class UnivariateList(_Si):
     """Uncertainties of the values of a list, each by itself (D-SI 2.2)."""
 
-    stated: Annotated[StandardListMU | ExpandedListMU, Choice(("standardMUXMLList", "expandedMUXMLList"))]
+    stated: Annotated[StandardListMU | ExpandedListMU, Child(("standardMUXMLList", "expandedMUXMLList"))]
 
 
 class RealList(_Si):
     """Values with their units (``realListXMLListType``): a unit a value, or one for all."""
 
-    labels: Annotated[tuple[str, ...], Child("labelXMLList", STRINGS)] = ()
-    values: Annotated[Decimals, Child("valueXMLList", DECIMALS)]
-    units: Annotated[tuple[str, ...], Child("unitXMLList", STRINGS)]
-    times: Annotated[tuple[dt.datetime, ...], Child("dateTimeXMLList", DATE_TIMES)] = ()
+    labels: Annotated[Strings, Child("labelXMLList")] = ()
+    values: Annotated[Decimals, Child("valueXMLList")]
+    units: Annotated[Strings, Child("unitXMLList")]
+    times: Annotated[tuple[dt.datetime, ...], Child("dateTimeXMLList")] = ()
     uncertainty: Annotated[
         ExpandedList | IntervalList | UnivariateList | None,
-        Choice(("expandedUncXMLList", "coverageIntervalXMLList", "measurementUncertaintyUnivariateXMLList")),
+        Child(("expandedUncXMLList", "coverageIntervalXMLList", "measurementUncertaintyUnivariateXMLList")),
     ] = None
     region: Annotated[
-        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegionXMLList", "rectangularRegionXMLList"))
+        EllipsoidalRegion | RectangularRegion | None, Child(("ellipsoidalRegionXMLList", "rectangularRegionXMLList"))
     ] = None
 
 
 class ListUncertainty(_Si):
     """Uncertainty of every value of a list alike (``listUnivariateUncType``)."""
 
-    stated: Annotated[Expanded | Interval, Choice(("expandedUnc", "coverageInterval"))]
+    stated: Annotated[Expanded | Interval, Child(("expandedUnc", "coverageInterval"))]
 
 
 class RealInList(_Si):
     """A value in a list; its unit may be the list's."""
 
-    label: Label = None
-    value: Annotated[Decimal, Child("value", DECIMAL)]
-    unit: Annotated[str | None, Child("unit", STRING)] = None
+    label: str | None = None
+    value: Decimal
+    unit: str | None = None
     time: Time = None
-    uncertainty: Annotated[Expanded | Interval | None, Choice(("expandedUnc", "coverageInterval"))] = None
+    uncertainty: Annotated[Expanded | Interval | None, Child(("expandedUnc", "coverageInterval"))] = None
 
 
 class Reals(_Si):
     """Values one by one (``realListType``)."""
 
-    label: Label = None
+    label: str | None = None
     time: Time = None
-    unit: Annotated[str | None, Child("listUnit", STRING)] = None
+    unit: Annotated[str | None, Child("listUnit")] = None
     uncertainty: Annotated[ListUncertainty | None, Child("listUnivariateUnc")] = None
-    values: Annotated[tuple[RealInList, ...], Many("real")]
-    region: Annotated[
-        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
-    ] = None
+    values: Annotated[tuple[RealInList, ...], Child("real")]
+    region: Region = None
 
 
 class Bivariate(_Si):
     """Region of every value of a list alike (``listBivariateUncType``)."""
 
-    region: Annotated[
-        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
-    ] = None
+    region: Region = None
 
 
 class Complexes(_Si):
     """Complex values one by one (``complexListType``)."""
 
-    label: Label = None
+    label: str | None = None
     time: Time = None
-    unit: Annotated[str | None, Child("listUnit", STRING)] = None
-    phase_unit: Annotated[str | None, Child("listUnitPhase", STRING)] = None
+    unit: Annotated[str | None, Child("listUnit")] = None
+    phase_unit: Annotated[str | None, Child("listUnitPhase")] = None
     uncertainty: Annotated[Bivariate | None, Child("listBivariateUnc")] = None
-    values: Annotated[tuple[Complex, ...], Many("complex")]
-    region: Annotated[
-        EllipsoidalRegion | RectangularRegion | None, Choice(("ellipsoidalRegion", "rectangularRegion"))
-    ] = None
+    values: Annotated[tuple[Complex, ...], Child("complex")]
+    region: Region = None
 
 
 class Lists(_Si):
     """Lists of lists (``listType`` of D-SI)."""
 
-    label: Label = None
+    label: str | None = None
     time: Time = None
-    lists: Annotated[tuple[Reals | Complexes | Lists, ...], Choice(("realList", "complexList", "list"), many=True)]
+    lists: Annotated[tuple[Reals | Complexes | Lists, ...], Child(("realList", "complexList", "list"))]
 
 
 class Hybrid(_Si):
@@ -283,5 +238,5 @@ class Hybrid(_Si):
 
     values: Annotated[
         tuple[Real | Complex | Lists | Reals | RealList | Complexes | Constant, ...],
-        Choice(("real", "complex", "list", "realList", "realListXMLList", "complexList", "constant"), many=True),
+        Child(("real", "complex", "list", "realList", "realListXMLList", "complexList", "constant")),
     ]

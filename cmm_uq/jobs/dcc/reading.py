@@ -1,8 +1,7 @@
-"""What a certificate must keep to beyond the schema: lists of one length, square matrices, dates in order, ids.
+"""A DCC read: every element is of the schema, in its order and of its type; whatever is not is told with line and XPath.
 
-A DCC read: every element is of the schema, in its order and of its type; whatever is not is told with line and XPath.
-
-Of schema 3.2.1 everything is read. Of other versions 3, what they have beyond it is left out; :func:`unread` lists it.
+Beyond the schema: lists of one length, square matrices, dates in order, ids. Of schema 3.2.1 everything is read. Of other
+versions 3, what they have beyond it is left out; :func:`unread` lists it.
 """
 
 from __future__ import annotations
@@ -12,31 +11,19 @@ from types import MappingProxyType
 from typing import Any, cast
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.jobs.dcc.administrative import CoreData, Markup
-from cmm_uq.jobs.dcc.certificate import VERSION, Certificate, Comment
-from cmm_uq.jobs.dcc.fields import (
-    Attribute,
-    Choice,
-    Content,
-    Element,
-    Field,
-    ForeignElements,
-    Many,
-    Simple,
-    by_tag,
-    fields_of,
-)
-from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion, Interval, RealList, RectangularRegion, Region
+from cmm_uq.jobs.dcc.certificate import VERSION, Certificate, Comment, CoreData, Markup
+from cmm_uq.jobs.dcc.fields import Attribute, Child, Content, Element, Field, ForeignElements, Simple, by_tag, fields_of
+from cmm_uq.jobs.dcc.quantities import EllipsoidalRegion, Interval, RealList, RectangularRegion
 from cmm_uq.jobs.dcc.tree import Node, parsed
 
-Problem = tuple[str, str]
-"""What is wrong, and how to mend it."""
+Problem = tuple[str, str]  # what is wrong, and how to mend it
+ROOT = "dcc:digitalCalibrationCertificate"
+_IGNORED = ("xsi:schemaLocation", "xsi:noNamespaceSchemaLocation", "xsi:type")
 
 
 def problems_of(part: Element) -> Iterator[Problem]:
     """What is wrong with a part by itself."""
-    check = _CHECKS.get(type(part))
-    if check is not None:
+    if check := _CHECKS.get(type(part)):
         yield from check(part)
 
 
@@ -44,11 +31,9 @@ def ids_and_references(root: Node) -> Iterator[tuple[Node, Problem]]:
     """Ids that are there twice, and references to what is not there."""
     first: dict[str, Node] = {}
     for node in root.walk():
-        own = node.attributes.get("id") if node.tag.startswith(("dcc:", "si:")) else None
-        if own is not None and own in first:
-            yield node, (f"id {own!r} is that of line {first[own].line} too", "Every id is there once")
-        elif own is not None:
-            first[own] = node
+        name = node.attributes.get("id") if node.tag.startswith(("dcc:", "si:")) else None
+        if name is not None and first.setdefault(name, node) is not node:
+            yield node, (f"id {name!r} is that of line {first[name].line} too", "Every id is there once")
     for node in root.walk():
         for reference in node.attributes.get("refId", "").split() if node.tag.startswith("dcc:") else ():
             if reference not in first:
@@ -57,18 +42,16 @@ def ids_and_references(root: Node) -> Iterator[tuple[Node, Problem]]:
 
 def _list(values: RealList) -> Iterator[Problem]:
     count = len(values.values)
-    lengths: dict[str, int] = {"units": len(values.units), "labels": len(values.labels), "times": len(values.times)}
-    uncertainty: Any = getattr(values.uncertainty, "stated", values.uncertainty)
-    if uncertainty is not None:
-        lengths.update({name: len(getattr(uncertainty, name)) for name in uncertainty.FIELDS})
-    for name, length in lengths.items():
-        if length not in (0, 1, count):
-            yield f"{count} values have {length} {name}", "One for each, or one for all"
+    lists: dict[str, Any] = {"units": values.units, "labels": values.labels, "times": values.times}
+    lists |= getattr(getattr(values.uncertainty, "stated", values.uncertainty), "__dict__", {})
+    for name, entries in lists.items():
+        if len(entries) not in (0, 1, count):
+            yield f"{count} values have {len(entries)} {name}", "One for each, or one for all"
     if values.region is not None and len(values.region.columns) != count:
         yield f"{count} values have a covariance matrix of {len(values.region.columns)}", "A row and a column for each"
 
 
-def _region(region: Region) -> Iterator[Problem]:
+def _region(region: EllipsoidalRegion) -> Iterator[Problem]:
     columns = [[one.value for one in column.covariances] for column in region.columns]
     if any(len(column) != len(columns) for column in columns):
         yield "the covariance matrix is not square", "A row and a column for each value"
@@ -93,20 +76,14 @@ _CHECKS: Mapping[type[Element], Callable[[Any], Iterator[Problem]]] = MappingPro
 })  # fmt: skip
 
 
-ROOT = "dcc:digitalCalibrationCertificate"
-_ANYTHING = (Markup, Comment)
-"""Classes whose children may be of any name."""
-
-_IGNORED = ("xsi:schemaLocation", "xsi:noNamespaceSchemaLocation", "xsi:type")
-
-
 def read(data: bytes, where: str) -> Certificate:
     root = _root(data, where)
     reader = _Reader(where, strict=root.attributes.get("schemaVersion") == VERSION)
-    found = reader.read(root, Certificate)
-    reader.connected(root)
+    certificate = reader.read(root, Certificate)
+    for node, (problem, fix) in ids_and_references(root):
+        reader.wrong(node, problem, fix)
     reader.gathered.refuse()
-    return cast("Certificate", found)
+    return cast("Certificate", certificate)
 
 
 def unread(data: bytes, where: str) -> tuple[str, ...]:
@@ -131,49 +108,46 @@ class _Reader:
 
     def __init__(self, where: str, *, strict: bool) -> None:
         self.where, self.strict = where, strict
-        self.gathered, self.wrong = Gathered(), 0
+        self.gathered, self.problems = Gathered(), 0
         self.unread: list[str] = []
+
+    def wrong(self, node: Node, problem: str, fix: str) -> None:
+        self.problems += 1
+        self.gathered.add(CmmUqError(problem, where=f"{self.where}, line {node.line}, {node.xpath}", fix=fix))
 
     def read(self, node: Node, cls: type[Element]) -> Any:
         """An element as a class; None where something of it is wrong."""
-        fields, before = fields_of(cls), self.wrong
+        fields, before = fields_of(cls), self.problems
         children = self._sorted(node, cls)
         self._attributes(node, fields)
         values = {field.name: self._value(node, field, children[i]) for i, field in enumerate(fields)}
-        if self.wrong > before:
+        if self.problems > before:
             return None
         part = cls(**{name: value for name, value in values.items() if value is not None})
         for problem, fix in problems_of(part):
-            self._wrong(node, problem, fix)
+            self.wrong(node, problem, fix)
         return part
-
-    def connected(self, root: Node) -> None:
-        """Look at what refers to what."""
-        for node, (problem, fix) in ids_and_references(root):
-            self._wrong(node, problem, fix)
 
     def _sorted(self, node: Node, cls: type[Element]) -> list[list[Node]]:
         """Children by the field that they belong to, in the order of the schema."""
         fields, places = fields_of(cls), by_tag(cls)
         rest = next((i for i, field in enumerate(fields) if isinstance(field.place, ForeignElements)), None)
-        found: list[list[Node]] = [[] for _ in fields]
-        last, ordered = -1, not cls.UNORDERED
+        children: list[list[Node]] = [[] for _ in fields]
+        last = -1
         for child in node.children:
             index = places.get(child.tag)
-            if index is None and rest is not None and (cls in _ANYTHING or child.tag == "ds:Signature"):
+            if index is None and (cls in (Markup, Comment) or child.tag == "ds:Signature"):
                 index = rest
             if index is None:
                 self._unknown(child, list(places))
                 continue
-            if ordered and index < last:
-                self._wrong(
-                    child, f"{child.tag} stands behind what has to follow it", "The order is that of the schema"
-                )
+            if index < last and not cls.UNORDERED:
+                self.wrong(child, f"{child.tag} stands behind what has to follow it", "The order is that of the schema")
             last = max(last, index)
-            found[index].append(child)
+            children[index].append(child)
         if node.children and node.text.strip():
-            self._wrong(node, f"{node.tag} has text between its elements", "Elements only")
-        return found
+            self.wrong(node, f"{node.tag} has text between its elements", "Elements only")
+        return children
 
     def _value(self, node: Node, field: Field, children: Sequence[Node]) -> Any:
         """Of one field; None for the default."""
@@ -185,11 +159,17 @@ class _Reader:
             return self._simple(node, place.simple, node.text)
         if isinstance(place, ForeignElements):
             return tuple(children)
-        return self._elements(node, field, list(self._inner(field, children)))
+        elements = list(self._inner(field, place, children))
+        if field.required and not elements and not any(child.tag in field.outer for child in node.children):
+            self.wrong(node, f"{node.tag} has no {' or '.join(field.outer)}", "The schema asks for it")
+        if field.repeated:
+            return tuple(self._element(child, field) for child in elements)
+        self._once(elements)
+        return self._element(elements[0], field) if elements else None
 
-    def _inner(self, field: Field, children: Sequence[Node]) -> Iterator[Node]:
+    def _inner(self, field: Field, place: Child, children: Sequence[Node]) -> Iterator[Node]:
         """The elements of a field, out of the element that they stand in together."""
-        if not (isinstance(field.place, Many) and field.place.within):
+        if not place.within:
             yield from children
             return
         self._once(children)
@@ -200,63 +180,39 @@ class _Reader:
                 else:
                     self._unknown(child, list(field.tags))
             if not any(child.tag in field.tags for child in outer.children):
-                self._wrong(outer, f"{outer.tag} is empty", f"It holds {', '.join(field.tags)}")
-
-    def _elements(self, node: Node, field: Field, children: list[Node]) -> Any:
-        if field.required and not children and self._held(node, field):
-            self._wrong(node, f"{node.tag} has no {' or '.join(field.outer)}", "The schema asks for it")
-        if field.repeated:
-            return tuple(self._one(child, field) for child in children)
-        self._once(children)
-        return self._one(children[0], field) if children else None
-
-    def _held(self, node: Node, field: Field) -> bool:
-        """Whether an empty outer element was not told of already."""
-        return not any(child.tag in field.outer for child in node.children)
+                self.wrong(outer, f"{outer.tag} is empty", f"It holds {', '.join(field.tags)}")
 
     def _once(self, children: Sequence[Node]) -> None:
         if len(children) > 1:
-            self._wrong(children[1], f"{children[1].tag} is there {len(children)} times", "Once, or not at all")
+            self.wrong(children[1], f"{children[1].tag} is there {len(children)} times", "Once, or not at all")
 
-    def _one(self, child: Node, field: Field) -> Any:
-        cls = field.tags[child.tag]
-        if cls is not None:
+    def _element(self, child: Node, field: Field) -> Any:
+        if (cls := field.tags[child.tag]) is not None:
             return self.read(child, cls)
         for inner in child.children:
             self._unknown(inner, [])
-        place = field.place
-        simple = None if isinstance(place, ForeignElements | Choice | Content) else place.simple
-        return None if simple is None else self._simple(child, simple, child.text)
+        return None if field.simple is None else self._simple(child, field.simple, child.text)
 
     def _simple(self, node: Node, simple: Simple, text: str, which: str = "") -> Any:
         try:
             return simple.read(text)
         except (ValueError, KeyError, OverflowError):
-            self._wrong(node, f"{which or node.tag} {text[:60]!r} is not {simple.what}", "As the schema has it")
+            self.wrong(node, f"{which or node.tag} {text[:60]!r} is not {simple.what}", "As the schema has it")
             return None
 
     def _attributes(self, node: Node, fields: Sequence[Field]) -> None:
         known = [field.place.tag for field in fields if isinstance(field.place, Attribute)]
-        for name in node.attributes:
-            if name in known or name in _IGNORED:
-                continue
+        for name in [name for name in node.attributes if name not in (*known, *_IGNORED)]:
             if self.strict:
-                self._wrong(
-                    node, f"{node.tag} has no attribute {name}", suggestion(name, known) if known else "Take it out"
-                )
+                fix = suggestion(name, known) if known else "Take it out"
+                self.wrong(node, f"{node.tag} has no attribute {name}", fix)
             else:
                 self.unread.append(f"{node.xpath}/@{name}")
-        for field in fields:
-            place = field.place
-            if isinstance(place, Attribute) and place.tag == "schemaVersion" and place.tag not in node.attributes:
-                self._wrong(node, f"{node.tag} has no attribute {place.tag}", "The schema asks for it")
+        if "schemaVersion" in known and "schemaVersion" not in node.attributes:
+            self.wrong(node, f"{node.tag} has no attribute schemaVersion", "The schema asks for it")
 
     def _unknown(self, node: Node, known: list[str]) -> None:
         if self.strict or not known:
-            self._wrong(node, f"{node.tag} has no place here", suggestion(node.tag, known) if known else "Text only")
+            self.wrong(node, f"{node.tag} has no place here", suggestion(node.tag, known) if known else "Text only")
         else:
             self.unread.append(node.xpath)
-
-    def _wrong(self, node: Node, problem: str, fix: str) -> None:
-        self.wrong += 1
-        self.gathered.add(CmmUqError(problem, where=f"{self.where}, line {node.line}, {node.xpath}", fix=fix))

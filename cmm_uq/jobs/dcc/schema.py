@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.dcc.tree import parsed
+from cmm_uq.jobs.dcc.tree import NAMESPACES, parsed
 
-_MOST = 20
-"""Problems that are told."""
-
+_MOST = 20  # problems that are told
 _IMPORT = re.compile(r'namespace="([^"]+)"\s+schemaLocation="([^"]+)"')
 
 
@@ -26,17 +25,14 @@ def checked_by_schema(data: bytes, folder: Path, where: str) -> None:
     schema = _schema(folder, version, where)
     import defusedxml.ElementTree
 
-    root = defusedxml.ElementTree.fromstring(data)
-    errors = [error for error, _ in zip(schema.iter_errors(root), range(_MOST), strict=False)]
+    root, fix = defusedxml.ElementTree.fromstring(data), f"The schema of DCC {version} asks for it"
+    errors = [
+        CmmUqError(str(error.reason), where=f"{where}, {error.path}", fix=fix)
+        for error in islice(schema.iter_errors(root), _MOST)
+    ]
     if errors:
-        found = [
-            CmmUqError(
-                str(error.reason), where=f"{where}, {error.path}", fix=f"The schema of DCC {version} asks for it"
-            )
-            for error in errors
-        ]
-        found[0].also = tuple(found[1:])
-        raise found[0]
+        errors[0].also = tuple(errors[1:])
+        raise errors[0]
 
 
 @cache
@@ -44,50 +40,34 @@ def _schema(folder: Path, version: str, where: str) -> Any:
     try:
         import xmlschema
     except ImportError:
-        raise CmmUqError(
-            "the package xmlschema is not installed",
-            where="--schema",
-            fix="pip install xmlschema, or leave --schema out",
-        ) from None
+        fix = "pip install xmlschema, or leave --schema out"
+        raise CmmUqError("the package xmlschema is not installed", where="--schema", fix=fix) from None
     file = folder / f"dcc-{version}.xsd"
     if not re.fullmatch(r"3\.\d+\.\d+", version) or not file.is_file():
-        raise CmmUqError(
-            f"no schema of DCC {version}", where=str(file), fix=f"Put PTB's dcc.xsd there; {where} is of that version"
-        )
-    places = {**_beside(folder), "http://www.w3.org/2000/09/xmldsig#": _dsig(xmlschema)}
+        fix = f"Put PTB's dcc.xsd there; {where} is of that version"
+        raise CmmUqError(f"no schema of DCC {version}", where=str(file), fix=fix)
+    # the newest schema of D-SI in the folder, and the schema of XML signatures that the xmlschema package has
+    places = {NAMESPACES["si"]: max(folder.glob("SI_Format-*.xsd"), default=None)}
+    places[NAMESPACES["ds"]] = Path(xmlschema.__file__).parent / "schemas" / "DSIG" / "xmldsig-core-schema.xsd"
     text = file.read_text(encoding="utf-8")
     for space, location in _IMPORT.findall(text):
-        wanted = _of_version(folder, space, location) or places.get(space)
-        if wanted is None:
-            raise CmmUqError(
-                f"imports {location}, which is not beside it", where=str(file), fix="Put it into the same folder"
-            )
-        text = text.replace(f'"{location}"', f'"{Path(wanted).as_uri()}"')
+        schema = _of_version(folder, space, location) or places.get(space)
+        if schema is None:
+            fix = "Put it into the same folder"
+            raise CmmUqError(f"imports {location}, which is not beside it", where=str(file), fix=fix)
+        text = text.replace(f'"{location}"', f'"{schema.as_uri()}"')
     beside = {"http://qudt.org/vocab/": str(folder / "qudt.xsd")} if (folder / "qudt.xsd").is_file() else None
     try:
         return xmlschema.XMLSchema(text, base_url=str(folder), locations=beside, allow="local", defuse="always")
     except xmlschema.XMLSchemaException as error:
-        problem = str(error).strip().partition("\n")[0]
-        raise CmmUqError(
-            f"cannot be used: {problem}", where=str(file), fix="What it imports has to be in the same folder"
-        ) from None
-
-
-def _beside(folder: Path) -> dict[str, Path]:
-    """The newest schema of D-SI in the folder."""
-    found = sorted(folder.glob("SI_Format-*.xsd"))
-    return {"https://ptb.de/si": found[-1]} if found else {}
+        problem, fix = str(error).strip().partition("\n")[0], "What it imports has to be in the same folder"
+        raise CmmUqError(f"cannot be used: {problem}", where=str(file), fix=fix) from None
 
 
 def _of_version(folder: Path, space: str, location: str) -> Path | None:
     """The file of an imported schema by the version in its address."""
     version = re.search(r"v(\d+\.\d+\.\d+)", location)
-    if space != "https://ptb.de/si" or version is None:
+    if space != NAMESPACES["si"] or version is None:
         return None
     file = folder / f"SI_Format-{version[1]}.xsd"
     return file if file.is_file() else None
-
-
-def _dsig(xmlschema: Any) -> Path:
-    """The schema of XML signatures that the xmlschema package has."""
-    return Path(xmlschema.__file__).parent / "schemas" / "DSIG" / "xmldsig-core-schema.xsd"

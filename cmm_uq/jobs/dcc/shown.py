@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from typing import Any
 
 from cmm_uq.base.units import UNITS
-from cmm_uq.jobs.dcc.administrative import Contact, Hash, IdentificationNumber, Somebody, Words
-from cmm_uq.jobs.dcc.certificate import Certificate, Measurement, StatementMetadata
+from cmm_uq.jobs.dcc import certificate as dcc
+from cmm_uq.jobs.dcc.certificate import Certificate, Hash, Measurement, StatementMetadata
 from cmm_uq.jobs.dcc.figures import QuantityFigures, ValueUncertainty, figures, of_data, statements
 
 _SYMBOLS = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
@@ -28,18 +27,14 @@ class Grid:
 
 @dataclass(frozen=True)
 class CertificateView:
-    """A certificate for a person.
-
-    rows : particulars.
-    parts : title, rows and tables of each measurement.
-    """
+    """A certificate for a person: particulars; title, rows and tables of each measurement."""
 
     rows: Rows
     parts: tuple[tuple[str, Rows, tuple[Grid, ...]], ...]
 
 
 def shown(certificate: Certificate) -> CertificateView:
-    return CertificateView(_particulars(certificate), tuple(_measured(one) for one in certificate.measurements))
+    return CertificateView(_particulars(certificate), tuple(map(_measured, certificate.measurements)))
 
 
 def unit_shown(dsi: str) -> str:
@@ -55,119 +50,118 @@ def data(certificate: Certificate) -> dict[str, Any]:
         "issued": None if core.issued is None else core.issued.isoformat(),
         "performed": [core.begin.isoformat(), core.end.isoformat()],
         "laboratory": str(laboratory.contact.name), "customer": str(certificate.administrative.customer.name),
-        "particulars": [list(row) for row in _particulars(certificate)],
-        "signed": bool(certificate.signatures),
-        "quantities": [_quantity(one) for one in figures(certificate)],
+        "particulars": [list(row) for row in _particulars(certificate)], "signed": bool(certificate.signatures),
+        "quantities": [_quantity(quantity) for quantity in figures(certificate)],
         "statements": [
-            {"measurement": str(measurement.name), "rows": [list(row) for row in _conformity(measurement)]}
-            for measurement in certificate.measurements if _conformity(measurement)
+            {"measurement": str(measurement.name), "rows": [list(row) for row in rows]}
+            for measurement in certificate.measurements if (rows := _conformity(measurement))
         ],
     }  # fmt: skip
 
 
-def _quantity(one: QuantityFigures) -> dict[str, Any]:
-    covariance = None if one.covariance is None else {
-        "matrix": [[_text(value) for value in row] for row in one.covariance[0]], "unit": one.covariance[1],
-    }  # fmt: skip
+def _quantity(quantity: QuantityFigures) -> dict[str, Any]:
+    stated, covariance = quantity.uncertainties, None
+    if quantity.covariance is not None:
+        matrix, unit = quantity.covariance
+        covariance = {"matrix": [[str(value) for value in row] for row in matrix], "unit": unit}
     return {
-        "place": list(one.place), "name": one.name, "ref_types": list(one.ref_types), "words": list(one.words),
-        "values": [_text(value) for value in one.values], "units": list(one.units),
-        "U": [_text(stated.expanded) for stated in one.uncertainties],
-        "k": [_text(stated.factor) for stated in one.uncertainties],
-        "p": [_text(stated.probability) for stated in one.uncertainties],
-        "u": [None if stated.u is None else float(stated.u) for stated in one.uncertainties],
-        "interval": [[_text(s.low), _text(s.high)] if s.low is not None else None for s in one.uncertainties],
+        "place": list(quantity.place), "name": quantity.name, "ref_types": list(quantity.ref_types),
+        "words": list(quantity.words), "values": [str(value) for value in quantity.values], "units": list(quantity.units),
+        "U": [_text(one.expanded) or None for one in stated], "k": [_text(one.factor) or None for one in stated],
+        "p": [_text(one.probability) or None for one in stated],
+        "u": [None if one.u is None else float(one.u) for one in stated],
+        "interval": [None if one.low is None else [str(one.low), _text(one.high) or None] for one in stated],
         "covariance": covariance,
     }  # fmt: skip
 
 
-def _text(value: Decimal | None) -> str | None:
-    return None if value is None else str(value)
+def _text(value: object | None) -> str:
+    return "" if value is None else str(value)
+
+
+def _joined(*parts: object | None, by: str = ", ") -> str:
+    """What there is of the parts."""
+    return by.join(filter(None, map(_text, parts)))
+
+
+def _rows(*rows: tuple[str, str]) -> Rows:
+    return tuple((label, text) for label, text in rows if text)
 
 
 def _particulars(certificate: Certificate) -> Rows:
-    own = certificate.administrative
-    core, dates = own.core, (own.core.begin, own.core.end)
-    performed = dates[0].isoformat() if dates[0] == dates[1] else f"{dates[0]} to {dates[1]}"
-    replaced = "" if core.replaced is None else f"{core.replaced.identifier} ({core.replaced.change})"
-    signed = f"{len(certificate.signatures)} (not verified here)" if certificate.signatures else "none in the file"
-    items = [_item(str(item.name), item.model, item.identifications, item.manufacturer) for item in own.items.items]
-    return _given((
-        ("Certificate", core.identifier), ("Schema", f"DCC {certificate.version}"), ("Replaces", replaced),
-        ("Previous report", _hashed(core.previous)), ("Laboratory", _contact(own.laboratory.contact)),
-        ("Laboratory code", own.laboratory.code or ""), ("Customer", _contact(own.customer)),
-        *(("Item", item) for item in items), ("Received", "" if core.received is None else core.received.isoformat()),
-        ("Calibrated", performed), ("Issued", "" if core.issued is None else core.issued.isoformat()),
-        ("Place", core.location.place), ("Languages", ", ".join(core.languages)),
-        *(("Responsible", " ".join(filter(None, (str(one.person.name), one.role)))) for one in own.persons),
-        *(("Statement", _statement(one)) for one in own.statements),
-        ("Software", ", ".join(f"{one.name} {one.release}" for one in own.software)), ("Signatures", signed),
-    ))  # fmt: skip
+    administrative = certificate.administrative
+    core, signed = administrative.core, "none in the file"
+    if certificate.signatures:
+        signed = f"{len(certificate.signatures)} (not verified here)"
+    performed = _text(core.begin) if core.begin == core.end else f"{core.begin} to {core.end}"
+    return _rows(
+        ("Certificate", core.identifier), ("Schema", f"DCC {certificate.version}"),
+        ("Replaces", "" if core.replaced is None else f"{core.replaced.identifier} ({core.replaced.change})"),
+        ("Previous report", _hashed(core.previous)), ("Laboratory", _contact(administrative.laboratory.contact)),
+        ("Laboratory code", administrative.laboratory.code or ""), ("Customer", _contact(administrative.customer)),
+        *(("Item", _item(item)) for item in administrative.items.items), ("Received", _text(core.received)),
+        ("Calibrated", performed), ("Issued", _text(core.issued)), ("Place", core.location.place),
+        ("Languages", ", ".join(core.languages)),
+        *(("Responsible", _joined(person.person.name, person.role, by=" ")) for person in administrative.persons),
+        *(("Statement", _statement(statement)) for statement in administrative.statements),
+        ("Software", ", ".join(f"{program.name} {program.release}" for program in administrative.software)),
+        ("Signatures", signed),
+    )  # fmt: skip
 
 
 def _measured(measurement: Measurement) -> tuple[str, Rows, tuple[Grid, ...]]:
     equipment = () if measurement.equipment is None else measurement.equipment.equipment
-    rows = _given((
-        *(("Method", ", ".join(filter(None, (str(one.name), *one.norms, *one.references)))) for one in measurement.methods),
-        *(("Equipment", _equipment(str(one.name), one.model, one.identifications, one.certificate)) for one in equipment),
-        *(("Condition", _condition(str(one.name), [*of_data(one.data, ())])) for one in measurement.conditions),
+    rows = _rows(
+        *(("Method", _joined(method.name, *method.norms, *method.references)) for method in measurement.methods),
+        *(("Equipment", _equipment(piece)) for piece in equipment),
+        *(("Condition", f"{each.name}: {_sentence(of_data(each.data, ()))}") for each in measurement.conditions),
         *_conformity(measurement),
-    ))  # fmt: skip
+    )
     grids = tuple(_grid(str(result.name), [*of_data(result.data, ())]) for result in measurement.results)
     return str(measurement.name), rows, grids
 
 
-def _grid(title: str, found: Sequence[QuantityFigures]) -> Grid:
+def _grid(title: str, quantities: Sequence[QuantityFigures]) -> Grid:
     """Lists side by side, one that has fewer values in the first rows only; quantities of one value each below each other."""
-    if len(found) > 1 and all(len(one.values) <= 1 for one in found):
-        return _below_each_other(title, found)
-    columns = [column for one in found for column in _columns(one)]
+    if len(quantities) > 1 and all(len(quantity.values) <= 1 for quantity in quantities):
+        return _below_each_other(title, quantities)
+    columns = [column for quantity in quantities for column in _columns(quantity)]
     count = max((len(cells) for _, cells in columns), default=0)
     rows = tuple(tuple(cells[i] if i < len(cells) else "" for _, cells in columns) for i in range(count))
     return Grid(title, tuple(heading for heading, _ in columns), rows)
 
 
-def _below_each_other(title: str, found: Sequence[QuantityFigures]) -> Grid:
+def _below_each_other(title: str, quantities: Sequence[QuantityFigures]) -> Grid:
     rows = [("Quantity", "Value", "Unit", "U", "k", "u", "Interval")]
-    for one in found:
-        name = " / ".join(filter(None, (*one.place, one.name)))
-        for value, unit, stated in zip(one.values, one.units, one.uncertainties, strict=True):
-            told = (
-                _text(stated.expanded) or "",
-                _text(stated.factor) or "",
-                _text(stated.standard) or "",
-                _interval(stated),
-            )
-            rows.append((name, str(value), unit_shown(unit), *told))
-        if not one.values:
-            rows.append((name, " ".join(one.words), "", "", "", "", ""))
-    kept = [i for i in range(len(rows[0])) if any(row[i] for row in rows[1:])]
-    head, *rest = (tuple(row[i] for i in kept) for row in rows)
+    for quantity in quantities:
+        for value, unit, stated in zip(quantity.values, quantity.units, quantity.uncertainties, strict=True):
+            U, k, u = _text(stated.expanded), _text(stated.factor), _text(stated.standard)
+            rows.append((quantity.shown, str(value), unit_shown(unit), U, k, u, _interval(stated)))
+        if not quantity.values:
+            rows.append((quantity.shown, " ".join(quantity.words), "", "", "", "", ""))
+    used = [i for i in range(len(rows[0])) if any(row[i] for row in rows[1:])]
+    head, *rest = (tuple(row[i] for i in used) for row in rows)
     return Grid(title, head, tuple(rest))
 
 
-def _columns(one: QuantityFigures) -> list[tuple[str, list[str]]]:
+def _columns(quantity: QuantityFigures) -> list[tuple[str, list[str]]]:
     """Of one quantity: labels, values, U with k, and u where it is given by itself."""
-    name = " / ".join(filter(None, (*one.place, one.name)))
-    if not one.values:
-        return [(name, list(one.words))]
-    common = one.units[0] if len(set(one.units)) == 1 else None
-    unit = f" / {unit_shown(common)}" if common and unit_shown(common) else ""
-    values = [_with_unit(value, given, common) for value, given in zip(one.values, one.units, strict=True)]
-    columns = [(f"{name}{unit}", values)]
-    columns = [(f"{name}: label", list(one.labels)), *columns] if one.labels else columns
-    stated = one.uncertainties
-    for heading, cells in (
-        ("U", [_text(each.expanded) or "" for each in stated]), ("k", [_text(each.factor) or "" for each in stated]),
-        ("u", [_text(each.standard) or "" for each in stated]), ("interval", [_interval(each) for each in stated]),
-    ):  # fmt: skip
-        if any(cells):
-            columns.append((f"{heading}{unit}" if heading != "k" else heading, cells))
-    return columns
-
-
-def _with_unit(value: Decimal, unit: str, common: str | None) -> str:
-    return str(value) if common is not None else f"{value} {unit_shown(unit)}".rstrip()
+    if not quantity.values:
+        return [(quantity.shown, list(quantity.words))]
+    unit, values = "", [str(value) for value in quantity.values]
+    if len(set(quantity.units)) != 1:
+        values = [f"{v} {unit_shown(own)}".rstrip() for v, own in zip(values, quantity.units, strict=True)]
+    elif quantity.units[0] and unit_shown(quantity.units[0]):
+        unit = f" / {unit_shown(quantity.units[0])}"
+    stated = quantity.uncertainties
+    further = [
+        (f"U{unit}", [_text(one.expanded) for one in stated]),
+        ("k", [_text(one.factor) for one in stated]),
+        (f"u{unit}", [_text(one.standard) for one in stated]),
+        (f"interval{unit}", [_interval(one) for one in stated]),
+    ]
+    labels = [(f"{quantity.shown}: label", list(quantity.labels))] if quantity.labels else []
+    return [*labels, (f"{quantity.shown}{unit}", values), *(column for column in further if any(column[1]))]
 
 
 def _interval(stated: ValueUncertainty) -> str:
@@ -175,73 +169,52 @@ def _interval(stated: ValueUncertainty) -> str:
 
 
 def _conformity(measurement: Measurement) -> Rows:
-    return _given(("Statement", _statement(one)) for one in statements(measurement))
+    return _rows(*(("Statement", _statement(statement)) for statement in statements(measurement)))
 
 
-def _statement(one: StatementMetadata) -> str:
-    verdicts = filter(None, (one.conformity, *one.conformity_list))
-    said = (
-        _words(one.name), *one.norms, *one.references, one.convention, *(f"conformity: {word}" for word in verdicts),
-        "" if one.declaration is None else str(one.declaration), "" if one.description is None else str(one.description),
-        "" if one.date is None else one.date.isoformat(), one.period,
-        "" if one.data is None else _figures_told([*of_data(one.data, ())]),
-    )  # fmt: skip
-    return "; ".join(filter(None, said))
+def _statement(statement: StatementMetadata) -> str:
+    decisions = (f"conformity: {word}" for word in (statement.conformity, *statement.conformity_list) if word)
+    return _joined(
+        *(statement.name, *statement.norms, *statement.references, statement.convention, *decisions),
+        *(statement.declaration, statement.description, statement.date, statement.period),
+        None if statement.data is None else _sentence(of_data(statement.data, ())),
+        by="; ",
+    )
 
 
-def _condition(name: str, found: Sequence[QuantityFigures]) -> str:
-    return f"{name}: {_figures_told(found)}"
-
-
-def _figures_told(found: Sequence[QuantityFigures]) -> str:
-    """Each quantity with its name, as a sentence."""
+def _sentence(quantities: Iterable[QuantityFigures]) -> str:
+    """Each quantity with its name."""
     return "; ".join(
-        " ".join(filter(None, (one.name, ", ".join(_value(one, i) for i in range(len(one.values))), *one.words)))
-        for one in found
+        _joined(one.name, ", ".join(_value(one, i) for i in range(len(one.values))), *one.words, by=" ")
+        for one in quantities
     )
 
 
-def _value(one: QuantityFigures, i: int) -> str:
-    stated, unit = one.uncertainties[i], unit_shown(one.units[i])
+def _value(quantity: QuantityFigures, i: int) -> str:
+    stated, unit = quantity.uncertainties[i], unit_shown(quantity.units[i])
     U = "" if stated.expanded is None else f", U = {stated.expanded} (k = {stated.factor})"
-    return f"{one.values[i]} {unit}".rstrip() + U
+    return f"{quantity.values[i]} {unit}".rstrip() + U
 
 
-def _item(
-    name: str, model: str | None, identifications: Iterable[IdentificationNumber], maker: Contact | Somebody | None
-) -> str:
-    return ", ".join(
-        filter(None, (name, "" if maker is None else str(maker.name), model, *_identified(identifications)))
-    )
+def _item(item: dcc.Item) -> str:
+    maker = item.manufacturer and item.manufacturer.name
+    return _joined(item.name, maker, item.model, *_identified(item.identifications))
 
 
-def _equipment(
-    name: str, model: str | None, identifications: Iterable[IdentificationNumber], chain: Hash | None
-) -> str:
-    certificate = "" if chain is None else f"certificate {_hashed(chain)}"
-    return ", ".join(filter(None, (name, model, *_identified(identifications), certificate)))
+def _equipment(piece: dcc.Equipment) -> str:
+    certificate = piece.certificate and f"certificate {_hashed(piece.certificate)}"
+    return _joined(piece.name, piece.model, *_identified(piece.identifications), certificate)
 
 
-def _identified(identifications: Iterable[IdentificationNumber]) -> list[str]:
-    return [f"{_words(one.name) or one.issuer} {one.value}" for one in identifications]
+def _identified(identifications: Iterable[dcc.IdentificationNumber]) -> list[str]:
+    return [f"{_text(number.name) or number.issuer} {number.value}" for number in identifications]
 
 
 def _hashed(chain: Hash | None) -> str:
     return "" if chain is None else f"{chain.referral_id} ({chain.procedure} {chain.value})"
 
 
-def _contact(contact: Contact) -> str:
+def _contact(contact: dcc.Contact) -> str:
     place = contact.location
-    where = () if place is None else (
-        *(" ".join(pair) for pair in zip(place.street, place.street_number, strict=False)),
-        " ".join((*place.post_code, *place.city)), *place.country,
-    )  # fmt: skip
-    return ", ".join(filter(None, (str(contact.name), *where)))
-
-
-def _words(words: Words | None) -> str:
-    return "" if words is None else str(words)
-
-
-def _given(rows: Iterable[tuple[str, str]]) -> Rows:
-    return tuple((label, text) for label, text in rows if text)
+    streets = (" ".join(pair) for pair in zip(place.street, place.street_number, strict=False))
+    return _joined(contact.name, *streets, " ".join((*place.post_code, *place.city)), *place.country)

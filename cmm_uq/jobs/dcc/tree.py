@@ -13,27 +13,18 @@ from xml.parsers import expat
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.limits import DCC_BYTES, XML_ATTRIBUTES, XML_DEPTH, XML_ELEMENTS
 
-NAMESPACES: Mapping[str, str] = {
+NAMESPACES: Mapping[str, str] = {  # by prefix
     "dcc": "https://ptb.de/dcc",
     "si": "https://ptb.de/si",
     "ds": "http://www.w3.org/2000/09/xmldsig#",
     "xsi": "http://www.w3.org/2001/XMLSchema-instance",
 }
-"""By prefix."""
-
 _PREFIXES = {uri: prefix for prefix, uri in NAMESPACES.items()}
-_ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that no XML 1.0 can hold."""
+_ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that no XML 1.0 can hold
 
 
 class Node:
-    """An element.
-
-    tag : its name, ``prefix:name``.
-    attributes : by name.
-    line : of its start; 0 where it was not read.
-    parent : that it stands in.
-    """
+    """An element, ``prefix:name``, with the line of its start, 0 where it was not read."""
 
     __slots__ = ("attributes", "children", "line", "parent", "tag", "text")
 
@@ -67,38 +58,35 @@ class Node:
 def parsed(data: bytes, where: str) -> Node:
     if len(data) > DCC_BYTES.most:
         raise CmmUqError(f"is larger than {DCC_BYTES.most} {DCC_BYTES.unit}", where=where, fix="Is it the right file?")
-    grown = _Growing(where)
+    tree = _Tree(where)
     try:
-        grown.parser.Parse(data, True)
+        tree.parser.Parse(data, True)
     except expat.ExpatError as error:
-        what = expat.errors.messages[error.code]
-        raise CmmUqError(f"is no XML: {what}", where=f"{where}, line {error.lineno}", fix="Ask for it again") from None
+        problem, where = expat.errors.messages[error.code], f"{where}, line {error.lineno}"
+        raise CmmUqError(f"is no XML: {problem}", where=where, fix="Ask for it again") from None
     except (ValueError, LookupError) as error:
         raise CmmUqError(f"is no XML: {error}", where=where, fix="Ask for it again") from None
-    return grown.root
+    return tree.root
 
 
-class _Growing:
+class _Tree:
     """The tree while it is read."""
 
     def __init__(self, where: str) -> None:
-        self.where, self.count, self.depth = where, 0, 0
+        self.where, self.count = where, 0
         self.open: list[Node] = []
         self.root = Node("", {})
         self.parser = parser = expat.ParserCreate(namespace_separator=" ")
         parser.buffer_text = True
-        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
+        parser.StartElementHandler, parser.EndElementHandler = self._start, lambda _: self.open.pop()
         parser.CharacterDataHandler = self._text
         parser.StartDoctypeDeclHandler = self._doctype
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         self.count += 1
-        for found, limit in (
-            (self.count, XML_ELEMENTS),
-            (len(self.open), XML_DEPTH),
-            (len(attributes), XML_ATTRIBUTES),
-        ):
-            if found > limit.most:
+        limits = ((self.count, XML_ELEMENTS), (len(self.open), XML_DEPTH), (len(attributes), XML_ATTRIBUTES))
+        for count, limit in limits:
+            if count > limit.most:
                 self._refuse(f"has more than {limit.most} {limit.unit}")
         parent = self.open[-1] if self.open else None
         named = {_named(key): value for key, value in attributes.items()}
@@ -109,12 +97,8 @@ class _Growing:
             parent.children.append(node)
         self.open.append(node)
 
-    def _end(self, name: str) -> None:
-        self.open.pop()
-
     def _text(self, text: str) -> None:
-        node = self.open[-1]
-        node.text = node.text + text if node.text else text
+        self.open[-1].text += text
 
     def _doctype(self, *declared: object) -> None:
         self._refuse("has a document type (DOCTYPE), which can pull in other files")
@@ -134,28 +118,26 @@ def _named(name: str) -> str:
 def serialised(root: Node) -> bytes:
     """A file of a tree: UTF-8, two spaces a level, the same bytes for the same tree."""
     declared = {f"xmlns:{prefix}": uri for prefix, uri in NAMESPACES.items() if prefix != "ds"}
-    parts = ['<?xml version="1.0" encoding="UTF-8"?>\n']
-    _write(root, declared, "", parts)
+    parts = ['<?xml version="1.0" encoding="UTF-8"?>\n', *_lines(root, declared, "")]
     return "".join(parts).encode()
 
 
-def _write(node: Node, declared: Mapping[str, str], indent: str, parts: list[str]) -> None:
+def _lines(node: Node, declared: Mapping[str, str], indent: str) -> Iterator[str]:
     tag, further = _spelled(node.tag)
-    attributes = "".join(f' {key}="{_quoted(value)}"' for key, value in {**declared, **further}.items())
+    attributes = [*{**declared, **further}.items()]
     for key, value in node.attributes.items():
         name, more = _spelled(key, "a")
-        attributes += "".join(f' {k}="{_quoted(v)}"' for k, v in more.items()) + f' {name}="{_quoted(value)}"'
-    if node.children:
-        parts.append(f"{indent}<{tag}{attributes}>\n")
-        if node.text.strip():
-            parts.append(_escaped(node.text.strip()) + "\n")
-        for child in node.children:
-            _write(child, {}, indent + "  ", parts)
-        parts.append(f"{indent}</{tag}>\n")
-    elif node.text:
-        parts.append(f"{indent}<{tag}{attributes}>{_escaped(node.text)}</{tag}>\n")
-    else:
-        parts.append(f"{indent}<{tag}{attributes}/>\n")
+        attributes += [*more.items(), (name, value)]
+    start = f"{indent}<{tag}" + "".join(f' {key}="{_quoted(value)}"' for key, value in attributes)
+    if not node.children:
+        yield f"{start}>{_escaped(node.text)}</{tag}>\n" if node.text else f"{start}/>\n"
+        return
+    yield f"{start}>\n"
+    if node.text.strip():
+        yield _escaped(node.text.strip()) + "\n"
+    for child in node.children:
+        yield from _lines(child, {}, indent + "  ")
+    yield f"{indent}</{tag}>\n"
 
 
 def _spelled(name: str, prefix: str = "o") -> tuple[str, dict[str, str]]:
@@ -168,11 +150,9 @@ def _spelled(name: str, prefix: str = "o") -> tuple[str, dict[str, str]]:
 
 
 def _escaped(text: str) -> str:
-    found = _ILLEGAL.search(text)
-    if found:
-        raise CmmUqError(
-            f"{found[0]!r} is a character that XML cannot hold", fix="Take it out of the text it stands in"
-        )
+    if illegal := _ILLEGAL.search(text):
+        problem = f"{illegal[0]!r} is a character that XML cannot hold"
+        raise CmmUqError(problem, fix="Take it out of the text it stands in")
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\r", "&#13;")
 
 

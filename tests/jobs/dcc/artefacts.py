@@ -7,8 +7,17 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 from cmm_uq.jobs.dcc import Certificate, written
-from cmm_uq.jobs.dcc.administrative import Person, Somebody, words
-from cmm_uq.jobs.dcc.certificate import Data, DccQuantity, DccResult, Measurement, QuantityList, StatementMetadata
+from cmm_uq.jobs.dcc.certificate import (
+    Data,
+    DccQuantity,
+    DccResult,
+    Measurement,
+    Person,
+    QuantityList,
+    Somebody,
+    StatementMetadata,
+    words,
+)
 from cmm_uq.jobs.dcc.quantities import (
     CovarianceColumn,
     CovarianceElement,

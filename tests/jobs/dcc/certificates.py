@@ -6,15 +6,21 @@ import datetime as dt
 from decimal import Decimal
 
 from cmm_uq.jobs.dcc import Certificate
-from cmm_uq.jobs.dcc.administrative import (
+from cmm_uq.jobs.dcc.certificate import (
+    Administrative,
     Attached,
     CalibrationLaboratory,
     Contact,
     CoreData,
+    Data,
+    DccQuantity,
+    DccResult,
     IdentificationNumber,
     Item,
     Items,
     Location,
+    Measurement,
+    Method,
     PerformanceLocation,
     Person,
     Software,
@@ -22,7 +28,6 @@ from cmm_uq.jobs.dcc.administrative import (
     rich,
     words,
 )
-from cmm_uq.jobs.dcc.certificate import Administrative, Data, DccQuantity, DccResult, Measurement, Method
 from cmm_uq.jobs.dcc.quantities import Expanded, Real
 
 LENGTH = Real(

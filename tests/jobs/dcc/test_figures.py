@@ -9,8 +9,7 @@ import lxml.etree
 import pytest
 
 from cmm_uq.jobs.dcc import Certificate, read, written
-from cmm_uq.jobs.dcc.administrative import rich, words
-from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata
+from cmm_uq.jobs.dcc.certificate import DccQuantity, QuantityList, StatementMetadata, rich, words
 from cmm_uq.jobs.dcc.figures import QuantityFigures, figures, statements
 from cmm_uq.jobs.dcc.quantities import (
     Constant,

@@ -17,8 +17,7 @@ from cmm_uq.artefacts import kind_named
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.certificate.sections.traceability import claimed
 from cmm_uq.jobs.dcc import Certificate, written
-from cmm_uq.jobs.dcc.administrative import rich
-from cmm_uq.jobs.dcc.certificate import StatementMetadata
+from cmm_uq.jobs.dcc.certificate import StatementMetadata, rich
 from cmm_uq.jobs.job import Job
 from cmm_uq.machine.model.artefact import Artefact
 from tests.conftest import ROOT
