@@ -1,8 +1,7 @@
 """The digital calibration certificate (DCC) of PTB as typed data, read from XML and written as XML; knows no job."""
 
 from cmm_uq.jobs.dcc.certificate import Certificate
-from cmm_uq.jobs.dcc.reading import read, unread
 from cmm_uq.jobs.dcc.schema import checked_by_schema
-from cmm_uq.jobs.dcc.writing import written
+from cmm_uq.jobs.dcc.xml_file import read, unread, written
 
 __all__ = ["Certificate", "checked_by_schema", "read", "unread", "written"]
