@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from cmm_uq.base.errors import CmmUqError
@@ -15,26 +15,14 @@ LONGEST = 160  # characters of what stands somewhere, as it is shown
 
 @dataclass(frozen=True)
 class VerificationFinding:
-    """Something that is not as it must be.
+    """Something that is not as it must be."""
 
-    ``check`` that found it, one of :data:`CHECKS`; ``file`` that it is in; ``place`` in the file: page, JSON path,
-    XPath, attachment, byte; empty where it is the file as a whole; ``problem`` in words; ``stands``, ``should`` what
-    stands there, and what should; empty where the words say it.
-    """
-
-    check: str
+    check: str  # of CHECKS
     file: str
-    place: str
+    place: str  # page, JSON path, XPath, attachment, byte; empty for the file as a whole
     problem: str
     stands: str = ""
     should: str = ""
-
-    def as_data(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "check": self.check, "file": self.file, "place": self.place or None, "problem": self.problem,
-            "stands": self.stands or None, "should": self.should or None,
-        }  # fmt: skip
 
     def __str__(self) -> str:
         where = ": ".join(filter(None, (self.file, self.place)))
@@ -44,10 +32,7 @@ class VerificationFinding:
 
 @dataclass(frozen=True)
 class Unchecked:
-    """Something that was not checked.
-
-    ``what`` it is; ``why`` not.
-    """
+    """Something that was not checked, and why."""
 
     what: str
     why: str
@@ -56,10 +41,9 @@ class Unchecked:
         return f"{self.what}: {self.why}"
 
 
-AGAIN, NOT_ASKED = "computing again", "not asked for (--no-rerun)"
-"""What is left where the inputs are not computed again, and why where nobody wished it."""
-
-CHECKS = {
+AGAIN = "computing again"
+NOT_ASKED = "not asked for (--no-rerun)"
+CHECKS = {  # what each check makes sure of
     "files": "the files are what cmm-uq writes, with nothing active, hidden or further in them",
     "signatures": "signatures are intact and cover the whole file; whom one must trust for them is trusted, or named above",
     "forms": "PDF, XML, HTML and results.json say the same",
@@ -69,16 +53,11 @@ CHECKS = {
     "dates": "artefacts were in date, and dates are in order",
     "again": "computed again from the inputs, everything is the same",
 }
-"""What each check makes sure of."""
 
 
 @dataclass
 class Inquiry:
-    """A verification under way: what it has found so far.
-
-    ``findings`` what is wrong; ``unchecked`` what could not be looked at; ``notes`` what the reader must know besides;
-    ``done`` how many things each check compared.
-    """
+    """A verification under way; ``done`` how many things each check compared."""
 
     findings: list[VerificationFinding] = field(default_factory=list)
     unchecked: list[Unchecked] = field(default_factory=list)
@@ -87,17 +66,22 @@ class Inquiry:
 
     def wrong(self, check: str, file: str, place: str, problem: str, stands: object = "", should: object = "") -> None:
         """Keep a finding; what stands there is shortened."""
-        self.findings.append(VerificationFinding(check, file, place, problem, shown(stands), shown(should)))
+        self.findings.append(VerificationFinding(check, file, place, problem, _shown(stands), _shown(should)))
 
     def looked(self, check: str, count: int = 1) -> None:
         """Something was compared, and whatever was wrong with it is kept."""
         self.done[check] = self.done.get(check, 0) + count
 
+    def compare(self, check: str, file: str, place: str, problem: str, stands: object, should: object) -> None:
+        """Look at a thing, and keep it where it is not what it should be."""
+        self.looked(check)
+        if stands != should:
+            self.wrong(check, file, place, problem, stands, should)
+
     def left(self, what: str, why: str) -> None:
         """Keep what was not checked, each thing once."""
-        one = Unchecked(what, why)
-        if one not in self.unchecked:
-            self.unchecked.append(one)
+        if (thing := Unchecked(what, why)) not in self.unchecked:
+            self.unchecked.append(thing)
 
     @contextmanager
     def reading(self, check: str, file: str) -> Iterator[None]:
@@ -118,14 +102,14 @@ class Inquiry:
         """For JSON."""
         return {
             "verdict": self.word,
-            "findings": [one.as_data() for one in self.findings],
-            "not_checked": [{"what": one.what, "why": one.why} for one in self.unchecked],
+            "findings": [{key: text or None for key, text in asdict(finding).items()} for finding in self.findings],
+            "not_checked": [asdict(thing) for thing in self.unchecked],
             "notes": self.notes,
             "checked": {name: self.done.get(name, 0) for name in CHECKS},
         }
 
 
-def shown(value: object) -> str:
+def _shown(value: object) -> str:
     """What stands somewhere, short enough for a line."""
     text = value if isinstance(value, str) else "" if value is None else repr(value)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

@@ -7,6 +7,8 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, get_args
 
@@ -20,41 +22,46 @@ from cmm_uq.certificate.verify.found import Inquiry
 from cmm_uq.certificate.verify.html_page import HtmlPage, read_html
 from cmm_uq.certificate.verify.pdf_file import PdfFile, read_pdf
 
+RESULTS, JOB = "results.json", "job.toml"
+RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"
 _FIX = "Ask whoever sent it for the file as cmm-uq wrote it"
+_FIX_OF_GIVEN = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
 
 
 def strict_json(content: bytes, where: str) -> dict[str, Any]:
-    """The object of a JSON file.
+    """The object of a JSON file: each key once, numbers that are numbers, nested within limits."""
 
-    ``content`` the file's bytes.
-    """
+    def refusal(problem: str, where: str = where) -> CmmUqError:
+        return CmmUqError(problem, where=where, fix=_FIX)
+
     if len(content) > JSON_BYTES.most:
-        raise CmmUqError(f"is larger than {JSON_BYTES.most} bytes", where=where, fix=_FIX)
+        raise refusal(f"is larger than {JSON_BYTES.most} bytes")
     text = text_of(content, where, _FIX)
-    _refuse_depth(text, where)
+    if _depth(text) > JSON_DEPTH.most:
+        raise refusal(f"is nested deeper than {JSON_DEPTH.most} levels")
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
+        values = dict(pairs)
+        if len(values) < len(pairs):
             twice = next(key for i, (key, _) in enumerate(pairs) if key in {name for name, _ in pairs[:i]})
-            raise CmmUqError(f"has the key {twice!r} twice", where=where, fix=_FIX)
-        return found
+            raise refusal(f"has the key {twice!r} twice")
+        return values
 
     def numeral(of: type[int | float], text: str) -> Any:
         number = None if len(text) > NUMERAL.most else of(text)
         if number is None or not math.isfinite(number):
-            raise CmmUqError(f"has a number that is none: {text}", where=where, fix=_FIX)
+            raise refusal(f"has a number that is none: {text}")
         return number
 
+    real = partial(numeral, float)
     try:
         data = json.loads(
-            text, object_pairs_hook=once, parse_int=lambda text: numeral(int, text),
-            parse_float=lambda text: numeral(float, text), parse_constant=lambda text: numeral(float, text),
-        )  # fmt: skip
+            text, object_pairs_hook=once, parse_int=partial(numeral, int), parse_float=real, parse_constant=real
+        )
     except json.JSONDecodeError as error:
-        raise CmmUqError(f"is no JSON: {error.msg}", where=f"{where} line {error.lineno}", fix=_FIX) from None
+        raise refusal(f"is no JSON: {error.msg}", f"{where} line {error.lineno}") from None
     if not isinstance(data, dict):
-        raise CmmUqError("holds no JSON object", where=where, fix=_FIX)
+        raise refusal("holds no JSON object")
     return data
 
 
@@ -63,39 +70,31 @@ def canonical(data: Any) -> bytes:
     return (json.dumps(data, indent=2, ensure_ascii=False) + "\n").encode()
 
 
-def _refuse_depth(text: str, where: str) -> None:
-    """Count brackets outside strings, before anything recurses."""
-    depth, quoted, escaped = 0, False, False
+def _depth(text: str) -> int:
+    """Of brackets outside strings, before anything recurses; counted until it is too deep."""
+    depth, deepest, quoted, escaped = 0, 0, False, False
     for c in text:
         if quoted:
-            if escaped:
-                escaped = False
-            elif c == "\\":
-                escaped = True
-            elif c == '"':
-                quoted = False
+            quoted = escaped or c != '"'
+            escaped = not escaped and c == "\\"
         elif c == '"':
             quoted = True
         elif c in "[{":
             depth += 1
-            if depth > JSON_DEPTH.most:
-                raise CmmUqError(f"is nested deeper than {JSON_DEPTH.most} levels", where=where, fix=_FIX)
+            deepest = max(deepest, depth)
+            if deepest > JSON_DEPTH.most:
+                break
         elif c in "]}":
             depth -= 1
-
-
-RESULTS, JOB = "results.json", "job.toml"
-RESULTS_SCHEMA, PART_SCHEMA = "cmm-uq/results/1", "cmm-uq/part/1"
-_FIX_of_given = "Give files that cmm-uq report, diagnose or part wrote, or their folder"
+    return deepest
 
 
 @dataclass
 class Given:
-    """The forms of one certificate.
+    """The forms of one certificate, each with its name, and ``None`` where it is not given.
 
-    ``pdf``, ``html``, ``xml``, ``results`` each with its name; ``None`` where it is not given. ``results`` may be the
-    one inside the PDF; ``digital_inside`` whether the XML is the one inside the PDF; ``page_inside`` the page that the
-    XML carries; ``others`` further files by name: inputs, draws of the posterior; ``manifest`` of a folder.
+    ``results`` may be the one inside the PDF; ``digital_inside`` whether the XML is; ``page_inside`` the page that the XML
+    carries; ``others`` further files by name: inputs, draws of the posterior; ``manifest`` of a folder.
     """
 
     pdf: tuple[str, PdfFile] | None = None
@@ -116,21 +115,17 @@ class Given:
     @property
     def files(self) -> Mapping[str, bytes]:
         """Whatever belongs to the certificate beside its forms, by name: those inside the PDF, else those given."""
-        inside = {} if self.pdf is None else self.pdf[1].files
-        return {**self.others, **inside}
+        return {**self.others, **({} if self.pdf is None else self.pdf[1].files)}
 
 
 def read_given(paths: Iterable[Path]) -> Given:
-    """Files and folders, read within limits.
-
-    ``paths`` of files, or of a report's folder.
-    """
+    """Files, and those of folders, read within limits."""
     read: dict[str, tuple[bytes, str]] = {}
     for name, path in _files(paths):
         if name in read:
             raise CmmUqError(f"there are two files {name!r}, and one certificate is verified at a time", where=str(path),
-                             fix=_FIX_of_given)  # fmt: skip
-        read[name] = content_of(path, PDF_BYTES, _FIX_of_given), str(path)
+                             fix=_FIX_OF_GIVEN)  # fmt: skip
+        read[name] = content_of(path, PDF_BYTES, _FIX_OF_GIVEN), str(path)
     return _given(read)
 
 
@@ -150,8 +145,8 @@ def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
         where = f"{RESULTS} in {given.pdf[0]}"
         given.results = where, strict_json(content, where), content
     if given.results is None and not (given.pdf or given.html or given.xml):
-        told = ", ".join(where for _, where in read.values())
-        raise CmmUqError("nothing given is a certificate", where=told, fix=_FIX_of_given)
+        names = ", ".join(where for _, where in read.values())
+        raise CmmUqError("nothing given is a certificate", where=names, fix=_FIX_OF_GIVEN)
     return given
 
 
@@ -160,82 +155,71 @@ def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
 
     Of folders inside a folder those files are read that its manifest names.
     """
-    found: list[tuple[str, Path]] = []
+    files: list[tuple[str, Path]] = []
     for path in paths:
         if path.is_symlink():
             raise CmmUqError("is a link, which may lead to anything", where=str(path), fix="Give the file itself")
         if not path.is_dir():
-            found.append((path.name, path))
+            files.append((path.name, path))
             continue
         inside = sorted(
-            Path(one.path) for one in os.scandir(path) if not one.name.startswith(".") and not _is_folder(one)
-        )
+            entry.name for entry in os.scandir(path)
+            if not entry.name.startswith(".") and not entry.is_dir(follow_symlinks=False)
+        )  # fmt: skip
         if not inside:
-            raise CmmUqError("holds no files", where=str(path), fix=_FIX_of_given)
-        named = [(one.name, one) for one in inside] + _deeper(path)
-        if linked := next((one for name, one in named if _is_linked(path, name)), None):
-            raise CmmUqError(
-                "is a link, which may lead to anything", where=str(linked), fix="Put the file itself there"
-            )
-        found += named
-    if len(found) > GIVEN.most:
-        raise CmmUqError(f"{len(found)} files are given, and {GIVEN.most} are read at once", where=str(found[0][1].parent),
-                         fix=_FIX_of_given)  # fmt: skip
-    return found
+            raise CmmUqError("holds no files", where=str(path), fix=_FIX_OF_GIVEN)
+        for name in (*inside, *_deeper(path)):
+            steps = [path.joinpath(*name.split("/")[: i + 1]) for i in range(name.count("/") + 1)]
+            if any(step.is_symlink() for step in steps):
+                where = str(path / name)
+                raise CmmUqError("is a link, which may lead to anything", where=where, fix="Put the file itself there")
+            files.append((name, path / name))
+    if len(files) > GIVEN.most:
+        raise CmmUqError(f"{len(files)} files are given, and {GIVEN.most} are read at once", where=str(files[0][1].parent),
+                         fix=_FIX_OF_GIVEN)  # fmt: skip
+    return files
 
 
-def _deeper(folder: Path) -> list[tuple[str, Path]]:
+def _deeper(folder: Path) -> list[str]:
     """Files in folders inside a folder that its manifest names and that are there."""
-    if (folder / MANIFEST).is_symlink() or not (folder / MANIFEST).is_file():
+    path = folder / MANIFEST
+    if path.is_symlink() or not path.is_file():
         return []
-    content = content_of(folder / MANIFEST, PDF_BYTES, _FIX_of_given)
-    manifest = parsed(strict_json(content, str(folder / MANIFEST)))
+    manifest = parsed(strict_json(content_of(path, PDF_BYTES, _FIX_OF_GIVEN), str(path)))
     names = [] if manifest is None else [name for name in manifest.files if "/" in name and plain_name(name)]
-    return [(name, folder / name) for name in sorted(names) if (folder / name).is_file()]
-
-
-def _is_linked(folder: Path, name: str) -> bool:
-    """Whether a file in a folder, or a folder on the way to it, is a link."""
-    parts = name.split("/")
-    return any(folder.joinpath(*parts[: i + 1]).is_symlink() for i in range(len(parts)))
-
-
-def _is_folder(one: os.DirEntry[str]) -> bool:
-    return one.is_dir(follow_symlinks=False)
+    return [name for name in sorted(names) if (folder / name).is_file()]
 
 
 def _sort(given: Given, name: str, content: bytes, where: str) -> None:
     """Put a file where it belongs, by what it begins with."""
+
+    def once(before: object, what: str) -> None:
+        if before is not None:
+            problem = f"is a second {what}, and one certificate is verified at a time"
+            raise CmmUqError(problem, where=where, fix=_FIX_OF_GIVEN)
+
     head = content[:1024].removeprefix(b"\xef\xbb\xbf").lstrip().lower()
+    schemas = (b'"cmm-uq/results/', b'"cmm-uq/part/')
     if "/" in name:
         given.others[name] = content
     elif head.startswith(b"%pdf-") or name.lower().endswith(".pdf"):
-        _once(given.pdf, "PDF", where)
+        once(given.pdf, "PDF")
         given.pdf = name, read_pdf(content, where)
     elif head.startswith((b"<!doctype html", b"<html")) or name.lower().endswith((".html", ".htm")):
-        _once(given.html, "HTML", where)
+        once(given.html, "HTML")
         given.html = name, read_html(content, where), content
     elif head.startswith(b"<") or name.lower().endswith(".xml"):
-        _once(given.xml, "XML", where)
+        once(given.xml, "XML")
         given.xml = name, content
     elif name == MANIFEST:
         given.manifest = parsed(strict_json(content, where))
         if given.manifest is None:
-            raise CmmUqError("is no manifest of cmm-uq", where=where, fix=_FIX_of_given)
-    elif name == RESULTS or (
-        head.startswith(b"{") and any(one in head for one in (b'"cmm-uq/results/', b'"cmm-uq/part/'))
-    ):
-        _once(given.results, RESULTS, where)
+            raise CmmUqError("is no manifest of cmm-uq", where=where, fix=_FIX_OF_GIVEN)
+    elif name == RESULTS or (head.startswith(b"{") and any(schema in head for schema in schemas)):
+        once(given.results, RESULTS)
         given.results = name, strict_json(content, where), content
     else:
         given.others[name] = content
-
-
-def _once(before: object, what: str, where: str) -> None:
-    if before is not None:
-        raise CmmUqError(
-            f"is a second {what}, and one certificate is verified at a time", where=where, fix=_FIX_of_given
-        )
 
 
 def check_files(inquiry: Inquiry, given: Given) -> None:
@@ -258,24 +242,23 @@ def check_files(inquiry: Inquiry, given: Given) -> None:
 def _check_pdf(inquiry: Inquiry, name: str, pdf: PdfFile, *, deeper: bool) -> None:
     """What does not belong in a PDF, and what is wrong with the names of its files, which may lie in folders or not."""
     inquiry.looked("files")
+    wrong = partial(inquiry.wrong, "files", name)
     for place, problem in pdf.problems:
-        inquiry.wrong("files", name, place, problem)
+        wrong(place, problem)
     seen: set[str] = set()
-    for one in pdf.attachments:
-        place = f"attachment {one.name}"
-        if one.name in seen:
-            inquiry.wrong("files", name, place, "is attached twice: readers may show either")
-        seen.add(one.name)
-        if not plain_name(one.name) or ("/" in one.name and not deeper):
-            inquiry.wrong("files", name, place, "has a name that leads out of its folder")
-        should = "Data" if one.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
-        if one.relationship != should:
-            inquiry.wrong("files", name, place, "has another relationship to the document", one.relationship, should)
+    for attachment in pdf.attachments:
+        place = f"attachment {attachment.name}"
+        if attachment.name in seen:
+            wrong(place, "is attached twice: readers may show either")
+        seen.add(attachment.name)
+        if not plain_name(attachment.name) or ("/" in attachment.name and not deeper):
+            wrong(place, "has a name that leads out of its folder")
+        should = "Data" if attachment.name.lower().endswith((".json", ".npz", ".xml")) else "Source"
+        if attachment.relationship != should:
+            wrong(place, "has another relationship to the document", attachment.relationship, should)
 
 
 def _check_manifest(inquiry: Inquiry, given: Given, manifest: Manifest) -> None:
-    from hashlib import sha256
-
     contents = {name: content for name, content in given.contents.items() if name != MANIFEST}
     inquiry.looked("files", len(manifest.files))
     for name, digest in manifest.files.items():
