@@ -7,15 +7,7 @@ from dataclasses import replace
 
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, day, foreign, names, say, signed, without_keys
 from cmm_uq.base.units import unit
-from cmm_uq.certificate.clauses import (
-    DRAFT,
-    NOT_OURS,
-    STATEMENTS,
-    clauses_data,
-    draft,
-    formal_warnings,
-    replaced_certificate,
-)
+from cmm_uq.certificate import clauses
 from cmm_uq.certificate.diagnosis.page import diagnosis_sections
 from cmm_uq.certificate.document import Document, Facts, Overview, Section, Signature, with_each_text
 from cmm_uq.certificate.origin import CERTIFICATE, DIGITAL, came_about, file_name, program
@@ -64,8 +56,7 @@ def conditions(job: Job) -> Facts:
     return Facts(tuple(row for row in rows if row[1]))
 
 
-Row = tuple[Text, str]
-"""What a particular is, and what the job states of it; empty where it states nothing."""
+Row = tuple[Text, str]  # what a particular is, and what the job states of it; empty where it states nothing
 
 
 def certificate_of(
@@ -84,7 +75,7 @@ def certificate_of(
         subject=say("{name}, {came_about} {date}", name=name, came_about=came_about(job), date=date),
         issuer=issuer_of(facts.laboratory),
         particulars=_particulars(job),
-        warnings=(*warnings, *formal_warnings(job)),
+        warnings=(*warnings, *clauses.formal_warnings(job)),
         sections=tuple(sorted((one for one in sections if one.blocks), key=lambda one: (not one.first, one.opinion))),
         statements=statements_of(facts.job),
         signatures=signatures_of(facts.laboratory),
@@ -94,8 +85,8 @@ def certificate_of(
         ),
         produced_by=produced_by,
         date=facts.job.issued or facts.job.date,
-        banner=DRAFT if draft(job) else NOTHING,
-        draft=draft(job),
+        banner=clauses.DRAFT if clauses.draft(job) else NOTHING,
+        draft=clauses.draft(job),
         logo=logo_of(facts.laboratory, job.inputs),
         overview=overview,
         decides=True,
@@ -119,10 +110,7 @@ def _particulars(of: Job) -> tuple[Facts, ...]:
     # no interval is recommended that the customer did not agree to (7.8.4.3)
     agreed = day(job.recalibration_agreed) if job.recalibration_agreed else NOTHING
     return grouped(
-        (
-            *identified(job, facts.laboratory, of.origin),
-            (say("Next calibration, as agreed with the customer"), agreed),
-        ),
+        (*identified(job, facts.laboratory, of.origin), (say("Next calibration, as agreed with the customer"), agreed)),
         (
             (say("Machine"), machine.name),
             (say("Manufacturer, model"), ", ".join(filter(None, (machine.manufacturer, machine.model)))),
@@ -183,7 +171,7 @@ def signatures_of(laboratory: Laboratory) -> tuple[Signature, ...]:
 
 
 def statements_of(job: Identification) -> tuple[Text, ...]:
-    return (*STATEMENTS, NOT_OURS) if job.from_customer else STATEMENTS
+    return (*clauses.STATEMENTS, clauses.NOT_OURS) if job.from_customer else clauses.STATEMENTS
 
 
 def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
@@ -192,7 +180,7 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
     if replaced is None:
         return ()
     return (
-        (say("Replaces certificate"), replaced_certificate(replaced)),
+        (say("Replaces certificate"), clauses.replaced_certificate(replaced)),
         (say("Reason for the replacement"), replaced.reason),
         (say("Changed against it"), replaced.changed),
         (COMPARED, NOT_COMPARED),
@@ -221,9 +209,9 @@ def certified(result: Result, page: Page) -> Outcome:
     """What there is to write of a result: the certificate, complete but for its looks, and its figures."""
     result, stating = with_capability(result)
     own = (*warnings(result), *stating.warnings())
-    warned = (*own, *formal_warnings(result.job))
+    warned = (*own, *clauses.formal_warnings(result.job))
     draws = posterior_file(result.draws, result.job.origin) if len(result.draws) else None
-    data = results(result) | as_found_data(result.job) | clauses_data(result.job) | stating.data()
+    data = results(result) | as_found_data(result.job) | clauses.clauses_data(result.job) | stating.data()
     if draws is not None:
         data["posterior"] = draws.entry
     return Outcome(

@@ -39,8 +39,9 @@ NOT_OURS = say(
 )
 """7.8.2.2, where there are such data."""
 
-DRAFT = say("DRAFT, not complete by ISO/IEC 17025:2017, 7.8")
-"""On every page of a certificate that lacks what each must state."""
+DRAFT = say(
+    "DRAFT, not complete by ISO/IEC 17025:2017, 7.8"
+)  # on every page of a certificate that lacks what each must state
 
 
 @dataclass(frozen=True)

@@ -63,11 +63,8 @@ def marked_as(document: Document, origin: Origin, id: str, told: Iterable[Text])
     )
 
 
-DIGITAL = "certificate.xml"
-"""The digital certificate."""
-
-CERTIFICATE = say("Calibration certificate")
-"""Title of a document that certifies."""
+DIGITAL = "certificate.xml"  # the digital certificate
+CERTIFICATE = say("Calibration certificate")  # title of a document that certifies
 
 
 def _of_such(title: Text, origin: str) -> Text:

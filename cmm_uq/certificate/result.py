@@ -100,8 +100,7 @@ def as_evaluated(
     return expanded, factor
 
 
-CAPABILITY_FACTOR = 2.0
-"""Coverage factor of a calibration and measurement capability (ILAC-P14:09/2020)."""
+CAPABILITY_FACTOR = 2.0  # coverage factor of a calibration and measurement capability (ILAC-P14:09/2020)
 
 
 @dataclass(frozen=True)
@@ -156,8 +155,7 @@ class StatedUncertainty:
         return {"cmc": {"length_mm": self.length_mm, "raised": self.raised}} if self.raised else {}
 
 
-LACK_OF_FIT = 0.01
-"""Probability below which the residuals are held to contradict the stated noise."""
+LACK_OF_FIT = 0.01  # probability below which the residuals are held to contradict the stated noise
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,7 @@ OUTCOME_WORDS: Mapping[str, Text] = {
 """What a statement of conformity comes to, in a table."""
 
 
-NO_FACTOR = say("–")
-"""In place of a coverage factor that would mean nothing."""
-
+NO_FACTOR = say("–")  # in place of a coverage factor that would mean nothing
 _ONE_HILL = 1.6
 """Least U/u of a distribution with one hill: a rectangle has 1.645. A smaller one has several, between which nothing lies."""
 
@@ -57,8 +55,7 @@ def with_uncertainty(quantity: Quantity) -> Text:
     return value if quantity.one_sided else say("{value} ± {U}", value=value, U=U)
 
 
-CERTAIN = 1e-4
-"""A probability nearer to 0 or 1 than this is printed as less or more than it."""
+CERTAIN = 1e-4  # A probability nearer to 0 or 1 than this is printed as less or more than it
 
 
 def probability(p: float) -> Text:
@@ -144,8 +141,7 @@ def deviating(what: Text, reference: Text, before_um: Floats, after_um: Floats, 
     )  # fmt: skip
 
 
-Figure = tuple[Text, Text, Text]
-"""Name of a quantity, its value with U and unit, its coverage factor."""
+Figure = tuple[Text, Text, Text]  # name of a quantity, its value with U and unit, its coverage factor
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import pytest
 from pydantic import ValidationError
 
 from cmm_uq.certificate.clauses import clauses, clauses_data, draft
-from cmm_uq.certificate.digital_certificate.administration import formal_statements, speaking
+from cmm_uq.certificate.digital_certificate.administration import Languages, formal_statements
 from cmm_uq.certificate.document import Paragraph
 from cmm_uq.certificate.sections.traceability import claimed, traceability_section
 from cmm_uq.jobs.acquired import AcquisitionRecord, Provenance
@@ -247,7 +247,7 @@ def test_page_results_and_digital_certificate_say_the_same_of_it(chain: dict[str
     page = next(block.text for block in traceability_section(job, ()).blocks if isinstance(block, Paragraph))
     data = clauses_data(job)["traceability"]
     digital = next(
-        one for one in formal_statements(job, {}, speaking("en"))
+        one for one in formal_statements(job, {}, Languages("en"))
         if "basic_metrologicallyTraceableToSI" in one.ref_type
     )  # fmt: skip
     assert page == data["statement"] == found.statement == str(digital.declaration)

@@ -16,26 +16,14 @@ from scipy import special
 from cmm_uq.base.languages.translation import ENGLISH
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.certificate.clauses import certifies
-from cmm_uq.certificate.digital_certificate.administration import (
-    NOT_STATED,
-    SayIn,
-    core_data,
-    customer,
-    formal_statements,
-    items,
-    laboratory,
-    mark_of,
-    persons,
-    ref_types,
-    speaking,
-    words_of,
-)
-from cmm_uq.certificate.digital_certificate.conformity import evidence, of_tolerances, statements
+from cmm_uq.certificate.digital_certificate import administration, measurement
+from cmm_uq.certificate.digital_certificate.administration import Languages, mark_of
+from cmm_uq.certificate.digital_certificate.conformity import evidence, of_tolerances, statement
 from cmm_uq.certificate.digital_certificate.figures import DigitalFigures
-from cmm_uq.certificate.digital_certificate.measurement import conditions, equipment, metadata, methods, software
 from cmm_uq.certificate.digital_certificate.quantities import (
     P95,
     decimal,
+    decimals,
     dsi_of,
     is_quantity,
     plain_name,
@@ -65,127 +53,110 @@ _NOT_STATED_THERE = (
 )  # fmt: skip
 """Keys that are no results of the machine, or stand elsewhere in the certificate; the attached results.json has them."""
 
-_MOST = 40
-"""Estimates whose covariance is written out; of more, the attached results.json has it."""
+_MOST = 40  # estimates whose covariance is written out; of more, the attached results.json has it.
 
 
 def digital_certificate(
     results: Mapping[str, Any], job: Job, *, html: bytes | None, file: bytes | None = None
 ) -> Certificate:
     """The certificate, in the language that results.json names, and in English."""
-    say_in = speaking(results["job"].get("language", ENGLISH))
+    texts = Languages(results["job"].get("language", ENGLISH))
     real, decided = certifies(job), results.get("conformity", ())
-    figures = DigitalFigures(say_in, free(results), of_tolerances(Verdicts.of_results(results), say_in, certifies=real))
-    stated = statements(decided, say_in, figures, certifies=real)
+    # estimates that are in a combination that the recording does not determine, ``scale_x.ppm``
+    undetermined = results.get("identifiability", {}).get("undetermined", ())
+    free = frozenset(name for combination in undetermined for name in combination)
+    figures = DigitalFigures(texts, free, of_tolerances(Verdicts.of_results(results), texts, certifies=real))
+    stated = [statement(i, entry, figures, certifies=real) for i, entry in enumerate(decided)]
+    # results.json itself: what D-SI has no place for stands there
+    content = as_json(results) if file is None else file
+    everything = DccResult(
+        name=texts.words(say("Every figure, for other programs")), ref_type=("cmm_resultsFile",),
+        data=Data(parts=(Attached(file_name="results.json", mime_type="application/json", data=content),)),
+    )  # fmt: skip
+    mark, title = mark_of(job), Verbatim(job.facts.machine.name)
     return Certificate(
         administrative=Administrative(
-            software=software(results, say_in),
-            ref_types=ref_types(say_in),
-            core=core_data(job, tuple(say_in(NOT_STATED)), say_in),
-            items=items(job, say_in),
-            laboratory=laboratory(job, say_in),
-            persons=persons(job, say_in),
-            customer=customer(job, say_in),
-            statements=(*formal_statements(job, results, say_in), *stated),
+            software=measurement.software(results, texts),
+            ref_types=administration.ref_types(texts),
+            core=administration.core_data(job, texts),
+            items=administration.items(job, texts),
+            laboratory=administration.laboratory(job, texts),
+            persons=administration.persons(job, texts),
+            customer=administration.customer(job, texts),
+            statements=(*administration.formal_statements(job, results, texts), *stated),
         ),
         measurements=(
             Measurement(
-                name=words_of(_title(job), say_in),
-                methods=methods(job, results, say_in),
-                software=software(results, say_in),
-                equipment=equipment(job, results, say_in),
-                conditions=conditions(job, say_in),
-                results=(
-                    *_results(results, say_in, figures),
-                    *evidence(decided, say_in, figures, certifies=real),
-                    _everything(as_json(results) if file is None else file, say_in),
+                name=texts.words(
+                    say("Calibration of {machine}", machine=title) if mark is None
+                    else say("{banner}: {machine}", banner=mark.banner, machine=title)
                 ),
-                metadata=metadata(results, say_in),
+                methods=measurement.methods(job, results, texts),
+                software=measurement.software(results, texts),
+                equipment=measurement.equipment(job, results, texts),
+                conditions=measurement.conditions(job, texts),
+                results=(*_results(results, figures), *evidence(decided, figures, certifies=real), everything),
+                metadata=measurement.metadata(results, texts),
                 ref_id=("machine",),
                 ref_type=("cmm_calibration",) if real else (f"cmm_{job.origin}", "cmm_notACertificate"),
             ),
         ),
         document=None if html is None else Attached(
             file_name=file_name("certificate.html", job.origin), mime_type="text/html", data=html,
-            name=words_of(say("The same certificate for reading"), say_in),
+            name=texts.words(say("The same certificate for reading")),
         ),
     )  # fmt: skip
 
 
-def _title(job: Job) -> Text:
-    mark, machine = mark_of(job), Verbatim(job.facts.machine.name)
-    if mark is None:
-        return say("Calibration of {machine}", machine=machine)
-    return say("{banner}: {machine}", banner=mark.banner, machine=machine)
-
-
-def free(results: Mapping[str, Any]) -> frozenset[str]:
-    """Estimates that are in a combination that the recording does not determine, ``scale_x.ppm``."""
-    known = results.get("identifiability", {})
-    return frozenset(name for combination in known.get("undetermined", ()) for name in combination)
-
-
-def _results(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> list[DccResult]:
-    keys = [key for key in (*_TITLES, *results) if key in results and key not in _NOT_STATED_THERE]
+def _results(results: Mapping[str, Any], figures: DigitalFigures) -> list[DccResult]:
     found = []
-    for key in dict.fromkeys(keys):
+    for key in dict.fromkeys((*_TITLES, *results)):
+        if key not in results or key in _NOT_STATED_THERE:
+            continue
         data = results[key]
-        parts = (
-            tuple(part for name, value in data.items() for part in figures.parts((key, name), value))
-            if isinstance(data, Mapping) and not is_quantity(data) and "budget" not in data
-            else tuple(figures.parts((key,), data))
-        )
+        if isinstance(data, Mapping) and not is_quantity(data) and "budget" not in data:
+            parts = tuple(part for name, value in data.items() for part in figures.parts((key, name), value))
+        else:
+            parts = tuple(figures.parts((key,), data))
         if parts:
-            title = words_of(_TITLES.get(key, Verbatim(without_unit(key).capitalize())), say_in)
+            title = figures.texts.words(_TITLES.get(key, Verbatim(without_unit(key).capitalize())))
             found.append(DccResult(name=title, data=Data(parts=parts), ref_type=(plain_name(f"cmm_{key}"),)))
-    together = _together(results, say_in, figures)
+    together = _together(results, figures)
     return found if together is None else [*found, together]
 
 
-def _together(results: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> DccResult | None:
+def _together(results: Mapping[str, Any], figures: DigitalFigures) -> DccResult | None:
     """Estimates and their covariance as an ellipsoidal region; without what the recording does not determine."""
     data = results.get("covariance")
     if data is None:
         return None
-    names = data["parameters"]
+    names, matrix = data["parameters"], data["matrix"]
     chosen = [i for i, name in enumerate(names) if name not in figures.free]
-    found = [one for i in chosen if (one := _of(results, names[i])) and one["u"] and one["k"] and one["k"] >= 1]
+    found = []
+    for i in chosen:  # estimates, and sizes of the artefact, by their names in the covariance
+        owner, _, parameter = names[i].partition(".")
+        place = results.get("artefact", {}) if owner == "artefact" else results["estimates"].get(owner, {})
+        quantity = place.get(parameter)
+        if isinstance(quantity, Mapping) and quantity.get("u") and quantity["k"] and quantity["k"] >= 1:
+            found.append(quantity)
     if not 1 < len(chosen) <= _MOST or len(found) < len(chosen):
         return None
     units = [dsi_of(data["units"][i]) for i in chosen]
-    region = EllipsoidalRegion(
-        columns=tuple(
-            CovarianceColumn(covariances=tuple(
-                CovarianceElement(value=decimal(data["matrix"][row][column]), unit=product(units[a], units[b]))
-                for a, row in enumerate(chosen)
-            ))
-            for b, column in enumerate(chosen)
-        ),
-        factor=decimal(float(f"{sqrt(special.chdtri(len(chosen), 0.05)):.6f}")), probability=P95, distribution="normal",
+    columns = tuple(
+        CovarianceColumn(covariances=tuple(
+            CovarianceElement(value=decimal(matrix[row][column]), unit=product(a, b))
+            for row, a in zip(chosen, units, strict=True)
+        ))
+        for column, b in zip(chosen, units, strict=True)
     )  # fmt: skip
+    factor = decimal(float(f"{sqrt(special.chdtri(len(chosen), 0.05)):.6f}"))
+    values, U, k = (decimals([quantity[key] for quantity in found]) for key in ("value", "U", "k"))
     stated = RealList(
-        labels=tuple(names[i] for i in chosen), values=tuple(decimal(one["value"]) for one in found), units=tuple(units),
-        uncertainty=ExpandedList(
-            uncertainties=tuple(decimal(one["U"]) for one in found), factors=tuple(decimal(one["k"]) for one in found),
-            probabilities=(P95,),
-        ),
-        region=region,
+        labels=tuple(names[i] for i in chosen), values=values, units=tuple(units),
+        uncertainty=ExpandedList(uncertainties=U, factors=k, probabilities=(P95,)),
+        region=EllipsoidalRegion(columns=columns, factor=factor, probability=P95, distribution="normal"),
     )  # fmt: skip
-    title, ref_type = words_of(say("Estimates together, with their covariance"), say_in), ("cmm_covariance",)
+    title = figures.texts.words(say("Estimates together, with their covariance"))
+    ref_type = ("cmm_covariance",)
     quantity = DccQuantity(id=figures.id_of(("covariance",)), name=title, value=stated, ref_type=ref_type)
     return DccResult(name=title, data=Data(parts=(quantity,)), ref_type=ref_type)
-
-
-def _of(results: Mapping[str, Any], name: str) -> Mapping[str, Any] | None:
-    """An estimate, or a size of the artefact, by its name in the covariance."""
-    owner, _, parameter = name.partition(".")
-    place = results.get("artefact", {}) if owner == "artefact" else results["estimates"].get(owner, {})
-    found = place.get(parameter)
-    return found if isinstance(found, Mapping) and "u" in found else None
-
-
-def _everything(results: bytes, say_in: SayIn) -> DccResult:
-    """results.json itself: what D-SI has no place for stands there."""
-    file = Attached(file_name="results.json", mime_type="application/json", data=results)
-    name = words_of(say("Every figure, for other programs"), say_in)
-    return DccResult(name=name, data=Data(parts=(file,)), ref_type=("cmm_resultsFile",))

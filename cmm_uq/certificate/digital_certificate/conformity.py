@@ -14,9 +14,9 @@ from typing import Any
 
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.units import UNITS
-from cmm_uq.certificate.digital_certificate.administration import SayIn, english, one_line, rich_of, words_of
+from cmm_uq.certificate.digital_certificate.administration import Languages, english, one_line
 from cmm_uq.certificate.digital_certificate.figures import DigitalFigures, Part
-from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, dsi_of, ratio
+from cmm_uq.certificate.digital_certificate.quantities import ONE, decimal, decimals, dsi_of, ratio
 from cmm_uq.certificate.wording import stated_row, stated_value
 from cmm_uq.jobs.dcc.certificate import Data, DccQuantity, DccResult, QuantityList, StatementMetadata
 from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Real, RealList
@@ -39,149 +39,130 @@ _WHY: Mapping[str, Text] = MappingProxyType({
 })  # fmt: skip
 
 _MICROMETRE, _MILLIMETRE = UNITS["µm"].dsi, UNITS["mm"].dsi
-_P_TWICE = Decimal("0.9545")
-"""Probability of a normal distribution within two standard deviations."""
+_P_TWICE = Decimal("0.9545")  # probability of a normal distribution within two standard deviations
 
 
-def of_tolerances(verdicts: Verdicts, say_in: SayIn, *, certifies: bool) -> Mapping[str, StatementMetadata]:
+def of_tolerances(verdicts: Verdicts, texts: Languages, *, certifies: bool) -> Mapping[str, StatementMetadata]:
     """Statements on parameters that have a tolerance, by their names (``scale_x.ppm``): each stands with its result."""
-    return {one.name: _of_tolerance(one, say_in, certifies=certifies) for one in verdicts if not one.by}
+    return {verdict.name: _of_tolerance(verdict, texts, certifies=certifies) for verdict in verdicts if not verdict.by}
 
 
-def _of_tolerance(one: Verdict, say_in: SayIn, *, certifies: bool) -> StatementMetadata:
-    limit, unit = decimal(one.limit or 0.0), dsi_of(one.unit)
+def _of_tolerance(verdict: Verdict, texts: Languages, *, certifies: bool) -> StatementMetadata:
+    limit, unit = decimal(verdict.limit or 0.0), dsi_of(verdict.unit)
     bounds = ((say("Smallest permissible value"), -limit), (say("Largest permissible value"), limit))
     return StatementMetadata(
-        name=words_of(say("Conformity with its tolerance"), say_in),
-        description=english([f"Missing: {what}" for what in one.missing]) if one.missing else None,
+        name=texts.words(say("Conformity with its tolerance")),
+        description=english([f"Missing: {what}" for what in verdict.missing]) if verdict.missing else None,
         references=(TOLERANCE_RULE,),
-        declaration=rich_of((Verbatim(one.outcome), *((_WHY[one.outcome],) if one.outcome in _WHY else ())), say_in),
-        conformity=IN_THE_SCHEMA[one.outcome] if certifies else None,
+        declaration=texts.rich(Verbatim(verdict.outcome), *_why(verdict.outcome)),
+        conformity=IN_THE_SCHEMA[verdict.outcome] if certifies else None,
         data=Data(parts=tuple(
-            DccQuantity(name=words_of(name, say_in), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
+            DccQuantity(name=texts.words(name), value=Real(value=bound, unit=unit), ref_type=("cmm_toleranceLimit",))
             for name, bound in bounds
         )),
-        ref_type=("basic_conformity", f"cmm_{one.outcome.replace(' ', '')}") if certifies else ("cmm_notCertified",),
+        ref_type=_ref_type(verdict.outcome, certifies=certifies),
     )  # fmt: skip
 
 
-def statements(
-    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
-) -> tuple[StatementMetadata, ...]:
-    """A statement for each decision of results.json."""
-    return tuple(_statement(i, one, say_in, figures, certifies=certifies) for i, one in enumerate(decided))
+def _why(decision: str) -> tuple[Text, ...]:
+    return (_WHY[decision],) if decision in _WHY else ()
 
 
-def _statement(
-    i: int, one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
-) -> StatementMetadata:
-    decision, path = one["decision"], ("conformity", str(i))
-    standard, characteristic = Verbatim(one["standard"]), Verbatim(one["characteristic"])
+def _ref_type(decision: str, *, certifies: bool) -> tuple[str, ...]:
+    return ("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",)
+
+
+def statement(i: int, entry: Mapping[str, Any], figures: DigitalFigures, *, certifies: bool) -> StatementMetadata:
+    """Of a decision of results.json, by its number there."""
+    texts, decision, path = figures.texts, entry["decision"], ("conformity", str(i))
+    standard, characteristic = Verbatim(entry["standard"]), Verbatim(entry["characteristic"])
     named = say("{standard}, {characteristic}", standard=standard, characteristic=characteristic)
-    remarks = [*one["remarks"], *(f"Missing: {what}" for what in one["missing"])]
+    remarks = [*entry["remarks"], *(f"Missing: {what}" for what in entry["missing"])]
     # as on the first page: of a size that may be zero its interval, beside which no U is stated
-    value = stated_value(one["value_um"], 2 * one["u_um"], signed=one.get("signed", True))
-    declared = (
-        say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(one["quantity"])),
-        stated_row(decision, value, UNITS["µm"], one["limit_um"]), *((_WHY[decision],) if decision in _WHY else ()),
-    )  # fmt: skip
+    value = stated_value(entry["value_um"], 2 * entry["u_um"], signed=entry.get("signed", True))
+    quantity = say("{decision}: {quantity}", decision=Verbatim(decision), quantity=Verbatim(entry["quantity"]))
+    row = stated_row(decision, value, UNITS["µm"], entry["limit_um"])
     return StatementMetadata(
         id=figures.id_of(path),
-        name=words_of(named, say_in),
+        name=texts.words(named),
         description=english(remarks) if remarks else None,
-        norms=(one_line(one["standard"]),),
-        references=(one_line(one["rule"]),),
-        declaration=rich_of(declared, say_in),
+        norms=(one_line(entry["standard"]),),
+        references=(one_line(entry["rule"]),),
+        declaration=texts.rich(quantity, row, *_why(decision)),
         conformity=IN_THE_SCHEMA[decision] if certifies else None,
-        data=Data(parts=tuple(_figures(path, one, say_in, figures))),
-        ref_type=("basic_conformity", f"cmm_{decision.replace(' ', '')}") if certifies else ("cmm_notCertified",),
+        data=Data(parts=tuple(_figures(path, entry, figures))),
+        ref_type=_ref_type(decision, certifies=certifies),
     )
 
 
-def _figures(path: tuple[str, ...], one: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures) -> Iterator[Part]:
+def _figures(path: tuple[str, ...], entry: Mapping[str, Any], figures: DigitalFigures) -> Iterator[Part]:
     """The value with its uncertainty, its limit, the acceptance limit of the rule, and probabilities."""
 
-    def quantity(key: str, name: Text, value: Real, *ref_type: str) -> DccQuantity:
-        return DccQuantity(id=figures.id_of((*path, key)), name=words_of(name, say_in), value=value, ref_type=ref_type)
+    def quantity(
+        keys: str, name: Text, value: Decimal, ref_type: str, unit: str = _MICROMETRE, stated: Expanded | None = None
+    ) -> DccQuantity:
+        real, id_ = Real(value=value, unit=unit, uncertainty=stated), figures.id_of((*path, *keys.split(".")))
+        return DccQuantity(id=id_, name=figures.texts.words(name), value=real, ref_type=(ref_type,))
 
-    u, limit, guard = decimal(one["u_um"]), decimal(one["limit_um"]), one["guard_band_um"]
-    stated = Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal")
-    value = Real(value=decimal(one["value_um"]), unit=_MICROMETRE, uncertainty=stated if u > 0 else None)
-    yield quantity("value_um", say("Value that is least favourable"), value, "basic_measuredValue")
-    bound = Real(value=limit, unit=_MICROMETRE)
-    yield quantity("limit_um", say("Limit"), bound, "cmm_toleranceLimit")
+    u, limit, guard = decimal(entry["u_um"]), decimal(entry["limit_um"]), entry["guard_band_um"]
+    stated = (
+        Expanded(uncertainty=2 * u, factor=Decimal(2), probability=_P_TWICE, distribution="normal") if u > 0 else None
+    )
+    named = say("Value that is least favourable")
+    yield quantity("value_um", named, decimal(entry["value_um"]), "basic_measuredValue", stated=stated)
+    yield quantity("limit_um", say("Limit"), limit, "cmm_toleranceLimit")
     if guard is not None:
-        band = decimal(guard)
-        yield quantity("guard_band_um", say("Guard band"), Real(value=band, unit=_MICROMETRE), "cmm_guardBand")
-        accepted = Real(value=max(limit - band, Decimal(0)), unit=_MICROMETRE)
+        yield quantity("guard_band_um", say("Guard band"), decimal(guard), "cmm_guardBand")
+        accepted = max(limit - decimal(guard), Decimal(0))
         yield quantity("acceptance_limit_um", say("Acceptance limit"), accepted, "basic_acceptanceLimitUpper")
     for key, name in (
         ("probability_conforming", say("Probability that the value is within its limit")),
         ("probability_all_conform", say("Probability that all values are within their limits")),
     ):
-        if one[key] is not None:
-            yield quantity(key, name, Real(value=decimal(one[key]), unit=ONE.dsi), "cmm_conformanceProbability")
-    yield from _permissible(path, one["mpe"] or {}, say_in, figures)
-    for key in ("prior", "global_risks"):
-        yield from figures.parts((*path, key), one[key])
-
-
-def _permissible(
-    path: tuple[str, ...], mpe: Mapping[str, Any], say_in: SayIn, figures: DigitalFigures
-) -> Iterator[Part]:
-    """A, K and B of a maximum permissible error A + L/K, at most B."""
+        if entry[key] is not None:
+            yield quantity(key, name, decimal(entry[key]), "cmm_conformanceProbability", ONE.dsi)
     units = {"a_um": _MICROMETRE, "k": ratio(_MILLIMETRE, _MICROMETRE), "b_um": _MICROMETRE}
-    for key, value in mpe.items():
+    for key, value in (entry["mpe"] or {}).items():
         if value is not None:
-            letter = key.partition("_")[0].upper()
-            name = say("{letter} of the maximum permissible error A + L/K, at most B", letter=Verbatim(letter))
-            yield DccQuantity(
-                id=figures.id_of((*path, "mpe", key)), name=words_of(name, say_in), ref_type=("cmm_toleranceLimit",),
-                value=Real(value=decimal(value), unit=units[key]),
-            )  # fmt: skip
+            letter = Verbatim(key.partition("_")[0].upper())
+            name = say("{letter} of the maximum permissible error A + L/K, at most B", letter=letter)
+            yield quantity(f"mpe.{key}", name, decimal(value), "cmm_toleranceLimit", units[key])
+    for key in ("prior", "global_risks"):
+        yield from figures.parts((*path, key), entry[key])
 
 
 def evidence(
-    decided: Sequence[Mapping[str, Any]], say_in: SayIn, figures: DigitalFigures, *, certifies: bool
+    decided: Sequence[Mapping[str, Any]], figures: DigitalFigures, *, certifies: bool
 ) -> tuple[DccResult, ...]:
     """Every value that was decided, and the budget of the one that is named."""
     found = []
-    for i, one in enumerate(decided):
+    for i, entry in enumerate(decided):
         path = ("conformity", str(i))
-        parts = (*_values(path, one["errors"], say_in, figures, certifies=certifies),
-                 *figures.parts((*path, "test_uncertainty"), one["test_uncertainty"]))  # fmt: skip
+        parts = [_values(path, entry["errors"], figures, certifies=certifies)] if entry["errors"] else []
+        parts += figures.parts((*path, "test_uncertainty"), entry["test_uncertainty"])
         if parts:
-            name = words_of(say("All values decided by {standard}", standard=Verbatim(one["standard"])), say_in)
-            found.append(DccResult(name=name, data=Data(parts=parts), ref_type=("cmm_conformity",)))
+            name = figures.texts.words(say("All values decided by {standard}", standard=Verbatim(entry["standard"])))
+            found.append(DccResult(name=name, data=Data(parts=tuple(parts)), ref_type=("cmm_conformity",)))
     return tuple(found)
 
 
 def _values(
-    path: tuple[str, ...],
-    errors: Sequence[Mapping[str, Any]],
-    say_in: SayIn,
-    figures: DigitalFigures,
-    *,
-    certifies: bool,
-) -> Iterator[Part]:
-    if not errors:
-        return
-    below = (*path, "errors")
-    values = tuple(decimal(one["error_um"]) for one in errors)
+    path: tuple[str, ...], errors: Sequence[Mapping[str, Any]], figures: DigitalFigures, *, certifies: bool
+) -> Part:
+    below, texts = (*path, "errors"), figures.texts
     uncertainty = ExpandedList(
-        uncertainties=tuple(decimal(one["U_um"]) for one in errors), factors=(Decimal(2),), probabilities=(_P_TWICE,),
+        uncertainties=decimals([error["U_um"] for error in errors]), factors=(Decimal(2),), probabilities=(_P_TWICE,),
         distributions=("normal",),
     )  # fmt: skip
-    known = all(one["u_um"] > 0 for one in errors)
+    known = all(error["u_um"] > 0 for error in errors)
+    values = decimals([error["error_um"] for error in errors])
     column = DccQuantity(
-        id=figures.id_of((*below, "error_um")), name=words_of(say("Value"), say_in), ref_type=("basic_measurementError",),
+        id=figures.id_of((*below, "error_um")), name=texts.words(say("Value")), ref_type=("basic_measurementError",),
         value=RealList(values=values, units=(_MICROMETRE,), uncertainty=uncertainty if known else None),
     )  # fmt: skip
-    others = [{key: value for key, value in one.items() if key not in ("error_um", "u_um", "U_um")} for one in errors]
+    others = [{key: error[key] for key in error if key not in ("error_um", "u_um", "U_um")} for error in errors]
     rest = [part for table in figures.parts(below, others) if isinstance(table, QuantityList) for part in table.parts]
-    words = tuple(IN_THE_SCHEMA[one["outcome"]] for one in errors)
-    outcomes = StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)) if certifies else None
-    yield QuantityList(
-        name=words_of(say("Values in the order of the recording"), say_in), parts=(column, *rest),
-        metadata=() if outcomes is None else (outcomes,), ref_type=("cmm_table",),
-    )  # fmt: skip
+    words = tuple(IN_THE_SCHEMA[error["outcome"]] for error in errors)
+    outcomes = (StatementMetadata(conformity_list=words, ref_type=("basic_conformity",)),) if certifies else ()
+    name = texts.words(say("Values in the order of the recording"))
+    return QuantityList(name=name, parts=(column, *rest), metadata=outcomes, ref_type=("cmm_table",))

@@ -13,11 +13,20 @@ from cmm_uq.base.units import PRINTED, UNITS, Unit
 from cmm_uq.jobs.dcc.quantities import Expanded, ExpandedList, Interval, IntervalList
 
 ONE = UNITS["1"]
-
 _ENDINGS: Mapping[str, Unit] = MappingProxyType({**PRINTED, "deg": UNITS["°"], "mm2": UNITS["mm²"]})
-
 _PLAIN = ("k", "probability", "p_value", "share", "dof", "draws", "repeat", "measurement", "point", "points")
 """Keys of what has no unit, also where the key above them has one."""
+
+_FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
+"""A unit with its prefix, and the power of both; those of the table."""
+
+_SHORT = 4  # numbers of a list that stand in columns of their own: a point, a direction
+_ILLEGAL = re.compile(r"[^A-Za-z0-9_.\-]")
+_BUDGET = {"value", "u", "U", "k", "dof", "unit", "budget"}
+_LINE = {"input", "value", "u", "unit", "distribution", "dof", "sensitivity", "contribution", "share", "source"}
+P95 = Decimal("0.95")
+P_STANDARD = Decimal("0.6827")  # probability of a normal distribution within one standard deviation
+POSTERIOR = "posterior"  # in place of a named distribution: that of the draws in posterior.npz.
 
 
 def unit_of(key: str, above: Unit | None) -> Unit:
@@ -34,8 +43,8 @@ def named_unit(key: str) -> Unit | None:
 
 def without_unit(key: str) -> str:
     """A key in words: ``b89 range``."""
-    fitting = [ending for ending in _ENDINGS if key.endswith(f"_{ending}")]
-    return (key.removesuffix(f"_{max(fitting, key=len)}") if fitting else key).replace("_", " ")
+    longest = max((f"_{ending}" for ending in _ENDINGS if key.endswith(f"_{ending}")), key=len, default="")
+    return key.removesuffix(longest).replace("_", " ")
 
 
 def dsi_of(symbol: str) -> str:
@@ -48,41 +57,28 @@ def _foreign(text: str) -> str:
     return "|" + "_".join(text.replace("|", "").split())
 
 
-def product(one: str, other: str) -> str:
-    if "|" in one + other:
-        return _foreign(f"{one}·{other}")
-    if one == ONE.dsi:
-        return other
-    return one if other == ONE.dsi else one + other
+def product(a: str, b: str) -> str:
+    if "|" in a + b:
+        return _foreign(f"{a}·{b}")
+    return b if a == ONE.dsi else a if b == ONE.dsi else a + b
 
 
-def ratio(one: str, other: str) -> str:
-    if "|" in one + other:
-        return _foreign(f"{one}/({other})")
-    return ONE.dsi if one == other else product(one, _inverse(other))
-
-
-_FACTOR = re.compile(r"((?:\\(?:nano|micro|milli|centi|kilo))?\\[a-z]+)(?:\\tothe\{(-?\d+)\})?")
-"""A unit with its prefix, and the power of both; those of the table."""
-
-
-def _inverse(unit: str) -> str:
-    if unit == ONE.dsi:
-        return unit
-    factors = ((name, -int(power or 1)) for name, power in _FACTOR.findall(unit))
-    return "".join(name if power == 1 else rf"{name}\tothe{{{power}}}" for name, power in factors)
-
-
-_SHORT = 4
-"""Numbers of a list that stand in columns of their own: a point, a direction."""
-
-_ILLEGAL = re.compile(r"[^A-Za-z0-9_.\-]")
-_BUDGET = {"value", "u", "U", "k", "dof", "unit", "budget"}
-_LINE = {"input", "value", "u", "unit", "distribution", "dof", "sensitivity", "contribution", "share", "source"}
+def ratio(a: str, b: str) -> str:
+    if "|" in a + b:
+        return _foreign(f"{a}/({b})")
+    if a == b:
+        return ONE.dsi
+    powers = [] if b == ONE.dsi else [(name, -int(power or 1)) for name, power in _FACTOR.findall(b)]
+    inverse = "".join(name if power == 1 else rf"{name}\tothe{{{power}}}" for name, power in powers)
+    return product(a, inverse or ONE.dsi)
 
 
 def decimal(value: float) -> Decimal:
     return Decimal(repr(value)) if isinstance(value, float) else Decimal(value)
+
+
+def decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
+    return tuple(map(decimal, values))
 
 
 def plain_name(text: str) -> str:
@@ -91,6 +87,11 @@ def plain_name(text: str) -> str:
 
 def is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def are_numbers(values: object, count: int | None = None) -> bool:
+    """Whether it is a list of numbers, of so many where that is said."""
+    return isinstance(values, list) and all(map(is_number, values)) and (count is None or len(values) == count)
 
 
 def is_quantity(value: object) -> bool:
@@ -105,11 +106,6 @@ def is_quantity(value: object) -> bool:
     )
 
 
-def are_numbers(values: object, count: int | None = None) -> bool:
-    """Whether it is a list of numbers, of so many where that is said."""
-    return isinstance(values, list) and all(map(is_number, values)) and (count is None or len(values) == count)
-
-
 def is_budget(data: Mapping[str, Any]) -> bool:
     """Whether it is a budget of uncertainty, with its lines."""
     lines = data.get("budget")
@@ -121,7 +117,7 @@ def is_budget(data: Mapping[str, Any]) -> bool:
 
 def is_matrix(data: Mapping[str, Any]) -> bool:
     """Whether it is a covariance matrix with names and units of its rows."""
-    if data.keys() != {"parameters", "units", "matrix"} or not all(isinstance(one, list) for one in data.values()):
+    if data.keys() != {"parameters", "units", "matrix"} or not all(isinstance(rows, list) for rows in data.values()):
         return False
     count = len(data["units"])
     return len(data["matrix"]) == count and all(are_numbers(row, count) for row in data["matrix"])
@@ -133,13 +129,9 @@ def is_curve(value: Any, u: Any, interval: Any) -> bool:
         return False
     low, high = interval
     return (
-        all(are_numbers(one, len(value)) for one in (u, low, high))
-        and min(u) >= 0 and all(one <= other for one, other in zip(low, high, strict=True))
+        all(are_numbers(series, len(value)) for series in (u, low, high))
+        and min(u) >= 0 and all(a <= b for a, b in zip(low, high, strict=True))
     )  # fmt: skip
-
-
-def decimals(values: Sequence[float]) -> tuple[Decimal, ...]:
-    return tuple(decimal(value) for value in values)
 
 
 def plain_cell(value: Any) -> bool:
@@ -147,14 +139,6 @@ def plain_cell(value: Any) -> bool:
     if isinstance(value, list):
         return 0 < len(value) <= _SHORT and are_numbers(value)
     return not isinstance(value, Mapping) or (is_quantity(value) and value["value"] is not None)
-
-
-P95 = Decimal("0.95")
-P_STANDARD = Decimal("0.6827")
-"""Probability of a normal distribution within one standard deviation."""
-
-POSTERIOR = "posterior"
-"""In place of a named distribution: that of the draws in posterior.npz."""
 
 
 def expanded_of(data: Mapping[str, Any]) -> Expanded | None:
@@ -174,10 +158,8 @@ def interval_of(data: Mapping[str, Any]) -> Interval | None:
     """The 95 % coverage interval."""
     if not data.get("interval95") or data["u"] is None:
         return None
-    low, high = data["interval95"]
-    return Interval(
-        standard=decimal(data["u"]), low=decimal(low), high=decimal(high), probability=P95, distribution=POSTERIOR
-    )
+    u, low, high = decimals((data["u"], *data["interval95"]))
+    return Interval(standard=u, low=low, high=high, probability=P95, distribution=POSTERIOR)
 
 
 def symmetric(data: Mapping[str, Any]) -> bool:
@@ -193,21 +175,19 @@ def spread_of(values: Sequence[Mapping[str, Any]]) -> ExpandedList | IntervalLis
     """Uncertainties of a column: U with k of each, or the interval of each; None where neither is known of all."""
     none = Expanded(uncertainty=Decimal(0), factor=Decimal(1), probability=P95)  # of what is known without one
     stated = [expanded_of(value) or (none if not value["u"] else None) for value in values]
-    found = [one for one in stated if one is not None]
-    if len(found) == len(stated):
-        return ExpandedList(
-            uncertainties=tuple(one.uncertainty for one in found), factors=tuple(one.factor for one in found),
-            probabilities=tuple(one.probability for one in found),
-        )  # fmt: skip
-    return intervals_of(values)
+    known = [spread for spread in stated if spread is not None]
+    if len(known) < len(stated):
+        return intervals_of(values)
+    uncertainties, factors, chances = zip(
+        *((each.uncertainty, each.factor, each.probability) for each in known), strict=True
+    )
+    return ExpandedList(uncertainties=uncertainties, factors=factors, probabilities=chances)
 
 
 def intervals_of(values: Sequence[Mapping[str, Any]]) -> IntervalList | None:
     """The interval of each; None where it is not known of all. What has no uncertainty is an interval of no width."""
-    intervals = [one for one in map(interval_of, values) if one is not None]
-    if len(intervals) < len(values):
+    known = [interval for interval in map(interval_of, values) if interval is not None]
+    if len(known) < len(values):
         return None
-    return IntervalList(
-        standards=tuple(one.standard for one in intervals), lows=tuple(one.low for one in intervals),
-        highs=tuple(one.high for one in intervals), probabilities=(P95,),
-    )  # fmt: skip
+    standards, lows, highs = zip(*((each.standard, each.low, each.high) for each in known), strict=True)
+    return IntervalList(standards=standards, lows=lows, highs=highs, probabilities=(P95,))

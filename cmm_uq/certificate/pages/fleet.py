@@ -56,9 +56,7 @@ def fleet_plot(
         return drawn(figure, caption, alternative)
 
 
-MOST_GROUPS = 12
-"""Models and places of a value, those with most machines."""
-
+MOST_GROUPS = 12  # models and places of a value, those with most machines
 MOST_MACHINES = 15
 """Machines of a value that do not belong, that are beyond their limit, and that cross it soonest: so many each."""
 

@@ -23,8 +23,7 @@ from cmm_uq.certificate.document import Overview, Standing
 from cmm_uq.certificate.wording import Headline, Summary
 from cmm_uq.laboratory.due.fleet import FleetResult, FleetValue, UsualRate, seen_again
 
-MOST_SERIALS = 12
-"""Machines in a line."""
+MOST_SERIALS = 12  # machines in a line
 
 
 def counted(count: int) -> Text:
@@ -80,8 +79,7 @@ def usual_rate(of: FleetValue) -> Text:
     return rate_words(average.rate, 1.96 * average.u, of)
 
 
-MOST_VERDICTS = 6
-"""Machines and values that a terminal names as unlike their fleet."""
+MOST_VERDICTS = 6  # machines and values that a terminal names as unlike their fleet
 
 
 def fleet_overview(found: FleetResult) -> Overview:

@@ -26,18 +26,7 @@ from cmm_uq.certificate.document import (
     Table,
     text_columns,
 )
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    BAD,
-    BAND,
-    INK,
-    MUTED,
-    bars,
-    dots,
-    drawn,
-    note,
-    picture,
-)
+from cmm_uq.certificate.plots.style import ACCENT, BAD, BAND, INK, MUTED, bars, dots, drawn, note, picture
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.verdicts import BEYOND, NONE
 from cmm_uq.laboratory.due.drift import HORIZON, PARTS
@@ -48,16 +37,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SCHEMA = "cmm-uq/history/1"
-
-COVERAGE = 2.0
-"""Factor of every expanded uncertainty here: 95 %, as of a normal distribution."""
+COVERAGE = 2.0  # factor of every expanded uncertainty here: 95 %, as of a normal distribution
 
 HEADINGS: tuple[Text, ...] = (
     say("Quantity"), say("Last value"), say("U"), say("Unit"), say("Change"), say("U of the change"), say("Trend per year"),
     say("U of the trend"), say("Limit"), say("Crosses its limit"),
 )  # fmt: skip
-WORDS = {say("Quantity"), say("Unit"), say("Crosses its limit")}
-"""Headings of columns that hold no figures."""
+WORDS = {say("Quantity"), say("Unit"), say("Crosses its limit")}  # headings of columns that hold no figures
 
 STATE_WORDS: Mapping[str, Text] = {
     "draft": say("draft"), "released": say("released"), "withdrawn": say("withdrawn"), "replaced": say("replaced"),
@@ -203,8 +189,7 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
     return found
 
 
-_AHEAD = 2.0
-"""Years after the last recording that are shown at least, where there is a trend."""
+_AHEAD = 2.0  # years after the last recording that are shown at least, where there is a trend
 
 
 def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:

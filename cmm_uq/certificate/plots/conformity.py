@@ -8,24 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cmm_uq.base.messages import NOTHING, Text, say, semicolons
+from cmm_uq.base.messages import Text, say, semicolons
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    BAND,
-    DIVERGING,
-    INK,
-    MUTED,
-    bars,
-    crosses,
-    dots,
-    drawn,
-    finite,
-    note,
-    picture,
-    strokes,
-)
+from cmm_uq.certificate.plots import style
+from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,23 +27,29 @@ def trumpet(
     All (m,) in µm but the lengths: errors, their limits, largest size that is accepted (``None`` where none is), expanded
     uncertainty (k = 2), and which errors are marked as not accepted.
     """
-    x = finite("length_mm", length_mm, (None,))
-    y, top, U = (finite(name, values, x.shape) for name, values in
+    x = style.finite("length_mm", length_mm, (None,))
+    y, top, U = (style.finite(name, values, x.shape) for name, values in
                  (("error_um", error_um), ("limit_um", limit_um), ("expanded_um", expanded_um)))  # fmt: skip
     accepted = np.array([np.nan if value is None else value for value in acceptance_um], dtype=np.float64)
     marked = np.asarray(outside, dtype=bool)
     size = float(np.clip(45.0 / len(x) ** 0.6, 1.6, 4.0))
-    with picture(76, left=0.082, right=0.985, bottom=0.145, top=0.91) as (figure, ax):
+    with style.picture(76, left=0.082, right=0.985, bottom=0.145, top=0.91) as (figure, ax):
         _limits(ax, x, top, accepted)
         ax.axhline(0, color=INK, lw=0.7, zorder=1)
-        bars(ax, x, y - U, y + U, max(0.28 * size, 0.6), MUTED)
-        dots(ax, x[~marked], y[~marked], size, ACCENT)
-        crosses(ax, x[marked], y[marked], size + 2.5, 1.3)
+        style.bars(ax, x, y - U, y + U, max(0.28 * size, 0.6), MUTED)
+        style.dots(ax, x[~marked], y[~marked], size, ACCENT)
+        style.crosses(ax, x[marked], y[marked], size + 2.5, 1.3)
         ax.set(xlabel=say("Length / mm"), ylabel=quantity, xlim=(0.0, 1.04 * float(x.max())))
         ax.margins(y=0.08)
         ax.grid(axis="y")
-        note(figure, _legend(accepted, U, marked=bool(marked.any())))
-        return drawn(figure, caption, alternative)
+        parts = (
+            (say("lines: ±MPE"), True),
+            (say("dashed: limits of acceptance, with the guard band between"), np.isfinite(accepted).any()),
+            (say("bars: U (k = 2)"), U.any()),
+            (say("crosses: not accepted"), marked.any()),
+        )
+        style.note(figure, semicolons([part for part, drawn in parts if drawn]))
+        return style.drawn(figure, caption, alternative)
 
 
 def _limits(ax: Axes, x: Floats, top: Floats, accepted: Floats) -> None:
@@ -72,21 +65,8 @@ def _limits(ax: Axes, x: Floats, top: Floats, accepted: Floats) -> None:
         ax.plot(length, side * np.where(known, inner, np.nan), color=INK, lw=0.7, ls=(0, (4, 3)), zorder=2)
 
 
-def _legend(accepted: Floats, expanded: Floats, *, marked: bool) -> Text:
-    parts = [
-        say("lines: ±MPE"),
-        say("dashed: limits of acceptance, with the guard band between") if np.isfinite(accepted).any() else NOTHING,
-        say("bars: U (k = 2)") if expanded.any() else NOTHING,
-        say("crosses: not accepted") if marked else NOTHING,
-    ]
-    return semicolons([part for part in parts if part])
-
-
-_FARTHEST = 3.0
-"""Times the tolerance that the picture reaches; what lies beyond is drawn at its edge with its figure."""
-
-_MANY = 8
-"""Rows beyond which they stand closer together."""
+_FARTHEST = 3.0  # times the tolerance that the picture reaches; what lies beyond is drawn at its edge with its figure
+_MANY = 8  # rows beyond which they stand closer together
 
 
 def tolerance_plot(
@@ -97,23 +77,23 @@ def tolerance_plot(
     ``ratio``: (n,) estimate over tolerance, signed; ``low, high``: (n,) ends of its coverage interval over the
     tolerance.
     """
-    value = finite("ratio", ratio, (len(names),))
-    ends = finite("low", low, value.shape), finite("high", high, value.shape)
+    value = style.finite("ratio", ratio, (len(names),))
+    ends = style.finite("low", low, value.shape), style.finite("high", high, value.shape)
     rows = np.arange(len(value), dtype=np.float64)
     reach = float(np.clip(1.15 * max(np.abs(ends[0]).max(), np.abs(ends[1]).max()), 1.3, _FARTHEST))
     out = (np.minimum(np.abs(ends[0]), np.abs(ends[1])) > 1) & (np.sign(ends[0]) == np.sign(ends[1]))
     height = 14 + (5.5 if len(value) <= _MANY else 4.5) * len(value)
-    with picture(height, left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height) as (figure, ax):
+    with style.picture(height, left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height) as (figure, ax):
         ax.axvspan(-1, 1, color=BAND, lw=0, zorder=0)
         ax.axvline(0, color=INK, lw=0.7, zorder=1)
         for chosen, colour in ((~out, ACCENT), (out, DIVERGING[-1])):
             inside, own = np.clip(value[chosen], -reach, reach), rows[chosen]
             left, right = (np.clip(end[chosen], -reach, reach) for end in ends)
-            strokes(ax, left, right, own, own, lw=1.6, color=colour, solid_capstyle="butt", zorder=2)
+            style.strokes(ax, left, right, own, own, lw=1.6, color=colour, solid_capstyle="butt", zorder=2)
             if colour == ACCENT:
-                dots(ax, inside, own, 4.0, colour)
+                style.dots(ax, inside, own, 4.0, colour)
             else:
-                crosses(ax, inside, own, 6.0, 1.6)
+                style.crosses(ax, inside, own, 6.0, 1.6)
         for row in np.flatnonzero(np.abs(value) > reach):
             side = np.sign(value[row])
             ax.annotate(f"{value[row]:+.1f}".replace("-", "−"), (side * reach, row), (-6 * side, 4),
@@ -124,4 +104,4 @@ def tolerance_plot(
         ax.invert_yaxis()
         ax.tick_params(left=False)
         ax.spines["left"].set_visible(False)
-        return drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative)

@@ -16,29 +16,15 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.labels import width_mm
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    INK,
-    MUTED,
-    SMALL,
-    TINY,
-    WIDTH_MM,
-    drawn,
-    finite,
-    house_style,
-    lettered,
-    new_figure,
-    strokes,
-)
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, SMALL, TINY, WIDTH_MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.path import Path
 
-READABLE = 12
-"""Most parameters that one corner shows."""
-
+READABLE = 12  # most parameters that one corner shows
 _BINS = 36
 _MASSES = (0.95, 0.5)  # probability inside the outer and the inner contour
 _SCALE = 0.9  # part of a panel's place that it fills
@@ -61,7 +47,7 @@ def corner_plot(
     parameter, (x, density) of its prior, dashed in grey.
     """
     total = len(names)
-    draws = finite("samples", samples, (None, total))
+    draws = style.finite("samples", samples, (None, total))
     if len(draws) < 2 or not total:
         raise CmmUqError("the picture of a posterior needs at least two draws of one parameter")
     chosen = _most_correlated(draws)
@@ -69,14 +55,14 @@ def corner_plot(
         caption = say("{caption} The {count} of {total} parameters that are correlated most are shown.",
                       caption=caption, count=len(chosen), total=total)  # fmt: skip
     kept = draws[:, chosen]
-    middle = np.median(draws, axis=0) if estimates is None else finite("estimates", estimates, (total,))
+    middle = np.median(draws, axis=0) if estimates is None else style.finite("estimates", estimates, (total,))
     between = np.quantile(draws, [0.025, 0.975], axis=0).T
     if intervals95 is not None:
-        between = finite("intervals95", intervals95, (total, 2))
+        between = style.finite("intervals95", intervals95, (total, 2))
     labels = [names[c] for c in chosen]
     if units:
         labels = [say("{name} / {unit}", name=names[c], unit=units[c]) if units[c] else names[c] for c in chosen]
-    with house_style():
+    with style.house_style():
         panels = _Panels(_ranges(kept), kept)
         panels.densities(middle[chosen], between[chosen])
         for k, parameter in enumerate(chosen):
@@ -85,7 +71,7 @@ def corner_plot(
         panels.pairs(middle[chosen])
         panels.frames()
         panels.words(labels)
-        return drawn(panels.figure, caption, alternative)
+        return style.drawn(panels.figure, caption, alternative)
 
 
 def _most_correlated(draws: Floats) -> NDArray[np.intp]:
@@ -134,7 +120,7 @@ class _Panels:
         below = max(_BELOW, longest * np.sin(np.radians(_SLANT)) + 4.0)
         self.panel_mm = min(30.0, (WIDTH_MM - self.left - 1) / self.count, max(_HEIGHT / self.count, 10.0))
         height = self.count * self.panel_mm + below + _ABOVE
-        self.figure = new_figure(height)
+        self.figure = style.new_figure(height)
         ax = self.figure.add_axes((0, 0, 1, 1))
         # the panels stand at the left, so that the last name, which begins over its own panel, has the room beside them
         ax.set(xlim=np.array([-self.left, WIDTH_MM - self.left]) / self.panel_mm)
@@ -175,8 +161,8 @@ class _Panels:
 
     def prior(self, k: int, x: ArrayLike, density: ArrayLike) -> None:
         """A prior density to the scale of the posterior's, as far as the panel goes."""
-        at = finite("prior", x, (None,))
-        heights = finite("prior density", density, at.shape)
+        at = style.finite("prior", x, (None,))
+        heights = style.finite("prior density", density, at.shape)
         posterior = self.marginal(k)
         per_density = posterior.sum() * np.ptp(self.ranges[k]) / _BINS
         grid = np.linspace(self.ranges[k, 0], self.ranges[k, 1], 64)
@@ -234,10 +220,10 @@ class _Panels:
             size = SMALL if self.count <= 8 else TINY
             room = WIDTH_MM - self.left - k * self.panel_mm - 1
             self.ax.text(k, self.count - k - 0.04, label, ha="left", va="bottom", fontweight="bold",
-                         fontsize=size * min(1.0, room / width_mm(lettered(label), size, "bold")))  # fmt: skip
+                         fontsize=size * min(1.0, room / width_mm(style.lettered(label), size, "bold")))  # fmt: skip
 
     def strokes(self, x0: Floats, x1: Floats, y0: Floats, y1: Floats, colour: str) -> None:
-        strokes(self.ax, x0, x1, y0, y1, color=colour, lw=0.6, solid_capstyle="butt")
+        style.strokes(self.ax, x0, x1, y0, y1, color=colour, lw=0.6, solid_capstyle="butt")
 
 
 def _ticks(low: float, high: float, most: int) -> tuple[Floats, list[str]]:

@@ -40,8 +40,7 @@ def farthest_right(path: Path) -> float:
     return float(max(part.max(initial=-np.inf) for part in (corners, turns, end)))
 
 
-NAMES_MM = 54.0
-"""Room of the names beside the bars of a budget."""
+NAMES_MM = 54.0  # room of the names beside the bars of a budget
 
 
 def narrowed(text: Text, room_mm: float) -> Text:
@@ -73,38 +72,36 @@ def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "norma
 
 def told_apart(names: Sequence[Text], room_mm: float) -> list[Text]:
     """Names cut to their room; where the beginnings of two are the same, each with its end in place of its beginning."""
-    found = [narrowed(name, room_mm) for name in names]
-    again = [str(one) for one in found]
+    short = [narrowed(name, room_mm) for name in names]
+    again = list(map(str, short))
     return [
-        _ending(name, room_mm) if again.count(str(one)) > 1 and str(one) != str(name) else one
-        for name, one in zip(names, found, strict=True)
+        _ending(name, room_mm) if again.count(text) > 1 and text != str(name) else beginning
+        for name, beginning, text in zip(names, short, again, strict=True)
     ]
 
 
 def _ending(text: Text, room_mm: float) -> Text:
     """The longest end of a text that has room, with what says that it began before."""
     whole = str.__str__(lettered(text))
-    start = next(i for i in range(1, len(whole)) if width_mm("…" + whole[i:].lstrip(" ,"), SMALL) <= room_mm)
-    return Verbatim("…" + whole[start:].lstrip(" ,"))
+    ends = ("…" + whole[i:].lstrip(" ,") for i in range(1, len(whole)))
+    return Verbatim(next(end for end in ends if width_mm(end, SMALL) <= room_mm))
 
 
 def _longest(text: str, room_mm: float) -> str:
     """The longest beginning of a text that has room, with what says that it goes on."""
+
+    def beginning(count: int) -> str:
+        return text[:count].rstrip(" ,") + "…"
+
     fits, too_long, trial = 0, len(text), len(text) // 2
     while too_long - fits > 1:
-        width = width_mm(_going_on(text, trial), SMALL)
+        width = width_mm(beginning(trial), SMALL)
         fits, too_long = (trial, too_long) if width <= room_mm else (fits, trial)
         trial = min(max(round(trial * room_mm / width), fits + 1), too_long - 1)
-    return _going_on(text, fits)
+    return beginning(fits)
 
 
-def _going_on(text: str, count: int) -> str:
-    return text[:count].rstrip(" ,") + "…"
-
-
-MOST = 1500
-"""Marks of one series: more would run into each other, and a page with them would take a browser seconds."""
-
+MOST = 1500  # marks of one series: more would run into each other, and a page with them would take a browser seconds
 _LARGEST = 300
 
 

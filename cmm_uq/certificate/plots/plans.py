@@ -12,38 +12,19 @@ from cmm_uq.analysis.planning.set_up import SetUp
 from cmm_uq.base.messages import Text, number, say, semicolons
 from cmm_uq.base.points import AXES, Floats
 from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.labels import folded, width_mm
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    INK,
-    MUTED,
-    RULE,
-    SMALL,
-    TINY,
-    WIDTH_MM,
-    dots,
-    drawn,
-    house_style,
-    lettered,
-    new_figure,
-    picture,
-)
+from cmm_uq.certificate.plots.style import ACCENT, INK, MUTED, RULE, SMALL, TINY, WIDTH_MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-A_ROW = 3
-"""Pictures side by side."""
-
-DEPTH = 0.5 * np.array([np.cos(np.radians(38.0)), np.sin(np.radians(38.0))])
-"""How the y axis runs into the picture."""
-
+A_ROW = 3  # pictures side by side
+DEPTH = 0.5 * np.array([np.cos(np.radians(38.0)), np.sin(np.radians(38.0))])  # how the y axis runs into the picture
 _REACH, _BELOW = 0.04, 0.064
 """Distance of the axes' names from the frame, and of that of X below it, in parts of the travel of X."""
 
-_LABEL_MM = 1.7
-"""Half the height of a name, with some room."""
-
+_LABEL_MM = 1.7  # half the height of a name, with some room
 _ROOM_MM = WIDTH_MM * (1 / A_ROW - 0.05)
 _TEXT_MM = 15.0
 
@@ -65,8 +46,8 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
     below = _BELOW * float(np.ptp(box[0])) + _LABEL_MM * float(span[0]) / width
     span[1] = max(span[1], high[1] - low[1] + 2 * below)  # the name of X needs more room than a share of a low volume
     height = min(width * float(span[1] / span[0]), 75.0) + _TEXT_MM
-    with house_style():
-        figure = new_figure(height)
+    with style.house_style():
+        figure = style.new_figure(height)
         for i, placing in enumerate(placings):
             ax = figure.add_axes((i / A_ROW, 0.0, 1 / A_ROW, 1 - _TEXT_MM / height))
             _draw(ax, placing, box)
@@ -77,9 +58,9 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
             left = i / A_ROW + 0.008
             figure.text(left, 1 - 4.5 / height, f"{first + i}", fontsize=10, color=ACCENT, fontweight="bold")
             lines = _title(placing.title)
+            size = min(map(_size, lines))
             for line, below in zip(lines, (4.5,) if len(lines) == 1 else (3.6, 6.4), strict=True):
-                figure.text(left + 0.035, 1 - below / height, line, fontsize=min(_size(one) for one in lines), color=INK,
-                            fontweight="bold")  # fmt: skip
+                figure.text(left + 0.035, 1 - below / height, line, fontsize=size, color=INK, fontweight="bold")
             figure.text(left, 1 - 9.5 / height, placing.ends, fontsize=TINY, color=MUTED)
         last, numbers = first + len(placings) - 1, say("Placing {first}", first=first)
         if last > first:
@@ -89,7 +70,7 @@ def _row(placings: Sequence[SetUp], box: Floats, first: int) -> Plot:
         )
         words = [say("{first}: {title}, {ends} mm", first=first + i, title=p.title, ends=p.ends)
                  for i, p in enumerate(placings)]  # fmt: skip
-        return drawn(figure, told, semicolons(words))
+        return style.drawn(figure, told, semicolons(words))
 
 
 def _seen(xyz: Floats) -> Floats:
@@ -108,8 +89,8 @@ def _draw(ax: Axes, placing: SetUp, box: Floats) -> None:
         _line(ax, np.vstack([readings[row], floor[row]]), MUTED, 0.5, dashed=True)
     _line(ax, readings[outline], ACCENT, 1.6)
     seen = _seen(readings)
-    dots(ax, seen[:, 0], seen[:, 1], 4.6 if len(readings) <= 3 else 2.2, ACCENT, zorder=5)
-    dots(ax, seen[:1, 0], seen[:1, 1], 6.0, ACCENT, hollow=True, zorder=6)
+    style.dots(ax, seen[:, 0], seen[:, 1], 4.6 if len(readings) <= 3 else 2.2, ACCENT, zorder=5)
+    style.dots(ax, seen[:1, 0], seen[:1, 1], 6.0, ACCENT, hollow=True, zorder=6)
 
 
 def _frame(ax: Axes, box: Floats) -> None:
@@ -163,12 +144,12 @@ def gain_plot(
     ratio = pairs / np.where(largest > 0, largest, 1.0)[:, None]
     shown = np.where(np.isfinite(ratio), ratio, 1.3)
     height, never = 20.0 + 5.2 * len(labels), say("not at all")
-    with picture(height, left=0.36, right=0.98, bottom=11 / height, top=1 - 8 / height) as (figure, ax):
+    with style.picture(height, left=0.36, right=0.98, bottom=11 / height, top=1 - 8 / height) as (figure, ax):
         y = np.arange(len(labels), dtype=np.float64)[::-1]
         for i, row in enumerate(y):
             ax.plot(shown[i], [row, row], color=RULE, lw=2.2, solid_capstyle="butt", zorder=1)
-        dots(ax, shown[:, 0], y, 5.0, MUTED, hollow=True)
-        dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
+        style.dots(ax, shown[:, 0], y, 5.0, MUTED, hollow=True)
+        style.dots(ax, shown[:, 1], y, 5.0, ACCENT, zorder=4)
         ax.set_yticks(y, labels)
         ax.set(xlim=(0.0, _edge(never)), ylim=(-0.7, len(labels) - 0.3))
         ax.set_xticks([0, 0.25, 0.5, 0.75, 1.0, 1.3], ["0", "¼", "½", "¾", "1", never])
@@ -176,12 +157,12 @@ def gain_plot(
         ax.set_xlabel(say("{quantity}, over the larger of the two", quantity=quantity))
         figure.text(0.36, 1 - 4.5 / height, say("○ {plan}", plan=names[0]), color=MUTED, fontsize=8)
         figure.text(0.66, 1 - 4.5 / height, say("● {plan}", plan=names[1]), color=ACCENT, fontsize=8, fontweight="bold")
-        told = semicolons(
+        words = semicolons(
             say("{label}: {before} before, {after} after", label=label, before=_figure(a), after=_figure(b))
             for label, a, b in zip(labels, before, after, strict=True)
         )
         both = say("{quantity} with {one} and with {other}.", quantity=quantity, one=names[0], other=names[1])
-        return drawn(figure, both, told)
+        return style.drawn(figure, both, words)
 
 
 def _title(title: Text) -> list[Text]:
@@ -191,12 +172,12 @@ def _title(title: Text) -> list[Text]:
 
 def _size(title: Text) -> float:
     """Of the letters of a placing's title, smaller where it is longer than its picture is wide."""
-    return SMALL * min(1.0, _ROOM_MM / width_mm(lettered(title), SMALL, "bold"))
+    return SMALL * min(1.0, _ROOM_MM / width_mm(style.lettered(title), SMALL, "bold"))
 
 
 def _edge(last: Text) -> float:
     """Right end of the axis, so that the text of its last tick, at 1.3, has room."""
-    axis, beside = 0.62 * WIDTH_MM, width_mm(lettered(last), SMALL) / 2 - 0.02 * WIDTH_MM
+    axis, beside = 0.62 * WIDTH_MM, width_mm(style.lettered(last), SMALL) / 2 - 0.02 * WIDTH_MM
     return max(1.38, 1.3 * axis / (axis - beside))
 
 

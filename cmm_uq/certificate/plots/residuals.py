@@ -17,36 +17,17 @@ from cmm_uq.base.messages import NOTHING, Text, say, semicolons, signed
 from cmm_uq.base.points import Floats
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.labels import NAMES_MM, folded, shown, told, width_mm
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    BAND,
-    DIVERGING,
-    INK,
-    MUTED,
-    RULE,
-    SMALL,
-    TINY,
-    WIDTH_MM,
-    band,
-    bars,
-    dots,
-    drawn,
-    finite,
-    house_style,
-    lettered,
-    new_figure,
-    note,
-    panel_title,
-    picture,
-    strokes,
-)
+from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, RULE, SMALL, TINY, WIDTH_MM
 from cmm_uq.certificate.result import Result
 from cmm_uq.maths.uncertainty.quantity import alike
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+_NOTE_MM = 128.0  # room of the note beside a title of thirty letters
+_PANELS = ((0, 1), (0, 2), (1, 2))
 
 
 def length_plot(
@@ -64,8 +45,10 @@ def length_plot(
     404.2357 mm"; ``reference_expanded_um``: expanded uncertainty of the reference, µm: the half width of the band about
     zero; ``flagged``: (n,) true where screening flagged the position.
     """
-    series = ((before_label, before_um, expanded_before_um, MUTED), (after_label, after_um, expanded_after_um, ACCENT))
-    return _panels(position, series, (reference, reference_expanded_um), flagged, position_label, caption, alternative)
+    before = before_label, before_um, expanded_before_um, MUTED
+    after = after_label, after_um, expanded_after_um, ACCENT
+    zero = reference, reference_expanded_um
+    return _panels(position, (before, after), zero, flagged, position_label, caption, alternative)
 
 
 def residual_plot(
@@ -85,53 +68,46 @@ def _panels(
     from matplotlib.ticker import MaxNLocator, MultipleLocator
 
     reference, reference_expanded_um = zero
-    count = np.asarray(given[0][1]).shape[0]
-    x = _side_by_side(finite("position", position, (count,)))
-    series = [(label, finite("deviation", values, (count,)), U, colour) for label, values, U, colour in given]
+    count, two = np.asarray(given[0][1]).shape[0], len(given) == 2
+    x = _side_by_side(style.finite("position", position, (count,)))
+    series = [(label, style.finite("deviation", values, (count,)), U, colour) for label, values, U, colour in given]
     marked = np.zeros(count, dtype=bool) if flagged is None else np.asarray(flagged, dtype=bool)
     rows = shown([values for _, values, _, _ in series], marked)
     caption, x, marked = told(caption, len(rows), count), x[rows], marked[rows]
-    size, two = float(np.clip(60.0 / count**0.75, 1.3, 4.2)), len(series) == 2
-    with house_style():
-        figure = new_figure(84 if two else 62)
-        axes = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
-        below, above = (0.105, 0.945) if two else (0.16, 0.92)
-        figure.subplots_adjust(left=0.082, right=0.995, bottom=below, top=above, hspace=0.27)
+    size = float(np.clip(60.0 / count**0.75, 1.3, 4.2))
+    below, above = (0.105, 0.945) if two else (0.16, 0.92)
+    with style.pictures(84 if two else 62, len(series), left=0.082, right=0.995, bottom=below, top=above, hspace=0.27) as (
+        figure, axes
+    ):  # fmt: skip
         for ax, (label, whole, expanded, colour) in zip(axes, series, strict=True):
             every = np.broadcast_to(np.asarray(expanded, dtype=float), (count,))
-            half, values = finite("expanded uncertainty", every, (count,))[rows], whole[rows]
+            half, values = style.finite("expanded uncertainty", every, (count,))[rows], whole[rows]
             ax.axhspan(-reference_expanded_um, reference_expanded_um, color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.7, zorder=1)
-            bars(ax, x, values - half, values + half, max(0.28 * size, 0.6), colour)
-            dots(ax, x, values, size, colour, hollow=colour == MUTED)  # the two series differ in grey too
+            style.bars(ax, x, values - half, values + half, max(0.28 * size, 0.6), colour)
+            style.dots(ax, x, values, size, colour, hollow=colour == MUTED)  # the two series differ in grey too
             if marked.any():
                 ax.plot(x[marked], values[marked], ls="", marker="o", ms=size + 4, mfc="none", mec=DIVERGING[-1], mew=1.1,
                         zorder=4)  # fmt: skip
             ax.grid(axis="y")
             ax.margins(y=0.08)
             ax.set_ylabel(say("Deviation / µm"))
-            panel_title(ax, label, colour)
+            style.panel_title(ax, label, colour)
         for ax in axes[:-1]:
             ax.tick_params(bottom=False)
-        last = axes[-1]
-        last.set_xlabel(position_label)
         room = 0.8 + 0.01 * float(np.ptp(x))
-        last.set_xlim(x.min() - room, x.max() + room)
-        last.xaxis.set_major_locator(MultipleLocator(1) if np.ptp(x) <= 30 else MaxNLocator(12, integer=True))
+        axes[-1].set(xlabel=position_label, xlim=(x.min() - room, x.max() + room))
+        axes[-1].xaxis.set_major_locator(MultipleLocator(1) if np.ptp(x) <= 30 else MaxNLocator(12, integer=True))
         figure.align_ylabels(axes)
-        parts = [say("zero: {reference}", reference=reference)]
+        zero_is = say("zero: {reference}", reference=reference)
         if reference_expanded_um:
-            parts = [say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=reference_expanded_um)]
+            zero_is = say("zero: {reference}, band: its U = {U:.2g} µm", reference=reference, U=reference_expanded_um)
         marks = say("bars: U, rings: flagged by screening") if marked.any() else say("bars: U")
-        legend = semicolons((*parts, marks))
-        if width_mm(lettered(legend), TINY) > _NOTE_MM:
+        legend = semicolons((zero_is, marks))
+        if width_mm(style.lettered(legend), TINY) > _NOTE_MM:
             figure.subplots_adjust(top=0.905 if two else 0.86)  # the note has a line of its own
-        note(figure, legend, 0.995, 0.985)
-        return drawn(figure, caption, alternative)
-
-
-_NOTE_MM = 128.0
-"""Room of the note beside a title of thirty letters."""
+        style.note(figure, legend, 0.995, 0.985)
+        return style.drawn(figure, caption, alternative)
 
 
 def _side_by_side(position: Floats) -> Floats:
@@ -157,13 +133,13 @@ def volume_plot(
     that ``quantity`` names; ``end_mm``: (n, 3) the other ends; none for points; ``travel_mm``: (3, 2) the machine's
     volume in the same frame, drawn as an outline where given.
     """
-    start = finite("start_mm", start_mm, (None, 3))
-    end = start if end_mm is None else finite("end_mm", end_mm, (len(start), 3))
-    residual = finite("residual_um", residual_um, (len(start),))
+    start = style.finite("start_mm", start_mm, (None, 3))
+    end = start if end_mm is None else style.finite("end_mm", end_mm, (len(start), 3))
+    residual = style.finite("residual_um", residual_um, (len(start),))
     rows = shown([residual])
     caption = told(caption, len(rows), len(residual))
     start, end, residual = start[rows], end[rows], residual[rows]
-    box = None if travel_mm is None else finite("travel_mm", travel_mm, (3, 2))
+    box = None if travel_mm is None else style.finite("travel_mm", travel_mm, (3, 2))
     limit = float(np.abs(residual).max(initial=0.0)) or 1.0
     edges = limit * np.linspace(-1, 1, len(DIVERGING) + 1)
     step = np.clip(np.searchsorted(edges, residual, side="right") - 1, 0, len(DIVERGING) - 1)
@@ -172,7 +148,7 @@ def volume_plot(
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = 0.06 * float((high - low).max()) + 1e-9
     low, high = low - margin, high + margin
-    with house_style():
+    with style.house_style():
         figure, axes, scale_axes = _projections(high - low)
         for ax, (a, b) in zip(axes, _PANELS, strict=True):
             for index in extremes_last:
@@ -180,16 +156,20 @@ def volume_plot(
                 _members(ax, start[chosen][:, (a, b)], end[chosen][:, (a, b)], residual[chosen] / limit,
                          DIVERGING[index], len(start))  # fmt: skip
             if box is not None:
-                outline = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
-                ax.plot(box[a][outline[:, 0]], box[b][outline[:, 1]], color=RULE, lw=0.7, zorder=0)
-            ax.set(xlabel=axis_labels[a], ylabel=axis_labels[b])
-            ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]))
+                (left, right), (bottom, top) = box[a], box[b]
+                ax.plot(
+                    [left, right, right, left, left], [bottom, bottom, top, top, bottom], color=RULE, lw=0.7, zorder=0
+                )
+            ax.set(xlabel=axis_labels[a], ylabel=axis_labels[b], xlim=(low[a], high[a]), ylim=(low[b], high[b]))
             ax.locator_params(nbins=4)
-        _colour_scale(scale_axes, edges, quantity)
-        return drawn(figure, caption, alternative)
-
-
-_PANELS = ((0, 1), (0, 2), (1, 2))
+        scale_axes.bar(edges[:-1], 1, np.diff(edges), align="edge", color=DIVERGING, lw=0)
+        digits = max(0, 1 - int(np.floor(np.log10(limit))))
+        scale_axes.set_xticks(edges, [f"{edge:+.{digits}f}".replace("-", "−") for edge in edges])
+        scale_axes.set(xlim=(edges[0], edges[-1]), yticks=[])
+        label = say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=quantity)
+        scale_axes.set_xlabel(label, labelpad=2)
+        scale_axes.spines[:].set_visible(False)
+        return style.drawn(figure, caption, alternative)
 
 
 def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
@@ -198,7 +178,7 @@ def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
     label, right, base = 14.0, 4.0, 25.0  # mm beside each panel, at the right edge, below the panels
     scale = min((WIDTH_MM - 3 * label - right) / sum(across), 70.0 / max(up))
     height = base + scale * max(up) + 2.0
-    figure = new_figure(height)
+    figure = style.new_figure(height)
     spare = (WIDTH_MM - 3 * label - right - scale * sum(across)) / 3
     axes, x = [], label
     for w, h in zip(across, up, strict=True):
@@ -210,28 +190,15 @@ def _projections(spans: Floats) -> tuple[Figure, list[Axes], Axes]:
 def _members(ax: Axes, start: Floats, end: Floats, relative: Floats, colour: str, total: int) -> None:
     """Bars of one colour step, with dots at their middles in four sizes."""
     width = float(np.clip(14 / np.sqrt(total), 0.7, 2.2))
-    strokes(
-        ax, start[:, 0], end[:, 0], start[:, 1], end[:, 1], color=colour, lw=width, solid_capstyle="round", zorder=2
-    )
-    middle = (start + end) / 2
+    (x0, y0), (x1, y1), (x, y) = start.T, end.T, ((start + end) / 2).T
+    style.strokes(ax, x0, x1, y0, y1, color=colour, lw=width, solid_capstyle="round", zorder=2)
     classes = np.minimum(np.floor(np.abs(relative) * 4), 3)
     for size_class in np.unique(classes):
-        chosen = classes == size_class
         size = float(np.clip(28 / np.sqrt(total), 1.4, 4.5)) * (0.6 + 0.4 * size_class)
         for positive in (True, False):
-            some = chosen & ((relative >= 0) == positive)
+            some = (classes == size_class) & ((relative >= 0) == positive)
             if some.any():
-                dots(ax, middle[some, 0], middle[some, 1], size, colour, hollow=not positive)
-
-
-def _colour_scale(ax: Axes, edges: Floats, quantity: Text) -> None:
-    ax.bar(edges[:-1], 1, np.diff(edges), align="edge", color=DIVERGING, lw=0)
-    digits = max(0, 1 - int(np.floor(np.log10(edges[-1]))))
-    ax.set_xticks(edges, [f"{edge:+.{digits}f}".replace("-", "−") for edge in edges])
-    ax.set(xlim=(edges[0], edges[-1]), yticks=[])
-    ax.set_xlabel(say("{quantity}  (full dot: positive, hollow dot: negative)", quantity=quantity), labelpad=2)
-    for spine in ax.spines.values():
-        spine.set_visible(False)
+                style.dots(ax, x[some], y[some], size, colour, hollow=not positive)
 
 
 def curve_with_band(
@@ -242,26 +209,25 @@ def curve_with_band(
 
     Labels carry their units, such as "Error / µm".
     """
-    across = finite("x", x, (None,))
-    values, half = finite("y", y, across.shape), finite("expanded uncertainty", expanded, across.shape)
-    with picture(72, left=0.105, right=0.975, bottom=0.14, top=0.97) as (
-        figure,
-        ax,
-    ):  # room for ticks of six characters
-        band(ax, across, values, half, alpha=0.16)
+    across = style.finite("x", x, (None,))
+    values, half = style.finite("y", y, across.shape), style.finite("expanded uncertainty", expanded, across.shape)
+    # room for ticks of six characters
+    with style.picture(72, left=0.105, right=0.975, bottom=0.14, top=0.97) as (figure, ax):
+        style.band(ax, across, values, half, alpha=0.16)
         ax.plot(across, values, color=ACCENT, lw=1.3)
         ax.axhline(0, color=INK, lw=0.6, zorder=1)
         if points is not None:
-            dots(ax, finite("points", points[0], (None,)), finite("points", points[1], (None,)), 2.5, MUTED)
+            px, py = (style.finite("points", part, (None,)) for part in points)
+            style.dots(ax, px, py, 2.5, MUTED)
         ax.grid(axis="y")
         ax.margins(x=0.01)
         ax.set(xlabel=x_label, ylabel=y_label)
-        return drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative)
 
 
 def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, alternative: Text) -> Plot:
     """Share of every source in the variance (0 … 1; negative where a correlation takes away), largest first."""
-    share = finite("shares", shares, (len(sources),))
+    share = style.finite("shares", shares, (len(sources),))
     if not len(share):
         raise CmmUqError("a budget without a source has no picture")
     from matplotlib import rcParams
@@ -270,8 +236,9 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
     rows = np.arange(len(order))
     names = [folded(sources[index], NAMES_MM) for index in order]
     height = 10 + (7.0 if any(len(lines) > 1 for lines in names) else 6.0) * len(order)
-    with picture(height, left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height) as (figure, ax):
-        ax.barh(rows, share[order], 0.55, color=[ACCENT if value >= 0 else MUTED for value in share[order]], lw=0)
+    with style.picture(height, left=0.34, right=0.93, bottom=1.5 / height, top=1 - 1.5 / height) as (figure, ax):
+        colours = [ACCENT if value >= 0 else MUTED for value in share[order]]
+        ax.barh(rows, share[order], 0.55, color=colours, lw=0)
         ax.axvline(0, color=MUTED, lw=0.6)
         for row, value in zip(rows, share[order], strict=True):
             text = say("{share} %", share=signed(100 * value, ".1f"))
@@ -285,9 +252,8 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
             for line, up in zip(lines, (0.6, -0.6), strict=True) if len(lines) > 1 else ():
                 ax.annotate(line, (0, place), (left, up * SMALL), xycoords=("axes fraction", "data"),
                             textcoords="offset points", ha="right", va="center", fontsize=SMALL, color=INK)  # fmt: skip
-        for side in ("bottom", "left"):
-            ax.spines[side].set_visible(False)
-        return drawn(figure, caption, alternative)
+        ax.spines[["bottom", "left"]].set_visible(False)
+        return style.drawn(figure, caption, alternative)
 
 
 def residual_volume(result: Result, what: Text) -> Plot:

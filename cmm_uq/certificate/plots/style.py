@@ -1,13 +1,9 @@
-"""The looks and lettering of all pictures, black and white first.
+"""The looks and lettering of all pictures, black and white first: one accent colour, quiet axes, one path a series.
 
-One accent colour, quiet axes, and SVG that both views can take as it is. The language of what is lettered is chosen before a
-document is composed, since a picture is drawn once, with the room that its texts need.
-
-Text stays text in the SVG, without a font of its own. The browser then sets it in the page's face and the PDF in the
-document's, and it can be searched and copied; outlines would make the three pictures of a ballbar certificate half as
-large again and look the same in both, but like neither. Room is measured with DejaVu Sans, which is wider than the faces
-that show it, so nothing runs into its neighbour (a test looks at that in a browser).
-Series are drawn as one compound path each, not as an object per point: 600 lengths are as light as twenty.
+The language of what is lettered is chosen before a document is composed, since a picture is drawn once, with the room that
+its texts need. Text stays text in the SVG, without a font of its own: the browser then sets it in the page's face and the
+PDF in the document's. Room is measured with DejaVu Sans, which is wider than the faces that show it, so nothing runs into
+its neighbour (a test looks at that in a browser).
 """
 
 from __future__ import annotations
@@ -15,7 +11,7 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import replace
@@ -38,10 +34,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.ticker import Formatter
 
-JAPANESE = "IPAexGothic"
-"""Family that sets Japanese, under the IPA Font License 1.0, which allows it in documents."""
-_PACKAGE = "matplotlib_fontja"
-"""What it comes in; the package is not imported, since that would change matplotlib's settings."""
+JAPANESE = "IPAexGothic"  # family that sets Japanese, under the IPA Font License 1.0, which allows it in documents.
+_PACKAGE = "matplotlib_fontja"  # has it; the package is not imported, since that would change matplotlib's settings
+_LANGUAGE: ContextVar[Code] = ContextVar("language of pictures", default=ENGLISH)
 
 
 def japanese_font() -> Path:
@@ -58,9 +53,6 @@ def japanese_font() -> Path:
 
 def fonts_of(language: Code) -> list[Path]:
     return [japanese_font()] if language == "ja" else []
-
-
-_LANGUAGE: ContextVar[Code] = ContextVar("language of pictures", default=ENGLISH)
 
 
 @contextmanager
@@ -88,9 +80,8 @@ def _known_to_matplotlib() -> str:
     from matplotlib.font_manager import fontManager
 
     fontManager.addfont(japanese_font())
-    fontManager.ttflist.append(
-        replace(fontManager.ttflist[-1], weight=700)
-    )  # its one weight serves bold lettering, too
+    # its one weight serves bold lettering, too
+    fontManager.ttflist.append(replace(fontManager.ttflist[-1], weight=700))
     return JAPANESE
 
 
@@ -141,18 +132,12 @@ def _localised() -> Callable[[Formatter, Code], Formatter]:
     return Localised
 
 
-INK = "#1b2328"
-"""Text and outlines; 15.9 : 1 on white."""
-MUTED = "#5a666e"
-"""Secondary text, and what was before; 5.9 : 1 on white."""
-RULE = "#d3dade"
-"""Hairlines."""
-TINT = "#eef4f6"
-"""A wash of the accent behind text."""
-ACCENT = "#0b5c7a"
-"""The one accent colour; 7.4 : 1 on white."""
-BAND = "#d5e4ea"
-"""A stronger wash, for bands behind data."""
+INK = "#1b2328"  # text and outlines; 15.9 : 1 on white.
+MUTED = "#5a666e"  # secondary text, and what was before; 5.9 : 1 on white.
+RULE = "#d3dade"  # hairlines
+TINT = "#eef4f6"  # A wash of the accent behind text
+ACCENT = "#0b5c7a"  # the one accent colour; 7.4 : 1 on white.
+BAND = "#d5e4ea"  # A stronger wash, for bands behind data
 GOOD, OPEN, BAD = "#1f6b3a", "#8a5300", "#9c2420"
 """A verdict: nothing to do, something to do, something wrong; white on them at least 6 : 1. A sign and words go with them."""
 COLOURS = {
@@ -163,43 +148,22 @@ COLOURS = {
 DIVERGING = ("#0b5c7a", "#3f86a0", "#86b1c2", "#c3ccd0", "#e0b48a", "#cc7f3c", "#a84e08")
 """Negative to positive, parted by blue and orange, which every common kind of colour vision tells apart."""
 
-WIDTH_MM = 170.0
-"""Width of the text on the page (A4 with margins of 20 mm)."""
-SMALL, TINY = 7.5, 6.8
-"""Sizes of lettering, pt."""
+WIDTH_MM = 170.0  # width of the text on the page (A4 with margins of 20 mm)
+SMALL, TINY = 7.5, 6.8  # sizes of lettering, pt
 
+_TICKS = {"color": MUTED, "labelcolor": INK, "labelsize": SMALL, "major.width": 0.6, "major.size": 2.5}
 _SETTINGS = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "cmm_uq",
+    "svg.fonttype": "none", "svg.hashsalt": "cmm_uq",
     "path.simplify": False,
     "text.parse_math": False,  # a dollar sign in a customer's column name is a dollar sign
-    "axes.unicode_minus": True,
-    "font.size": SMALL,
-    "text.color": INK,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": INK,
-    "axes.labelsize": SMALL,
-    "axes.labelpad": 4.0,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "grid.color": "#e6eaec",
-    "grid.linewidth": 0.5,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.major.size": 2.5,
-    "ytick.major.size": 2.5,
+    "font.size": SMALL, "text.color": INK,
+    "axes.unicode_minus": True, "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.labelsize": SMALL, "axes.labelpad": 4.0,
+    "axes.linewidth": 0.6, "axes.spines.top": False, "axes.spines.right": False, "axes.axisbelow": True,
     "axes.titley": 1.0,  # or matplotlib looks through all ticks for one that a title could touch; none is above
-    "legend.frameon": False,
-    "legend.fontsize": SMALL,
-}
+    "grid.color": "#e6eaec", "grid.linewidth": 0.5,
+    "legend.frameon": False, "legend.fontsize": SMALL,
+    **{f"{axis}tick.{key}": value for axis in "xy" for key, value in _TICKS.items()},
+}  # fmt: skip
 
 
 @contextmanager
@@ -226,13 +190,23 @@ def new_figure(height_mm: float) -> Figure:
 
 
 @contextmanager
-def picture(height_mm: float, **edges: float) -> Iterator[tuple[Figure, Axes]]:
-    """A figure in the house style with one set of axes, whose ``left``, ``right``, ``bottom``, ``top`` are parts of it."""
+def pictures(
+    height_mm: float, rows: int, columns: int = 1, height_ratios: Sequence[float] | None = None, **layout: Any
+) -> Iterator[tuple[Figure, list[Axes]]]:
+    """A figure in the house style with panels that share their axes; edges and gaps of ``layout`` are parts of it."""
     with house_style():
         figure = new_figure(height_mm)
-        ax = figure.subplots()
-        figure.subplots_adjust(**edges)
-        yield figure, ax
+        axes = figure.subplots(rows, columns, sharex=True, sharey=rows == 1, squeeze=False,
+                                height_ratios=height_ratios)  # fmt: skip
+        figure.subplots_adjust(**layout)
+        yield figure, list(axes.ravel())
+
+
+@contextmanager
+def picture(height_mm: float, **layout: Any) -> Iterator[tuple[Figure, Axes]]:
+    """The same with one panel."""
+    with pictures(height_mm, 1, **layout) as (figure, axes):
+        yield figure, axes[0]
 
 
 _NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
@@ -243,26 +217,26 @@ _ALONE = re.compile(r"M (\S+) (\S+)(?: L \1 \2| M \1 \2)+ ?")
 """Dots in one place: a path without extent, which some viewers of PDF leave out."""
 
 
-def _shorter(number: re.Match[str]) -> str:
-    return _shorter_of(float(number[0]))
-
-
-def _shorter_of(value: float) -> str:
+def _shorter(value: float) -> str:
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
+
+
+def _shortened(text: str) -> str:
+    return _NUMBER.sub(lambda number: _shorter(float(number[0])), text)
 
 
 class _Words(dict[str, str]):
     """Words of paths, shortened where they are numbers: that of a dot has each of them twice, that of a ring four times."""
 
     def __missing__(self, word: str) -> str:
-        self[word] = shorter = _NUMBER.sub(_shorter, word)
-        return shorter
+        self[word] = _shortened(word)
+        return self[word]
 
     def path(self, data: str) -> str:
-        said = " ".join(map(self.__getitem__, data.split()))
-        alone = _ALONE.fullmatch(said)
-        return f"M {alone[1]} {alone[2]} L {_shorter_of(float(alone[1]) + 0.01)} {alone[2]}" if alone else said
+        words = " ".join(map(self.__getitem__, data.split()))
+        alone = _ALONE.fullmatch(words)
+        return f"M {alone[1]} {alone[2]} L {_shorter(float(alone[1]) + 0.01)} {alone[2]}" if alone else words
 
 
 def as_svg(figure: Figure) -> str:
@@ -285,7 +259,7 @@ def as_svg(figure: Figure) -> str:
     def plain(tag: str) -> str:
         tag = _UNWANTED.sub("", tag).replace("xlink:href", "href")
         tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in used else "", tag)
-        tag = _COORDINATES.sub(lambda values: _NUMBER.sub(_shorter, values[0]), tag)
+        tag = _COORDINATES.sub(lambda values: _shortened(values[0]), tag)
         return re.sub(r"\s+", " ", tag).replace(' "', '"')
 
     svg = re.sub(r">\s+<", "><", _TAG.sub(clean, svg))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,31 +12,20 @@ from cmm_uq.analysis.diagnosis.location import ResidualField
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import Floats
 from cmm_uq.certificate.document import Plot
+from cmm_uq.certificate.plots import style
 from cmm_uq.certificate.plots.labels import shown, told
-from cmm_uq.certificate.plots.style import (
-    ACCENT,
-    BAND,
-    DIVERGING,
-    INK,
-    MUTED,
-    RULE,
-    TINY,
-    WIDTH_MM,
-    band,
-    dots,
-    drawn,
-    finite,
-    house_style,
-    new_figure,
-    panel_title,
-    strokes,
-)
+from cmm_uq.certificate.plots.style import ACCENT, BAND, DIVERGING, INK, MUTED, RULE, TINY, WIDTH_MM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _ROUND = (1.0, 2.0, 5.0)
+_PLANES = ((0, 1), (0, 2), (1, 2))
+_AXES = "XYZ"
+_TITLE = 56.0  # mm that the title of a column needs
+_LONGEST = 0.16  # of the drawn width, the longest vector
+Shade = tuple[str, float, float]  # axis, and the range of its reading that is shaded
 
 
 def vector_plot(
@@ -47,27 +36,25 @@ def vector_plot(
 
     ``position_mm``: (n, 2) where each vector stands; ``series``: title and (n, 2) vectors in µm; one to three of them.
     """
-    place = finite("position_mm", position_mm, (None, 2))
-    vectors = [(title, finite("vectors", values, place.shape)) for title, values in series]
-    rows = shown([np.linalg.norm(values, axis=1) for _, values in vectors])
+    place = style.finite("position_mm", position_mm, (None, 2))
+    vectors = [style.finite("vectors", values, place.shape) for _, values in series]
+    rows = shown([np.linalg.norm(values, axis=1) for values in vectors])
     caption = told(caption, len(rows), len(place))
-    place, vectors = place[rows], [(title, values[rows]) for title, values in vectors]
-    longest = max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for _, values in vectors) or 1.0
+    place, vectors = place[rows], [values[rows] for values in vectors]
+    longest = _longest(vectors)
     low, high = place.min(axis=0), place.max(axis=0)
     span = np.maximum(high - low, 1e-3 * float(np.ptp(place)) + 1.0)
-    factor = 0.14 * float(span.max()) / longest  # mm drawn for one µm
-    margin = 0.2 * float(span.max())
+    factor, margin = 0.14 * float(span.max()) / longest, 0.2 * float(span.max())  # mm drawn for one µm, and about all
     width = 170.0 / len(vectors)
     height = min(22 + (width - 16) * float((span[1] + 2 * margin) / (span[0] + 2 * margin)), 150.0)
-    with house_style():
-        figure = new_figure(height)
-        axes = figure.subplots(1, len(vectors), squeeze=False, sharex=True, sharey=True)[0]
-        figure.subplots_adjust(left=0.085, right=0.995, bottom=12 / height, top=1 - 8 / height, wspace=0.08)
-        for ax, (title, values), colour in zip(axes, vectors, (MUTED, ACCENT, ACCENT), strict=False):
-            dots(ax, place[:, 0], place[:, 1], 2.0, RULE)
+    edges: dict[str, Any] = {"left": 0.085, "right": 0.995, "bottom": 12 / height, "top": 1 - 8 / height}
+    with style.pictures(height, 1, len(vectors), **edges, wspace=0.08) as (figure, axes):
+        colours = (MUTED, ACCENT, ACCENT)
+        for ax, (title, _), values, colour in zip(axes, series, vectors, colours, strict=False):
+            style.dots(ax, place[:, 0], place[:, 1], 2.0, RULE)
             tips = place + factor * values
             ax.quiver(*place.T, *(tips - place).T, angles="xy", scale_units="xy", scale=1, color=colour, width=0.006)
-            panel_title(ax, title, colour)
+            style.panel_title(ax, title, colour)
             ax.set_aspect("equal")
             ax.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
             ax.set_xlabel(axis_labels[0])
@@ -78,25 +65,17 @@ def vector_plot(
         axes[-1].plot([x, x + factor * unit], [y, y], color=ACCENT, lw=1.6, solid_capstyle="butt")
         axes[-1].annotate(say("{length:g} µm", length=unit), (x + factor * unit / 2, y), (0, 3),
                           textcoords="offset points", ha="center", va="bottom", fontsize=TINY)  # fmt: skip
-        return drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative)
+
+
+def _longest(vectors: Sequence[Floats]) -> float:
+    return max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for values in vectors) or 1.0
 
 
 def round_length(longest: float) -> float:
     """The largest of 1, 2, 5 times a power of ten that is not longer than the longest vector."""
     power = 10.0 ** np.floor(np.log10(longest))
     return float(max(step * power for step in _ROUND if step * power <= longest))
-
-
-_PLANES = ((0, 1), (0, 2), (1, 2))
-_AXES = "XYZ"
-_TITLE = 56.0
-"""mm that the title of a column needs."""
-
-_LONGEST = 0.16
-"""Of the drawn width, the longest vector."""
-
-Shade = tuple[str, float, float]
-"""Axis, and the range of its reading that is shaded."""
 
 
 def residual_field_plot(
@@ -109,26 +88,33 @@ def residual_field_plot(
 
     ``expanded_um``: (q,) expanded uncertainty of the length of each vector, µm.
     """
-    place, limit = finite("place", field.place, (None, 3)), finite("expanded_um", expanded_um, (len(field.place),))
-    series = [finite("vectors", v, place.shape) for v in (field.before, field.after)[: len(titles)]]
-    rows = _rows(series, field.lengths)
+    place, limit = (
+        style.finite("place", field.place, (None, 3)),
+        style.finite("expanded_um", expanded_um, (len(field.place),)),
+    )
+    series = [style.finite("vectors", v, place.shape) for v in (field.before, field.after)[: len(titles)]]
+    sizes = [np.linalg.norm(values, axis=1) for values in series]
+    rows = shown([size[::2] for size in sizes] if field.lengths else sizes)
+    if field.lengths:  # both ends of each
+        rows = np.column_stack([2 * rows, 2 * rows + 1]).ravel()
     caption = told(caption, len(rows), len(place))
     place, limit, series = place[rows], limit[rows], [values[rows] for values in series]
-    planes = _planes(place, series[0])
-    longest = max(float(np.linalg.norm(values, axis=1).max(initial=0.0)) for values in series) or 1.0
+    planes, longest = _planes(place, series[0]), _longest(series)
     low, high = place.min(axis=0), place.max(axis=0)
     span = max(float((high - low).max()), 1.0)
     factor = _LONGEST * span / longest  # mm drawn for one µm
     low, high = low - 0.19 * span, high + 0.19 * span
     colours = (DIVERGING[-1], ACCENT)
-    with house_style():
+    with style.house_style():
         figure, axes = _panels(planes, len(titles), high - low)
         for row, (a, b) in enumerate(planes):
             for column, values in enumerate(series):
                 ax, at = axes[row][column], place[:, (a, b)]
-                _shaded(ax, shade, a, b)
+                if shade is not None and shade[0] in (_AXES[a].lower(), _AXES[b].lower()):
+                    span_of = ax.axvspan if shade[0] == _AXES[a].lower() else ax.axhspan
+                    span_of(*shade[1:], color=BAND, lw=0, zorder=0)
                 if field.lengths:
-                    strokes(ax, at[::2, 0], at[1::2, 0], at[::2, 1], at[1::2, 1], color=RULE, lw=0.8, zorder=1)
+                    style.strokes(ax, at[::2, 0], at[1::2, 0], at[::2, 1], at[1::2, 1], color=RULE, lw=0.8, zorder=1)
                 beyond = np.linalg.norm(values, axis=1) > limit
                 _vectors(ax, at, factor * values[:, (a, b)], beyond, colours[column])
                 ax.set(xlim=(low[a], high[a]), ylim=(low[b], high[b]), aspect="equal")
@@ -137,17 +123,9 @@ def residual_field_plot(
                 if not column:
                     ax.set_ylabel(say("{axis} / mm", axis=Verbatim(_AXES[b])))
                 if not row:
-                    panel_title(ax, titles[column], colours[column])
+                    style.panel_title(ax, titles[column], colours[column])
         _key(figure, axes[-1][0], factor, longest, float(np.median(limit)), colours[0])
-        return drawn(figure, caption, alternative)
-
-
-def _rows(series: list[Floats], lengths: bool) -> NDArray[np.int64]:
-    sizes = [np.linalg.norm(values, axis=1) for values in series]
-    if not lengths:
-        return shown(sizes)
-    chosen = shown([size[::2] for size in sizes])
-    return np.column_stack([2 * chosen, 2 * chosen + 1]).ravel()
+        return style.drawn(figure, caption, alternative)
 
 
 def _planes(place: Floats, vectors: Floats) -> list[tuple[int, int]]:
@@ -168,32 +146,19 @@ def _panels(planes: list[tuple[int, int]], columns: int, spans: Floats) -> tuple
     scale = min(width / wide, 94.0 / sum(float(spans[b]) for _, b in planes))
     heights = [scale * float(spans[b]) for _, b in planes]
     height = top + base + sum(heights) + label * len(planes)
-    figure = new_figure(height)
+    figure, step = style.new_figure(height), max(scale * wide, _TITLE) + gap
     axes, y = [], height - top
-    for (a, _), own in zip(planes, heights, strict=True):
-        y -= own
-        step = max(scale * wide, _TITLE) + gap
-        axes.append([
-            figure.add_axes(((left + column * step) / WIDTH_MM, y / height, scale * float(spans[a]) / WIDTH_MM, own / height))
-            for column in range(columns)
-        ])  # fmt: skip
+    for (a, _), tall in zip(planes, heights, strict=True):
+        y -= tall
+        size = y / height, scale * float(spans[a]) / WIDTH_MM, tall / height
+        axes.append([figure.add_axes(((left + column * step) / WIDTH_MM, *size)) for column in range(columns)])
         y -= label
     return figure, axes
 
 
-def _shaded(ax: Axes, shade: Shade | None, a: int, b: int) -> None:
-    if shade is None:
-        return
-    axis, low, high = shade
-    if axis == _AXES[a].lower():
-        ax.axvspan(low, high, color=BAND, lw=0, zorder=0)
-    elif axis == _AXES[b].lower():
-        ax.axhspan(low, high, color=BAND, lw=0, zorder=0)
-
-
 def _vectors(ax: Axes, place: Floats, way: Floats, beyond: NDArray[np.bool_], colour: str) -> None:
-    start, tips = place[~beyond], (place + way)[~beyond]
-    strokes(ax, start[:, 0], tips[:, 0], start[:, 1], tips[:, 1], color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
+    (x0, y0), (x1, y1) = place[~beyond].T, (place + way)[~beyond].T
+    style.strokes(ax, x0, x1, y0, y1, color=MUTED, lw=0.5, solid_capstyle="round", zorder=2)
     if beyond.any():
         ax.quiver(*place[beyond].T, *way[beyond].T, angles="xy", scale_units="xy", scale=1, color=colour, units="width",
                   width=0.006, headwidth=4, headlength=5, zorder=3)  # fmt: skip
@@ -201,12 +166,12 @@ def _vectors(ax: Axes, place: Floats, way: Floats, beyond: NDArray[np.bool_], co
 
 def _key(figure: Figure, ax: Axes, factor: float, longest: float, limit: float, colour: str) -> None:
     """A round length to scale, and the expanded uncertainty to the same scale."""
+    from matplotlib.lines import Line2D
+
     x0, x1 = ax.get_xlim()
     per_mm = ax.get_position().width / (x1 - x0)  # of the figure's width, a millimetre of the machine
     unit = round_length(longest)
-    height_mm = float(figure.get_size_inches()[1]) * 25.4
-    y, left = 3.2 / height_mm, 14.0 / WIDTH_MM
-    from matplotlib.lines import Line2D
+    y, left = 3.2 / (float(figure.get_size_inches()[1]) * 25.4), 14.0 / WIDTH_MM
 
     def bar(start: float, length: float, width: float, shade: str, text: Text) -> float:
         end = start + length * factor * per_mm
@@ -218,8 +183,8 @@ def _key(figure: Figure, ax: Axes, factor: float, longest: float, limit: float, 
     if limit * factor * per_mm < 0.3:
         bar(end + 0.14, limit, 0.8, MUTED, say("U = {limit:.2g} µm; within it a thin line without a head", limit=limit))
     else:
-        figure.text(end + 0.14, y, say("U = {limit:.2g} µm, longer than any vector", limit=limit), va="center",
-                    fontsize=TINY, color=INK)  # fmt: skip
+        text = say("U = {limit:.2g} µm, longer than any vector", limit=limit)
+        figure.text(end + 0.14, y, text, va="center", fontsize=TINY, color=INK)
 
 
 def profile_plot(
@@ -231,34 +196,31 @@ def profile_plot(
     ``curve``: covariate, function in µm and its expanded uncertainty, each (p,); ``data``: lowest and highest covariate
     of each observation, and its residual in µm, each (m,).
     """
-    x = finite("x", curve[0], (None,))
-    y, half = (finite("curve", values, x.shape) for values in curve[1:])
-    low = finite("data", data[0], (None,))
-    high, residual = (finite("data", values, low.shape) for values in data[1:])
+    x, y, half = (style.finite("curve", values, np.shape(curve[0])) for values in curve)
+    low, high, residual = (style.finite("data", values, np.shape(data[0])) for values in data)
     rows = shown([residual])
     caption = told(caption, len(rows), len(low))
     low, high, residual = low[rows], high[rows], residual[rows]
     middle = 0.5 * (region[0] + region[1])
     seen = max(0.5 * (region[1] - region[0]), 0.005 * float(np.ptp(x)))  # a hundredth of the picture at least
-    with house_style():
-        figure = new_figure(90)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 0.8))
-        figure.subplots_adjust(left=0.105, right=0.985, bottom=0.115, top=0.94, hspace=0.22)
+    edges: dict[str, Any] = {"left": 0.105, "right": 0.985, "bottom": 0.115, "top": 0.94, "hspace": 0.22}
+    with style.pictures(90, 2, height_ratios=(1.0, 0.8), **edges) as (figure, (above, below)):
         for ax in (above, below):
             ax.axvspan(middle - seen, middle + seen, color=BAND, lw=0, zorder=0)
             ax.axhline(0, color=INK, lw=0.6, zorder=1)
             ax.grid(axis="y")
-        band(above, x, y, half, alpha=0.18, zorder=2)
+        style.band(above, x, y, half, alpha=0.18, zorder=2)
         above.plot(x, y, color=ACCENT, lw=1.4, zorder=3)
         above.set_ylabel(y_label)
-        panel_title(above, say("What the observations show together, with U"), ACCENT)
+        style.panel_title(above, say("What the observations show together, with U"), ACCENT)
         wide = high - low > 1e-3 * np.ptp(x)
         if wide.any():
-            strokes(below, low[wide], high[wide], residual[wide], residual[wide], color=DIVERGING[-1], lw=0.6, zorder=2)
+            ends = low[wide], high[wide], residual[wide], residual[wide]
+            style.strokes(below, *ends, color=DIVERGING[-1], lw=0.6, zorder=2)
         size = float(np.clip(60.0 / len(low) ** 0.75, 1.3, 3.6))
-        dots(below, 0.5 * (low + high), residual, size, DIVERGING[-1], hollow=True)
+        style.dots(below, 0.5 * (low + high), residual, size, DIVERGING[-1], hollow=True)
         below.set(xlabel=x_label, ylabel=say("Residual / µm"))
-        panel_title(below, say("What each observation leaves"), DIVERGING[-1])
+        style.panel_title(below, say("What each observation leaves"), DIVERGING[-1])
         below.margins(x=0.02, y=0.1)
         figure.align_ylabels((above, below))
-        return drawn(figure, caption, alternative)
+        return style.drawn(figure, caption, alternative)

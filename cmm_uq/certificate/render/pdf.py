@@ -25,9 +25,7 @@ from cmm_uq.certificate.render.fitting import SMALLEST, fitted
 from cmm_uq.certificate.render.html import template_folder
 from cmm_uq.certificate.sign import TEST_NOTE, Seal, Signer
 
-FACE = "Libertinus Serif"
-"""Of the text; what it lacks, as Japanese, is set in the font of the language."""
-
+FACE = "Libertinus Serif"  # of the text; what it lacks, as Japanese, is set in the font of the language
 EPOCH = "1970-01-01"
 """Date of a PDF whose document has none: the clock is never read, so the same document gives the same bytes."""
 
@@ -158,7 +156,6 @@ LEFT_MM, BOTTOM_MM, GAP_MM = 20.0, 3.5, 2.0
 """Of the first seal on a page A4; a second stands beside it. The text of a page ends 22 mm, its foot 10 mm above the edge."""
 
 SEALS = 2
-
 _POINTS = 72 / 25.4
 
 

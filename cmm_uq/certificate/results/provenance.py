@@ -82,7 +82,6 @@ PLATFORM = "cmm-uq:platform"
 _PREFIX = "urn:cmm-uq:"
 _RECORDING, _REPORT, _PROGRAM, _LABORATORY = "cmm-uq:recording", "cmm-uq:report", "cmm-uq:program", "cmm-uq:laboratory"
 _CERTIFICATE, _REPLACED, _ARTEFACT = "cmm-uq:certificate", "cmm-uq:replaced", "cmm-uq:artefact-certificate"
-
 Record = dict[str, Any]
 
 

@@ -20,10 +20,7 @@ from cmm_uq.jobs.verdicts import Verdicts
 
 SPACE = "http://qifstandards.org/xsd/qif3"
 VERSION = "3.0.0"
-
-_STATUS = {"pass": "PASS", "fail": "FAIL"}
-"""Outcomes that QIF has a word for; others are said in their own."""
-
+_STATUS = {"pass": "PASS", "fail": "FAIL"}  # outcomes that QIF has a word for; others are said in their own
 _DOCUMENTS = uuid.UUID("6f1a7c60-3f0e-5e1b-9f7d-0b1c5d2f4a10")
 """Name space of the identifiers of documents: the same results have the same identifier."""
 

@@ -9,15 +9,10 @@ from typing import Any
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, foreign, plural, say, semicolons
 from cmm_uq.certificate.document import Column, Document, Facts, Section, Table
 
-KEY = "replaced"
-"""Of results.json."""
-
-COMPARED = say("Results compared")
-"""On the first page."""
-
+KEY = "replaced"  # of results.json.
+COMPARED = say("Results compared")  # on the first page
 NOT_COMPARED = say("No comparison of the results was made: those of the replaced certificate were not at hand.")
-_NAMED = 6
-"""Differences that the first page names one by one."""
+_NAMED = 6  # differences that the first page names one by one
 
 
 @dataclass(frozen=True)

@@ -68,8 +68,7 @@ def _shown(line: BudgetLine) -> tuple[float, Text]:
     return 1.0, line.unit
 
 
-_LISTED = 250
-"""Rows of a table of errors; of more only those nearest to their limits are listed, results.json has all."""
+_LISTED = 250  # rows of a table of errors; of more only those nearest to their limits are listed, results.json has all.
 
 
 def conformity_section(statements: Sequence[Statement]) -> Section:

@@ -19,8 +19,7 @@ from cmm_uq.machine.model import RecordingModel
 from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, alike, rounded
 
-_TOLD = 8
-"""Periods that a sentence tells; results.json has all."""
+_TOLD = 8  # periods that a sentence tells; results.json has all.
 
 
 def sentences(withheld: Sequence[WithheldEffect]) -> list[Text]:

@@ -9,43 +9,36 @@ from cmm_uq.analysis.conformity.accuracy import TITLES
 from cmm_uq.analysis.conformity.decision import rule_words
 from cmm_uq.analysis.conformity.statement import Statement
 from cmm_uq.base.messages import Text, Verbatim, commas, day, number, plural, say, semicolons
+from cmm_uq.certificate import wording
 from cmm_uq.certificate.document import Overview, Plot, Section, Table
 from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.sections.conformity import has_picture, named, picture
-from cmm_uq.certificate.wording import (
-    CERTAIN,
-    OUTCOME_WORDS,
-    Headline,
-    Summary,
-    figure_row,
-    measured,
-    probability,
-    stated_row,
-    stated_value,
-    title_of,
-)
 from cmm_uq.jobs.verdicts import GRAVEST, NONE, Verdict, gravest, standing_of
 from cmm_uq.maths.uncertainty.quantity import limit_in_full, rounded, significant
 
 
-def summary(result: Result, warnings: Iterable[Text]) -> Summary:
+def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
     """What was measured, the decisions, the figures, the warnings."""
     facts, artefact = result.job.facts, result.artefact
     machine = Verbatim(facts.machine.name)
     subject = say("{machine}, {artefact:small}, {count} observations",
                   machine=machine, artefact=artefact.title, count=len(result.residuals))  # fmt: skip
-    figures = [figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
-    figures += [figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"]
+    figures = [wording.figure_row(TITLES[name], quantity) for name, quantity in result.accuracy.items()]
+    figures += [
+        wording.figure_row(size.title, result.sizes[size.name]) for size in artefact.sizes if size.role == "sought"
+    ]
     for effect in result.model.effects:
         for name, quantity in result.parameters[effect.name].items():
             key = (effect.name, name)
-            figures.append(figure_row(title_of(key, result), quantity, known=key not in result.not_given))
+            figures.append(
+                wording.figure_row(wording.title_of(key, result), quantity, known=key not in result.not_given)
+            )
     remarks = (*map(_remarks, result.statements), *map(_tolerance_remarks, tolerances_of(result)))
     decided = tuple(
-        Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
+        wording.Headline(one.outcome.upper(), one.standing, subject_of(one), tuple(told))
         for one, told in zip(result.verdicts, remarks, strict=True)
     )
-    return Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
+    return wording.Summary(subject, day(facts.job.date), decided, tuple(figures), warnings=tuple(warnings))
 
 
 def subject_of(one: Verdict) -> Text:
@@ -69,7 +62,7 @@ def _tolerance_remarks(one: Verdict) -> list[Text]:
 
 def _remarks(statement: Statement) -> list[Text]:
     """Value, limit, uncertainty and probability of a statement; what its test lacks."""
-    value, _ = measured(statement)
+    value, _ = wording.measured(statement)
     chance = statement.decision.probability_conforming
     told: list[Text] = [say("{value} µm against {limit} µm", value=value, limit=limit_in_full(statement.limit_um))]
     if statement.u_um > 0:
@@ -84,18 +77,15 @@ def _remarks(statement: Statement) -> list[Text]:
 
 
 def _chance(p: float) -> Text:
-    if p < CERTAIN:
-        return say("less than\u00a0{p}\u00a0%", p=number(100 * CERTAIN, "g"))
-    if p > 1 - CERTAIN:
-        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - CERTAIN), "g"))
-    return probability(p)
+    if p < wording.CERTAIN:
+        return say("less than\u00a0{p}\u00a0%", p=number(100 * wording.CERTAIN, "g"))
+    if p > 1 - wording.CERTAIN:
+        return say("more than\u00a0{p}\u00a0%", p=number(100 * (1 - wording.CERTAIN), "g"))
+    return wording.probability(p)
 
 
-_MOST = 8
-"""Statements in the box; of more the gravest, all are behind the page."""
-
-_ROWS = 16
-"""Of a table that the first page has room for."""
+_MOST = 8  # statements in the box; of more the gravest, all are behind the page
+_ROWS = 16  # of a table that the first page has room for
 
 _WORDS: Mapping[str, Text] = {
     "fail": say("Does not conform"),
@@ -130,7 +120,7 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
     if overall == "pass":
         many = say("Conforms: all {count} statements of conformity", count=count)
         return plural(count, one=say("Conforms"), many=many)
-    words = _WORDS.get(overall, OUTCOME_WORDS.get(overall, say("Not decided")))
+    words = _WORDS.get(overall, wording.OUTCOME_WORDS.get(overall, say("Not decided")))
     if count == 1:
         return words
     alike = sum(one.outcome == overall for one in verdicts)
@@ -139,10 +129,10 @@ def _verdict(verdicts: Sequence[Verdict]) -> Text:
 
 def _row(one: Verdict, *, signed: bool) -> Text:
     if one.value is None:
-        outcome = OUTCOME_WORDS.get(one.outcome, say("undecided"))
+        outcome = wording.OUTCOME_WORDS.get(one.outcome, say("undecided"))
         return say("{outcome}: not determined by this recording", outcome=outcome)
-    value = stated_value(one.value, one.U, signed=signed)
-    return stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
+    value = wording.stated_value(one.value, one.U, signed=signed)
+    return wording.stated_row(one.outcome, value, one.unit, one.limit if one.by else None)
 
 
 def _lacking(verdicts: Sequence[Verdict]) -> list[tuple[Text, Text]]:

@@ -12,9 +12,7 @@ from cmm_uq.machine.model.measurement import ARTEFACT
 from cmm_uq.maths.inference.posterior import Posterior
 from cmm_uq.maths.uncertainty.quantity import alike
 
-_SHOWN = 0.8
-"""Probability from which a component is said to be there; beforehand it is at most one half."""
-
+_SHOWN = 0.8  # probability from which a component is said to be there; beforehand it is at most one half
 _WIDER = 1.05
 
 

@@ -96,8 +96,7 @@ def _free_combination(result: Result, combination: tuple[tuple[str, str], ...]) 
     return [words, stated_table(caption, named, what=say("Difference"), value=say("Estimate"))]
 
 
-Left = tuple[str, str, Text, Quantity]
-"""Group and name of a quantity in results.json, its title, and what it is now."""
+Left = tuple[str, str, Text, Quantity]  # group and name of a quantity in results.json, its title, and what it is now.
 
 
 def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict] = ()) -> Section:

@@ -11,11 +11,8 @@ from cmm_uq.certificate.result import Result
 from cmm_uq.certificate.wording import title_of, with_uncertainty
 from cmm_uq.maths.uncertainty.quantity import figure, nominal, significant
 
-ASSUMED = 0.25
-"""Share of the prior in a parameter's variance from which on the reader is told."""
-
-IMPLAUSIBLE = 4.0
-"""Standard deviations of what was known beforehand from which on an estimate is held to be a mistake."""
+ASSUMED = 0.25  # share of the prior in a parameter's variance from which on the reader is told
+IMPLAUSIBLE = 4.0  # standard deviations of what was known beforehand from which on an estimate is held to be a mistake
 
 
 def warnings(result: Result) -> tuple[Text, ...]:

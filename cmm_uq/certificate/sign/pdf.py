@@ -82,8 +82,7 @@ def sign_pdf(
         seal = None
     said = seal.says if seal else signer.name
     fields.append_signature_field(
-        writer,
-        fields.SigFieldSpec(name, box=seal.places[count] if seal else None, readable_field_name=said),
+        writer, fields.SigFieldSpec(name, box=seal.places[count] if seal else None, readable_field_name=said)
     )
     field = next(reference for _, _, reference in fields.enumerate_sig_fields(writer, with_name=name))
     if seal is not None:

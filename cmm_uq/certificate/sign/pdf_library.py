@@ -19,15 +19,7 @@ from typing import Any
 from asn1crypto import tsp, x509
 from asn1crypto.algos import SignedDigestAlgorithm
 from cryptography.hazmat.primitives.serialization import Encoding
-from pyhanko.pdf_utils.generic import (
-    ArrayObject,
-    DictionaryObject,
-    IndirectObject,
-    NameObject,
-    NumberObject,
-    PdfObject,
-    pdf_string,
-)
+from pyhanko.pdf_utils import generic
 from pyhanko.pdf_utils.incremental_writer import IncrementalPdfFileWriter
 from pyhanko.pdf_utils.reader import PdfFileReader
 from pyhanko.sign import signers
@@ -73,54 +65,56 @@ def translated(certificate: Any) -> x509.Certificate:
     return x509.Certificate.load(certificate.public_bytes(Encoding.DER))
 
 
-def show(writer: IncrementalPdfFileWriter, field: DictionaryObject, picture: bytes) -> None:
+def show(writer: IncrementalPdfFileWriter, field: generic.DictionaryObject, picture: bytes) -> None:
     """The page of a PDF in the place of a field, with the fonts that it has embedded."""
     seen = writer.import_page_as_xobject(PdfFileReader(io.BytesIO(picture)))
-    field["/AP"] = DictionaryObject({NameObject("/N"): seen})
+    field["/AP"] = generic.DictionaryObject({generic.NameObject("/N"): seen})
 
 
-def tag(writer: IncrementalPdfFileWriter, reference: IndirectObject, says: str) -> None:
+def tag(writer: IncrementalPdfFileWriter, reference: generic.IndirectObject, says: str) -> None:
     """Put a field into the structure of a tagged PDF as a form control (ISO 14289-1, 7.18.1 and 7.18.4)."""
     field = reference.get_object()
-    field["/Contents"] = pdf_string(says)
-    root = writer.root["/StructTreeRoot"] if "/StructTreeRoot" in writer.root else DictionaryObject()
+    field["/Contents"] = generic.pdf_string(says)
+    root = writer.root["/StructTreeRoot"] if "/StructTreeRoot" in writer.root else generic.DictionaryObject()
     if "/ParentTree" not in root or "/Nums" not in root["/ParentTree"]:
         return  # not tagged, or by a program that lays its tree out in another way
-    top = root["/K"][0] if isinstance(root["/K"], ArrayObject) else root["/K"]
-    key = NumberObject(int(root["/ParentTreeNextKey"]))
-    element = writer.add_object(DictionaryObject({
-        NameObject("/Type"): NameObject("/StructElem"),
-        NameObject("/S"): NameObject("/Form"),
-        NameObject("/P"): _to(top),
-        NameObject("/Alt"): pdf_string(says),
-        NameObject("/Pg"): field.raw_get("/P"),
-        NameObject("/K"): DictionaryObject({
-            NameObject("/Type"): NameObject("/OBJR"),
-            NameObject("/Obj"): reference,
-            NameObject("/Pg"): field.raw_get("/P"),
+    top = root["/K"][0] if isinstance(root["/K"], generic.ArrayObject) else root["/K"]
+    key = generic.NumberObject(int(root["/ParentTreeNextKey"]))
+    element = writer.add_object(generic.DictionaryObject({
+        generic.NameObject("/Type"): generic.NameObject("/StructElem"),
+        generic.NameObject("/S"): generic.NameObject("/Form"),
+        generic.NameObject("/P"): _to(top),
+        generic.NameObject("/Alt"): generic.pdf_string(says),
+        generic.NameObject("/Pg"): field.raw_get("/P"),
+        generic.NameObject("/K"): generic.DictionaryObject({
+            generic.NameObject("/Type"): generic.NameObject("/OBJR"),
+            generic.NameObject("/Obj"): reference,
+            generic.NameObject("/Pg"): field.raw_get("/P"),
         }),
     }))  # fmt: skip
     field["/StructParent"] = key
     _append(writer, top, "/K", element)
     _append(writer, root["/ParentTree"], "/Nums", key, element)
-    root["/ParentTreeNextKey"] = NumberObject(int(key) + 1)
+    root["/ParentTreeNextKey"] = generic.NumberObject(int(key) + 1)
     writer.update_container(root)
 
 
-def _append(writer: IncrementalPdfFileWriter, owner: DictionaryObject, key: str, *values: PdfObject) -> None:
+def _append(
+    writer: IncrementalPdfFileWriter, owner: generic.DictionaryObject, key: str, *values: generic.PdfObject
+) -> None:
     """Values at the end of a list, wherever that is kept."""
     held = owner[key]
-    if not isinstance(held, ArrayObject):
-        owner[NameObject(key)] = held = ArrayObject([owner.raw_get(key)])
+    if not isinstance(held, generic.ArrayObject):
+        owner[generic.NameObject(key)] = held = generic.ArrayObject([owner.raw_get(key)])
     held.extend(values)
     writer.update_container(held)
     writer.update_container(owner)
 
 
-def _to(held: PdfObject) -> IndirectObject:
+def _to(held: generic.PdfObject) -> generic.IndirectObject:
     """To an object that has a number of its own."""
     place = held.container_ref
-    return IndirectObject(place.idnum, place.generation, place.get_pdf_handler())
+    return generic.IndirectObject(place.idnum, place.generation, place.get_pdf_handler())
 
 
 _ELEMENT = {"/Type", "/S", "/P", "/Alt", "/Pg", "/K"}
@@ -146,7 +140,7 @@ POLICY = StandardDiffPolicy(
 
 def _grown(old: Any, new: Any) -> list[Any]:
     """References of what grew; none where the tree is a part of an object that holds more, or differs otherwise."""
-    if not isinstance(new.root.raw_get("/StructTreeRoot"), IndirectObject):
+    if not isinstance(new.root.raw_get("/StructTreeRoot"), generic.IndirectObject):
         return []
     before, after = old.root["/StructTreeRoot"], new.root["/StructTreeRoot"]
     top_before, top_after = _top(before), _top(after)
@@ -170,12 +164,12 @@ def _grown(old: Any, new: Any) -> list[Any]:
 
 def _top(root: Any) -> Any:
     """The element that all others are below."""
-    return root["/K"][0] if isinstance(root["/K"], ArrayObject) else root["/K"]
+    return root["/K"][0] if isinstance(root["/K"], generic.ArrayObject) else root["/K"]
 
 
 def _list(element: Any) -> Any:
     held = element["/K"]
-    return held if isinstance(held, ArrayObject) else ArrayObject([element.raw_get("/K")])
+    return held if isinstance(held, generic.ArrayObject) else generic.ArrayObject([element.raw_get("/K")])
 
 
 def _added(before: Any, after: Any) -> list[Any]:
@@ -194,14 +188,14 @@ def _is_control(element: Any) -> bool:
     """Whether an element of the structure is that of a signature's field, and of nothing else."""
     target = element["/K"]
     return bool(
-        isinstance(element, DictionaryObject) and set(element) <= _ELEMENT and element["/S"] == "/Form"
+        isinstance(element, generic.DictionaryObject) and set(element) <= _ELEMENT and element["/S"] == "/Form"
         and target["/Type"] == "/OBJR" and target["/Obj"]["/FT"] == "/Sig"
     )  # fmt: skip
 
 
 def _text(held: Any) -> bytes:
     """An object as a file has it, references by their numbers."""
-    if isinstance(held, IndirectObject):
+    if isinstance(held, generic.IndirectObject):
         return b"%d %d R" % (held.idnum, held.generation)
     output = io.BytesIO()
     held.write_to_stream(output)

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from cryptography.x509 import Certificate, Name
 
 TEST_WORDS = "TEST KEY"  # what the subject of a test key begins with
-
 TEST_OID = "2.25.252645135011245891322374512867431283711"
 """Of the extension that marks a test key, below the arc of numbers that anybody may draw (ITU-T X.667)."""
 

@@ -20,9 +20,9 @@ from cmm_uq.certificate.verify.views import squashed
 from cmm_uq.maths.uncertainty.quantity import rounded
 
 _NUMBER = re.compile(r"[−-]?\d+(?:[.,]\d+)*")
-_OTHER_KERNELS = 0.5
-"""Share of the sampled figures from which on their differences are taken for those of other kernels."""
-
+_OTHER_KERNELS = (
+    0.5  # share of the sampled figures from which on their differences are taken for those of other kernels
+)
 _OF_ONE = ("sampling", "diagnosis", "budget", "correlation", "unseen", "decision")
 """Parts whose figures are compared with one and not with themselves: shares, probabilities, statistics of a sampler."""
 
