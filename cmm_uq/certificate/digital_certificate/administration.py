@@ -18,8 +18,7 @@ from cmm_uq.certificate.clauses import DRAFT, NOT_OURS, STATEMENTS, certifies, d
 from cmm_uq.certificate.origin import BANNERS
 from cmm_uq.certificate.results.reissue import Reissue
 from cmm_uq.certificate.sections.traceability import claimed
-from cmm_uq.jobs.dcc import administrative as dcc
-from cmm_uq.jobs.dcc.certificate import StatementMetadata
+from cmm_uq.jobs.dcc import certificate as dcc
 from cmm_uq.jobs.dcc.quantities import RealList
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.tables.origin import MEASURED
@@ -165,18 +164,18 @@ def customer(job: Job, texts: Languages) -> dcc.Contact:
     return _contact(job.facts.job.customer, job.facts.job.address, texts)
 
 
-def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) -> tuple[StatementMetadata, ...]:
+def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) -> tuple[dcc.StatementMetadata, ...]:
     """What it is not, what the results relate to, how they are traceable, what it replaces, when the next is agreed."""
-    facts, mark, found = job.facts.job, mark_of(job), list[StatementMetadata]()
+    facts, mark, found = job.facts.job, mark_of(job), list[dcc.StatementMetadata]()
 
     def state(name: Text, *paragraphs: Text, **more: Any) -> None:
-        found.append(StatementMetadata(name=texts.words(name), declaration=texts.rich(*paragraphs), **more))
+        found.append(dcc.StatementMetadata(name=texts.words(name), declaration=texts.rich(*paragraphs), **more))
 
     if mark is not None:
         state(mark.banner, mark.banner, valid=False, ref_type=("cmm_notACertificate",))
     if certifies(job):
         chain = claimed(job)
-        found += [StatementMetadata(declaration=texts.rich(text), ref_type=("cmm_general",)) for text in STATEMENTS]
+        found += [dcc.StatementMetadata(declaration=texts.rich(text), ref_type=("cmm_general",)) for text in STATEMENTS]
         state(say("Traceability"), chain.statement, traceable=chain.claim == "traceable",
               ref_type=("basic_metrologicallyTraceableToSI",))  # fmt: skip
     if (replaces := facts.replaces) is not None:
@@ -186,7 +185,9 @@ def formal_statements(job: Job, results: Mapping[str, Any], texts: Languages) ->
         state(say("Replaces certificate"), *paragraphs, ref_type=("basic_revision",))
     if facts.recalibration_agreed:
         name = texts.words(say("Next calibration, as agreed with the customer"))
-        found.append(StatementMetadata(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",)))
+        found.append(
+            dcc.StatementMetadata(name=name, date=facts.recalibration_agreed, ref_type=("basic_recalibration",))
+        )
     further = [
         (say("Place"), facts.place), (say("Deviations from the method"), facts.deviations),
         (say("Results of external providers"), facts.external), (say("Data from the customer"), facts.from_customer),

@@ -21,7 +21,6 @@ from cmm_uq.certificate.digital_certificate.quantities import P_STANDARD
 from cmm_uq.certificate.sections.results import SIGN, UNCERTAINTY
 from cmm_uq.jobs.chain import holds_on, right
 from cmm_uq.jobs.dcc import certificate as dcc
-from cmm_uq.jobs.dcc.administrative import Hash, IdentificationNumber, PrimitiveQuantity, Rich, Software
 from cmm_uq.jobs.dcc.quantities import Expanded, Hybrid, Real
 from cmm_uq.jobs.job import Job
 from cmm_uq.jobs.reading import sha256
@@ -48,12 +47,12 @@ def methods(job: Job, results: Mapping[str, Any], texts: Languages) -> tuple[dcc
     )  # fmt: skip
 
 
-def software(results: Mapping[str, Any], texts: Languages) -> tuple[Software, ...]:
+def software(results: Mapping[str, Any], texts: Languages) -> tuple[dcc.Software, ...]:
     """The program, and other packages that took part."""
     used = results["software"]
     named = {used["name"]: used["version"], **used.get("plugins", {})}
     return tuple(
-        Software(name=texts.words(Verbatim(name)), release=one_line(version), type="application" if not i else "library")
+        dcc.Software(name=texts.words(Verbatim(name)), release=one_line(version), type="application" if not i else "library")
         for i, (name, version) in enumerate(named.items())
     )  # fmt: skip
 
@@ -61,7 +60,9 @@ def software(results: Mapping[str, Any], texts: Languages) -> tuple[Software, ..
 def equipment(job: Job, results: Mapping[str, Any], texts: Languages) -> dcc.Equipments:
     """The artefact, the short gauge, and instruments of a recording that was taken live."""
 
-    def reference(name: str, serial: str, chain: Traceability | None, *certified: PrimitiveQuantity) -> dcc.Equipment:
+    def reference(
+        name: str, serial: str, chain: Traceability | None, *certified: dcc.PrimitiveQuantity
+    ) -> dcc.Equipment:
         return dcc.Equipment(
             name=texts.words(Verbatim(name)), certificate=_certificate(job, chain, texts),
             identifications=_serial(serial, texts), quantities=certified, ref_type=("basic_normalUsed",),
@@ -93,11 +94,11 @@ def equipment(job: Job, results: Mapping[str, Any], texts: Languages) -> dcc.Equ
     return dcc.Equipments(equipment=tuple(found))
 
 
-def _serial(serial: str, texts: Languages) -> tuple[IdentificationNumber, ...]:
+def _serial(serial: str, texts: Languages) -> tuple[dcc.IdentificationNumber, ...]:
     return (serial_number(one_line(serial), texts),) if serial.strip() else ()
 
 
-def _certificate(job: Job, chain: Traceability | None, texts: Languages) -> Hash | None:
+def _certificate(job: Job, chain: Traceability | None, texts: Languages) -> dcc.Hash | None:
     """Of the artefact: its number, who issued it and when; with the SHA-256 of its file where the job has one."""
     if chain is None:
         return None
@@ -113,9 +114,13 @@ def _certificate(job: Job, chain: Traceability | None, texts: Languages) -> Hash
 
 
 def _referral(
-    number: str, texts: Languages, digest: str | None = None, described: Rich | None = None, valid: bool | None = None
-) -> Hash:
-    return Hash(
+    number: str,
+    texts: Languages,
+    digest: str | None = None,
+    described: dcc.Rich | None = None,
+    valid: bool | None = None,
+) -> dcc.Hash:
+    return dcc.Hash(
         referral=texts.words(say("Calibration certificate")), referral_id=number, procedure="SHA-256" if digest else NO_HASH,
         value=digest or NO_HASH, description=described, in_validity_range=valid,
     )  # fmt: skip
@@ -123,7 +128,7 @@ def _referral(
 
 def _certified(
     owner: str, length: float | None, u_um: float | None, cte: float, texts: Languages
-) -> tuple[PrimitiveQuantity, ...]:
+) -> tuple[dcc.PrimitiveQuantity, ...]:
     u = Decimal(repr(float(u_um or 0.0))).scaleb(-3)
     stated = Expanded(uncertainty=u, factor=Decimal(1), probability=P_STANDARD, distribution="normal") if u else None
     known = (
@@ -131,7 +136,7 @@ def _certified(
         ("cte", say("Coefficient of thermal expansion"), cte or None, "1/K", None),
     )
     return tuple(
-        PrimitiveQuantity(
+        dcc.PrimitiveQuantity(
             id=f"{owner}_{key}", name=texts.words(name), ref_type=("basic_referenceValue",),
             value=Real(value=Decimal(repr(float(value))), unit=UNITS[unit].dsi, uncertainty=uncertainty),
         )
