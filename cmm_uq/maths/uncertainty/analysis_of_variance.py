@@ -21,13 +21,11 @@ from cmm_uq.maths.uncertainty.budget import REPEATS, Budget, BudgetLine
 class OneWay:
     """Variances of readings in groups."""
 
-    # groups, repeats: number of groups, and of readings in each
     groups: int
-    repeats: int
+    repeats: int  # readings in each group
     mean: float  # of all readings
-    # between, within: mean squares, of ``groups − 1`` and ``groups · (repeats − 1)`` degrees of freedom
-    between: float
-    within: float
+    between: float  # mean square, of ``groups − 1`` degrees of freedom
+    within: float  # mean square, of ``groups · (repeats − 1)`` degrees of freedom
 
     @property
     def s_repeat(self) -> float:
@@ -73,16 +71,12 @@ class OneWay:
 
         Both come from the same mean square, so that its degrees of freedom are those of the sum, not of the parts.
         """
-        within = float(self.groups * (self.repeats - 1))
-        parts = Budget(
-            name,
-            [
-                BudgetLine(group, self.s_group / sqrt(self.groups), REPEATS, unit=unit, dof=self.groups - 1.0),
-                BudgetLine(repeat, self.s_repeat / sqrt(self.groups * self.repeats), REPEATS, unit=unit, dof=within),
-            ],
-            unit=unit,
-            effective_dof=self.dof_mean,
-        )
+        u_repeat, within = self.s_repeat / sqrt(self.groups * self.repeats), float(self.groups * (self.repeats - 1))
+        lines = [
+            BudgetLine(group, self.s_group / sqrt(self.groups), REPEATS, unit=unit, dof=self.groups - 1.0),
+            BudgetLine(repeat, u_repeat, REPEATS, unit=unit, dof=within),
+        ]
+        parts = Budget(name, lines, unit=unit, effective_dof=self.dof_mean)
         return replace(parts.as_line(name, sensitivity), origin=REPEATS)
 
 

@@ -6,16 +6,15 @@ are lines of their own, so that the shares always add up to one; a share is nega
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import copysign, inf, isfinite, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, foreign, say, signed
-from cmm_uq.base.points import Floats
 from cmm_uq.base.units import unit_as_written
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 from cmm_uq.maths.uncertainty.type_a import coverage_factor
@@ -75,28 +74,22 @@ class Labels:
     units: Mapping[str, str] = field(default_factory=dict)
     origins: Mapping[str, str] = field(default_factory=dict)
 
+    def unit(self, name: str) -> Text:
+        return unit_as_written(self.units.get(name, ""))
 
-def line_of(name: str, given: Distribution, labels: Labels | None = None, sensitivity: float = 1.0) -> BudgetLine:
+
+def line_of(name: str, given: Distribution, labels: Labels, sensitivity: float = 1.0) -> BudgetLine:
     """Line of an input by its distribution."""
-    told = labels or Labels()
-    origin, unit = told.origins.get(name, say("not stated")), unit_as_written(told.units.get(name, ""))
-    return BudgetLine(
-        Verbatim(name),
-        float(given.u),
-        foreign(origin),
-        float(given.mean),
-        unit,
-        given.kind,
-        float(given.dof),
-        sensitivity,
-    )
+    origin = foreign(labels.origins.get(name, say("not stated")))
+    u, mean, dof = float(given.u), float(given.mean), float(given.dof)
+    return BudgetLine(Verbatim(name), u, origin, mean, labels.unit(name), given.kind, dof, sensitivity)
 
 
 @dataclass(frozen=True, eq=False)
 class Budget:
     """What is known of a measurand, line by line."""
 
-    measurand: Text  # what is measured
+    measurand: Text
     lines: Sequence[BudgetLine]  # its sources of uncertainty
     value: float | None = None  # estimate; None where the budget is of an uncertainty alone
     unit: Text = NOTHING  # of the measurand, as text
@@ -148,9 +141,8 @@ class Budget:
 
     def as_line(self, name: Text, sensitivity: float = 1.0) -> BudgetLine:
         """Its result as one line of another budget."""
-        return BudgetLine(
-            name, self.u, say("budget"), self.value, self.unit, "normal", self.dof, sensitivity, parts=self
-        )
+        origin = say("budget")
+        return BudgetLine(name, self.u, origin, self.value, self.unit, "normal", self.dof, sensitivity, parts=self)
 
     def mean_of(self, repetitions: int, measurand: Text) -> Budget:
         """Budget of the mean of repetitions: what they do not share is divided by √n."""
@@ -164,33 +156,26 @@ class Budget:
             if line.parts is not None:
                 yield from line.parts.flat(depth + 1, weight * share)
 
-    def as_rows(self) -> list[dict[str, Any]]:
-        """One plain dict a line, nested lines included."""
-        return [
-            {
-                "quantity": line.name,
-                "depth": depth,
-                "value": line.value,
-                "u": line.u,
-                "unit": line.unit,
-                "distribution": line.distribution,
-                "dof": line.dof,
-                "sensitivity": line.sensitivity,
-                "contribution": line.contribution,
-                "share": share,
-                "origin": line.origin,
-            }
-            for depth, line, share in self.flat()
-        ]
-
     def as_dataframe(self) -> pd.DataFrame:
-        """The same as a table of pandas."""
+        """A table of pandas with a row a line, nested lines included."""
         import pandas as pd
 
-        return pd.DataFrame(self.as_rows())
+        attributes = ("value", "u", "unit", "distribution", "dof", "sensitivity", "contribution")
+        return pd.DataFrame(
+            [
+                {
+                    "quantity": line.name,
+                    "depth": depth,
+                    **{name: getattr(line, name) for name in attributes},
+                    "share": share,
+                    "origin": line.origin,
+                }
+                for depth, line, share in self.flat()
+            ]
+        )
 
     def as_text(self) -> list[tuple[Text, ...]]:
-        """The same as rows of text under :data:`HEADINGS`, for a page."""
+        """Rows of text under :data:`HEADINGS`, for a page, nested lines included."""
         return [_text(depth, line, share) for depth, line, share in self.flat()]
 
 
@@ -212,12 +197,13 @@ def _text(depth: int, line: BudgetLine, share: float) -> tuple[Text, ...]:
         _DISTRIBUTIONS.get(line.distribution, NOTHING),
         NOTHING if line.u is None else figure(line.dof, 3) if isfinite(line.dof) else Number("∞"),
         NOTHING if line.sensitivity is None else figure(line.sensitivity),
-        _signed(line.contribution),
+        Number(("−" if line.contribution < 0 else "") + significant(abs(line.contribution))),
         say("{share} %", share=signed(100 * share, ".1f")),
         line.origin,
     )
 
 
+# by the names of JCGM 101 table 1 as model files write them
 _DISTRIBUTIONS = {
     "normal": say("normal"),
     "t": say("t"),
@@ -229,11 +215,6 @@ _DISTRIBUTIONS = {
     "exponential": say("exponential"),
     "gamma": say("gamma"),
 }
-"""By the names of JCGM 101 table 1 as model files write them."""
-
-
-def _signed(contribution: float) -> Text:
-    return Number(("−" if contribution < 0 else "") + significant(abs(contribution)))
 
 
 def budget_of(
@@ -245,47 +226,31 @@ def budget_of(
     coverage: float = 0.95,
 ) -> Budget:
     """Budget of one output of a model propagated at a single point: inputs, correlations, terms of second order."""
-    names, contribution = list(propagated.inputs), propagated.contribution[output]
-    slopes = dict(zip(names, propagated.sensitivity[output].tolist(), strict=True))
-    told, name = labels or Labels(), propagated.outputs[output]
-    lines = [line_of(key, given, told, slopes[key]) for key, given in model.inputs.items()]
+    labels, name = labels or Labels(), propagated.outputs[output]
+    slopes = propagated.sensitivity[output].tolist()
+    lines = [
+        line_of(key, given, labels, slope) for (key, given), slope in zip(model.inputs.items(), slopes, strict=True)
+    ]
+    inputs, contribution = [Verbatim(key) for key in propagated.inputs], propagated.contribution[output]
     joint = 2 * np.triu(np.outer(contribution, contribution) * propagated.correlation, 1)
-    lines += _joint_lines(_of_pairs, names, joint)
+    for i, j in zip(*np.nonzero(joint), strict=True):
+        words = say("correlation of {one}, {other}", one=inputs[i], other=inputs[j])
+        lines.append(joint_line(words, float(joint[i, j])))
     rounding = _ROUNDING * float(propagated.covariance[output, output])
     bending = propagated.bending[output]
-    lines += _joint_lines(_of_squares, names, np.where(np.abs(bending) > rounding, bending, 0.0))
+    for i, j in zip(*np.nonzero(np.abs(bending) > rounding), strict=True):
+        if i == j:
+            words = say("second order: {one} squared", one=inputs[i])
+        else:
+            words = say("second order: {one}, {other}", one=inputs[i], other=inputs[j])
+        lines.append(joint_line(words, float(bending[i, j])))
     cubic = float(propagated.cubic[output])
     if abs(cubic) > rounding:
         lines.append(joint_line(say("third derivatives"), cubic))
-    return Budget(
-        Verbatim(name),
-        lines,
-        float(propagated.value[output]),
-        unit_as_written(told.units.get(name, "")),
-        coverage,
-        float(propagated.dof[output]),
-    )
+    value, dof = float(propagated.value[output]), float(propagated.dof[output])
+    return Budget(Verbatim(name), lines, value, labels.unit(name), coverage, dof)
 
 
 def joint_line(name: Text, variance: float) -> BudgetLine:
     """Line that is no quantity but what several of them add to, or take from, the variance together."""
     return BudgetLine(name, None, say("model"), distribution="", sensitivity=None, variance=variance)
-
-
-def _of_squares(one: Text, other: Text) -> Text:
-    return (
-        say("second order: {one} squared", one=one)
-        if one == other
-        else say("second order: {one}, {other}", one=one, other=other)
-    )
-
-
-def _of_pairs(one: Text, other: Text) -> Text:
-    return say("correlation of {one}, {other}", one=one, other=other)
-
-
-def _joint_lines(words: Callable[[Text, Text], Text], names: Sequence[str], variance: Floats) -> list[BudgetLine]:
-    return [
-        joint_line(words(Verbatim(names[i]), Verbatim(names[j])), float(variance[i, j]))
-        for i, j in zip(*np.nonzero(variance), strict=True)
-    ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +10,11 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import NOTHING, Number, Text, Verbatim, in_a_row, number, say
 from cmm_uq.maths.uncertainty.budget import Budget
+from cmm_uq.maths.uncertainty.choice import NAMES
 from cmm_uq.maths.uncertainty.quantity import figure, rounded, significant
 
 if TYPE_CHECKING:
     from cmm_uq.maths.uncertainty.evaluation import Evaluation, OutputResult as Stated
-    from cmm_uq.maths.uncertainty.monte_carlo import Simulated
     from cmm_uq.maths.uncertainty.propagation import Propagated
 
 SCHEMA = "cmm-uq/budget/1"
@@ -23,14 +22,13 @@ SCHEMA = "cmm-uq/budget/1"
 
 def results_of(evaluation: Evaluation) -> dict[str, Any]:
     """The evaluation as dicts, lists and finite numbers, ready for JSON; what has no value is None."""
-    outputs = {name: _output(evaluation, row, stated) for row, (name, stated) in enumerate(evaluation.stated.items())}
-    asked = evaluation.request
+    request = evaluation.request
     return {
         "schema": SCHEMA,
-        "coverage": asked.coverage,
-        "digits": asked.digits,
-        "seed": asked.seed,
-        "outputs": outputs,
+        **{key: getattr(request, key) for key in ("coverage", "digits", "seed")},
+        "outputs": {
+            name: _output(evaluation, row, stated) for row, (name, stated) in enumerate(evaluation.stated.items())
+        },
         "output_correlation": [[_finite(r) for r in line] for line in evaluation.correlation.tolist()],
     }
 
@@ -40,7 +38,7 @@ def _finite(number: float) -> float | None:
 
 
 def _output(evaluation: Evaluation, row: int, stated: Stated) -> dict[str, Any]:
-    ways, coverage = evaluation.ways, evaluation.request.coverage
+    ways, coverage, drawn = evaluation.ways, evaluation.request.coverage, evaluation.ways.simulated
     return {
         "value": stated.value,
         "u": stated.u,
@@ -52,7 +50,16 @@ def _output(evaluation: Evaluation, row: int, stated: Stated) -> dict[str, Any]:
         "reason": stated.reason,
         "first": _propagated(ways.first, row, coverage),
         "second": _propagated(ways.second, row, coverage),
-        "monte_carlo": _simulated(ways.simulated, row),
+        "monte_carlo": drawn
+        and {
+            "value": float(drawn.value[row]),
+            "u": float(drawn.u[row]),
+            "interval": drawn.interval[row].tolist(),
+            "symmetric_interval": drawn.symmetric_interval[row].tolist(),
+            "trials": drawn.trials,
+            "stable": drawn.stable,
+            "tail_shape": _finite(float(drawn.shape[row])),
+        },
         "budget": _lines(stated.budget),
     }
 
@@ -89,33 +96,15 @@ def _lines(budget: Budget) -> list[dict[str, Any]]:
     ]
 
 
-def _propagated(found: Propagated | None, row: int, coverage: float) -> dict[str, Any] | None:
-    if found is None:
+def _propagated(result: Propagated | None, row: int, coverage: float) -> dict[str, Any] | None:
+    if result is None:
         return None
     try:
-        ends = [float(end[row]) for end in found.interval(coverage)]
+        ends = [float(end[row]) for end in result.interval(coverage)]
     except CmmUqError:  # too few effective degrees of freedom for any interval
         ends = []
-    return {
-        "value": float(found.value[row]),
-        "u": float(found.u[row]),
-        "dof": _finite(float(found.dof[row])),
-        "interval": ends or None,
-    }
-
-
-def _simulated(found: Simulated | None, row: int) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "value": float(found.value[row]),
-        "u": float(found.u[row]),
-        "interval": found.interval[row].tolist(),
-        "symmetric_interval": found.symmetric_interval[row].tolist(),
-        "trials": found.trials,
-        "stable": found.stable,
-        "tail_shape": _finite(float(found.shape[row])),
-    }
+    value, u, dof = float(result.value[row]), float(result.u[row]), _finite(float(result.dof[row]))
+    return {"value": value, "u": u, "dof": dof, "interval": ends or None}
 
 
 SUMMARY = (
@@ -128,48 +117,33 @@ SUMMARY = (
     say("ν"),
     say("Method"),
 )
+COMPARISON = (say("Method"), say("Estimate"), say("Standard uncertainty"), say("Interval"), say("Trials"))
 
 
 def summary_rows(evaluation: Evaluation) -> list[tuple[Text, ...]]:
     """One row of text an output under :data:`SUMMARY`, rounded to the digits asked for."""
-    return [_summary(name, stated, min(evaluation.request.digits, 2)) for name, stated in evaluation.stated.items()]
-
-
-_METHODS: Mapping[str, Text] = {
-    "first": say("first order"),
-    "second": say("second order"),
-    "monte_carlo": say("Monte Carlo"),
-}
-
-
-def _summary(name: str, stated: Stated, digits: int) -> tuple[Text, ...]:
-    value, u = rounded(stated.value, stated.u, digits)
-    low, high = (rounded(end, stated.u, digits)[0] for end in stated.interval)
-    return (
-        Verbatim(name),
-        value,
-        u,
-        (NOTHING if stated.budget.unit == "1" else stated.budget.unit),
-        say("[{low}, {high}]", low=low, high=high),
-        figure(stated.coverage_factor, 3),
-        (figure(np.floor(stated.dof), 3) if isfinite(stated.dof) else Number("∞")),
-        _METHODS[stated.method],
-    )
-
-
-COMPARISON = (say("Method"), say("Estimate"), say("Standard uncertainty"), say("Interval"), say("Trials"))
+    rows: list[tuple[Text, ...]] = []
+    digits = min(evaluation.request.digits, 2)
+    for name, stated in evaluation.stated.items():
+        low, high = (rounded(end, stated.u, digits)[0] for end in stated.interval)
+        unit = NOTHING if stated.budget.unit == "1" else stated.budget.unit
+        k = figure(stated.coverage_factor, 3)
+        dof = figure(np.floor(stated.dof), 3) if isfinite(stated.dof) else Number("∞")
+        value_and_u, interval = rounded(stated.value, stated.u, digits), say("[{low}, {high}]", low=low, high=high)
+        rows.append((Verbatim(name), *value_and_u, unit, interval, k, dof, NAMES[stated.method]))
+    return rows
 
 
 def comparison_rows(evaluation: Evaluation, output: str) -> list[tuple[Text, ...]]:
     """One row of text for each method that was possible, under :data:`COMPARISON`."""
-    told = results_of(evaluation)["outputs"][output]
+    results = results_of(evaluation)["outputs"][output]
     rows: list[tuple[Text, ...]] = []
-    for method, name in _METHODS.items():
-        if found := told[method]:
-            value, u = rounded(found["value"], found["u"])
-            ends = [rounded(end, found["u"])[0] for end in found["interval"] or ()]
+    for method, name in NAMES.items():
+        if result := results[method]:
+            value, u = rounded(result["value"], result["u"])
+            ends = [rounded(end, result["u"])[0] for end in result["interval"] or ()]
             interval = say("[{ends}]", ends=in_a_row(ends)) if ends else NOTHING
-            rows.append((say("{name:capital}", name=name), value, u, interval, number(found.get("trials", ""))))
+            rows.append((say("{name:capital}", name=name), value, u, interval, number(result.get("trials", ""))))
     return rows
 
 

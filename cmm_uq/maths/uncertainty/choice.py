@@ -1,7 +1,5 @@
 """Which method states the result: the simplest one that Monte Carlo confirms (JCGM 101:2008 clause 8).
 
-Is the law of propagation good enough here? Monte Carlo says (JCGM 101:2008 clause 8).
-
 The interval value ± U of the law of propagation is compared with Monte Carlo's probabilistically symmetric one. The ends
 may differ by the numerical tolerance δ, half a unit of the last digit of u that is regarded as meaningful. Monte Carlo's
 own error must not decide: trials are made until every comparison is clear of it by two standard errors, or the error is
@@ -10,8 +8,8 @@ below δ/5 (8.2).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import astuple, dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -26,16 +24,22 @@ from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second
 from cmm_uq.maths.uncertainty.quantity import figure
 from cmm_uq.maths.uncertainty.type_a import coverage_factor
 
-_OF_TOLERANCE = 5.0
+Method = Literal["first", "second", "monte_carlo"]
+NAMES: Mapping[Method, Text] = {
+    "first": say("first order"),
+    "second": say("second order"),
+    "monte_carlo": say("Monte Carlo"),
+}
+_OF_TOLERANCE = 5.0  # δ over the error of Monte Carlo that leaves any comparison as it is
+_ROUNDING = 4e-16
 
 
 @dataclass(frozen=True)
 class Comparison:
     """Interval of the law of propagation against that of Monte Carlo, for one output."""
 
-    # low, high: differences of the lower and the upper ends
-    low: float
-    high: float
+    low: float  # difference of the lower ends
+    high: float  # difference of the upper ends
     tolerance: float  # δ
     error: float  # standard error of Monte Carlo's ends, the larger of the two
 
@@ -50,15 +54,6 @@ class Comparison:
         difference = abs(max(self.low, self.high) - self.tolerance)
         return 2 * self.error <= max(difference, self.tolerance / _OF_TOLERANCE)
 
-    @property
-    def words(self) -> Text:
-        """The comparison as part of a sentence."""
-        low, high, tolerance = (figure(number, 2) for number in (self.low, self.high, self.tolerance))
-        return say(
-            "its interval's ends differ from Monte Carlo's by {low} and {high}, numerical tolerance {tolerance}",
-            low=low, high=high, tolerance=tolerance,
-        )  # fmt: skip
-
 
 def compare(propagated: Propagated, simulated: Simulated, row: int, digits: int) -> Comparison:
     """Clause 8.1 for one output; ``digits`` of u are regarded as meaningful."""
@@ -68,11 +63,9 @@ def compare(propagated: Propagated, simulated: Simulated, row: int, digits: int)
     if not simulated.stable:
         # the standard deviation of draws without one (a ratio, a Cauchy distribution) must not widen the tolerance
         u = min(u, (drawn_high - drawn_low) / (2 * float(coverage_factor(np.inf, simulated.coverage))))
+    tolerance = float(numerical_tolerance(np.array([u]), digits)[0])
     return Comparison(
-        abs(low - drawn_low),
-        abs(high - drawn_high),
-        float(numerical_tolerance(np.array([u]), digits)[0]),
-        float(np.max(simulated.standard_error[row, 4:])),
+        abs(low - drawn_low), abs(high - drawn_high), tolerance, float(np.max(simulated.standard_error[row, 4:]))
     )
 
 
@@ -85,7 +78,7 @@ def simulate_to_validate(
     largest: int = LARGEST,
 ) -> Simulated:
     """Adaptive Monte Carlo, run until it can also say whether each candidate agrees with it."""
-    ends = [np.stack(candidate.interval(coverage), axis=1) for candidate in candidates if _has_interval(candidate)]
+    ends = [np.stack(order.interval(coverage), axis=1) for order in candidates if np.all(order.dof >= 1)]
 
     def settled(figures: Floats, errors: Floats) -> bool:
         tolerance = numerical_tolerance(figures[:, 1], digits)[:, None]
@@ -94,20 +87,6 @@ def simulate_to_validate(
         return all(np.all(one | (doubt <= tolerance / _OF_TOLERANCE)) for one in clear)
 
     return simulate_adaptively(model, coverage, digits, seed, largest, settled)
-
-
-def _has_interval(propagated: Propagated) -> bool:
-    return bool(np.all(propagated.dof >= 1))
-
-
-Method = Literal["first", "second", "monte_carlo"]
-_ROUNDING = 4e-16
-PROPAGATION: tuple[Method, ...] = ("first", "second")
-NAMES: Mapping[Method, Text] = {
-    "first": say("first order"),
-    "second": say("second order"),
-    "monte_carlo": say("Monte Carlo"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,45 +99,48 @@ class Ways:
     problems: Mapping[Method, Text] = field(default_factory=dict)
 
     def propagated(self, method: Method) -> Propagated | None:
-        """Result by the law of propagation."""
         return self.first if method == "first" else self.second
 
 
 def by_propagation(model: MeasurementModel) -> Ways:
     """First and second order, as far as they are possible."""
-    found: dict[Method, Propagated] = {}
+    orders: dict[Method, Propagated] = {}
     problems: dict[Method, Text] = {}
-    for method, propagate in zip(PROPAGATION, (first_order, second_order), strict=True):
+    propagations: dict[Method, Callable[[MeasurementModel], Propagated]] = {
+        "first": first_order,
+        "second": second_order,
+    }
+    for method, propagate in propagations.items():
         try:
-            found[method] = propagate(model)
+            orders[method] = propagate(model)
         except CmmUqError as error:
             problems[method] = foreign(error.problem)
-    return Ways(found.get("first"), found.get("second"), None, problems)
+    return Ways(orders.get("first"), orders.get("second"), None, problems)
 
 
 def must_be_possible(model: MeasurementModel, ways: Ways, method: Method) -> None:
     """Refuse a method that was asked for by name and does not give an uncertainty."""
-    found = ways.propagated(method)
-    if found is None:
-        raise CmmUqError(ways.problems[method], where=f"method = {method!r}", fix="Use method 'auto' or 'monte_carlo'")
-    for row, output in enumerate(found.outputs):
-        if is_flat(model, found, row):
+    propagated = ways.propagated(method)
+    where, fix = f"method = {method!r}", "Use method 'auto' or 'monte_carlo'"
+    if propagated is None:
+        raise CmmUqError(ways.problems[method], where=where, fix=fix)
+    for row, output in enumerate(propagated.outputs):
+        if _is_flat(model, propagated, row):
             raise CmmUqError(
                 f"{NAMES[method]} gives u = 0 for {output} although its inputs are uncertain: "
                 "the derivatives vanish at the estimates, or correlations cancel",
-                where=f"method = {method!r}",
-                fix="Use method 'auto' or 'monte_carlo'",
+                where=where,
+                fix=fix,
             )
 
 
 def beside(ways: Ways, method: Method, row: int, digits: int) -> Text:
     """What the other order says, where it says something else."""
-    if ways.first is None or ways.second is None:
+    if ways.first is None or ways.second is None or not _differ(ways.first, ways.second, row, digits):
         return NOTHING
-    other = ways.second if method == "first" else ways.first
-    name = NAMES["second" if method == "first" else "first"]
-    differs = _differ(ways.first, ways.second, row, digits)
-    return say("{name:capital} gives u = {u}.", name=name, u=figure(other.u[row], digits)) if differs else NOTHING
+    other: Method = "second" if method == "first" else "first"
+    u = (ways.second if method == "first" else ways.first).u[row]
+    return say("{name:capital} gives u = {u}.", name=NAMES[other], u=figure(u, digits))
 
 
 def _differ(first: Propagated, second: Propagated, row: int, digits: int) -> bool:
@@ -167,35 +149,41 @@ def _differ(first: Propagated, second: Propagated, row: int, digits: int) -> boo
     return bool(max(abs(second.u[row] - first.u[row]), abs(second.value[row] - first.value[row])) > tolerance)
 
 
-def is_flat(model: MeasurementModel, found: Propagated, row: int) -> bool:
+def _is_flat(model: MeasurementModel, propagated: Propagated, row: int) -> bool:
     """Whether the law of propagation gives no uncertainty, beyond rounding, although inputs have some."""
     uncertain = any(np.any(np.asarray(given.u) > 0) for given in model.inputs.values())
-    return uncertain and bool(found.u[row] <= _ROUNDING * abs(found.value[row]))
+    return uncertain and bool(propagated.u[row] <= _ROUNDING * abs(propagated.value[row]))
 
 
 def stability(ways: Ways, row: int, digits: int) -> Text:
     """Sentences where Monte Carlo gave up before its figures were stable, and why it had to, else nothing."""
-    found = ways.simulated
-    if found is None or found.stable:
+    drawn = ways.simulated
+    if drawn is None or drawn.stable:
         return NOTHING
-    told = say(
-        "Monte Carlo is not stable to {digits} digits after {trials} trials.", digits=digits, trials=found.trials
+    unstable = say(
+        "Monte Carlo is not stable to {digits} digits after {trials} trials.", digits=digits, trials=drawn.trials
     )
-    name, shape, unseen = foreign(found.outputs[row]), float(found.shape[row]), float(found.unseen[row])
+    name, shape, unseen = foreign(drawn.outputs[row]), float(drawn.shape[row]), float(drawn.unseen[row])
     if shape >= NO_VARIANCE:
-        heavy = say(
-            "The tail of {name} is so heavy (Pareto shape {shape:.2f}; from 0.5 on there is no standard deviation) that u "
-            "is of these trials alone and grows with their number; the coverage interval stands.",
-            name=name,
-            shape=shape,
+        return after(
+            unstable,
+            say(
+                "The tail of {name} is so heavy (Pareto shape {shape:.2f}; from 0.5 on there is no standard deviation) that u "
+                "is of these trials alone and grows with their number; the coverage interval stands.",
+                name=name,
+                shape=shape,
+            ),
         )
-        return after(told, heavy)
-    if unseen > numerical_tolerance(found.u, digits)[row]:
-        heavy = say(
-            "The tail of {name} is so heavy (Pareto shape {shape:.2f}) that rare draws rule u.", name=name, shape=shape
+    if unseen > numerical_tolerance(drawn.u, digits)[row]:
+        return after(
+            unstable,
+            say(
+                "The tail of {name} is so heavy (Pareto shape {shape:.2f}) that rare draws rule u.",
+                name=name,
+                shape=shape,
+            ),
         )
-        return after(told, heavy)
-    return told
+    return unstable
 
 
 def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[Method, Text]:
@@ -203,46 +191,44 @@ def choose(model: MeasurementModel, ways: Ways, row: int, digits: int) -> tuple[
     if ways.simulated is None:
         return _without_monte_carlo(ways, row, digits)
     findings: list[Text] = []
-    told = stability(ways, row, digits)
-    for method in PROPAGATION:
+    chosen: Method = "monte_carlo"
+    orders: tuple[Method, ...] = ("first", "second")
+    for method in orders:
         confirmed, finding = _finding(model, ways, ways.simulated, method, row, digits)
         findings.append(say("{names} {finding}", names=NAMES[method], finding=finding))
         if confirmed:
-            return method, after(_sentence(findings), told)
-    return ("monte_carlo", after(_sentence(findings), told))
+            chosen = method
+            break
+    reason = say("{said:capital} (JCGM 101 clause 8).", said=semicolons(findings))
+    return chosen, after(reason, stability(ways, row, digits))
 
 
 def _finding(
     model: MeasurementModel, ways: Ways, simulated: Simulated, method: Method, row: int, digits: int
 ) -> tuple[bool, Text]:
     """Whether Monte Carlo confirms the method for one output, and what to say of it."""
-    found = ways.propagated(method)
-    if found is None:
-        return (False, say("is impossible ({problems})", problems=ways.problems[method]))
-    if is_flat(model, found, row):
-        return (False, say("gives u = 0, since the model is flat at the estimates"))
-    if found.dof[row] < 1:
-        return (False, say("has no interval, with {dof:.2g} effective degrees of freedom", dof=found.dof[row]))
-    comparison = compare(found, simulated, row, digits)
-    if not comparison.clear:
-        error = figure(comparison.error, 2)
-        return (
-            max(comparison.low, comparison.high) <= comparison.tolerance + 2 * comparison.error,
-            say(
-                "is neither confirmed nor refuted: {words}, but Monte Carlo's own error is {error}",
-                words=comparison.words,
-                error=error,
-            ),
-        )
-    words = comparison.words
-    return comparison.agrees, (
-        say("is confirmed: {words}", words=words) if comparison.agrees else say("is not enough: {words}", words=words)
+    propagated = ways.propagated(method)
+    if propagated is None:
+        return False, say("is impossible ({problems})", problems=ways.problems[method])
+    if _is_flat(model, propagated, row):
+        return False, say("gives u = 0, since the model is flat at the estimates")
+    if propagated.dof[row] < 1:
+        return False, say("has no interval, with {dof:.2g} effective degrees of freedom", dof=propagated.dof[row])
+    comparison = compare(propagated, simulated, row, digits)
+    low, high, tolerance, error = (figure(number, 2) for number in astuple(comparison))
+    words = say(
+        "its interval's ends differ from Monte Carlo's by {low} and {high}, numerical tolerance {tolerance}",
+        low=low,
+        high=high,
+        tolerance=tolerance,
     )
-
-
-def _sentence(findings: Sequence[Text]) -> Text:
-    said = semicolons(findings)
-    return say("{said:capital} (JCGM 101 clause 8).", said=said)
+    if comparison.clear:
+        if comparison.agrees:
+            return True, say("is confirmed: {words}", words=words)
+        return False, say("is not enough: {words}", words=words)
+    return max(comparison.low, comparison.high) <= comparison.tolerance + 2 * comparison.error, say(
+        "is neither confirmed nor refuted: {words}, but Monte Carlo's own error is {error}", words=words, error=error
+    )
 
 
 def _without_monte_carlo(ways: Ways, row: int, digits: int) -> tuple[Method, Text]:

@@ -1,7 +1,5 @@
 """Correlation between inputs, and draws from their joint distribution.
 
-Draws from the joint distribution of all inputs.
-
 Inputs that nothing ties are drawn one by one. Tied ones are drawn jointly: normal ones as a multivariate normal (JCGM
 101:2008 6.4.8), the means of simultaneous readings as a multivariate t (JCGM 102:2011 5.3.2), the columns of an earlier
 sample row by row. Other distributions have no standard joint form: a Gaussian copula gives each its own distribution
@@ -10,8 +8,9 @@ and the pair the stated correlation coefficient (Cario and Nelson 1997, "NORmal 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -39,11 +38,6 @@ def correlation_matrix(names: Sequence[str], correlations: Correlations) -> Floa
         if matrix[i, j] not in (0.0, r):
             raise CmmUqError("the pair is given twice", where=where, fix="Keep one of the two lines")
         matrix[i, j] = matrix[j, i] = r
-    _must_be_possible(names, matrix)
-    return matrix
-
-
-def _must_be_possible(names: Sequence[str], matrix: Floats) -> None:
     eigenvalues, vectors = np.linalg.eigh(matrix)
     if eigenvalues[0] < -_ROUNDING * len(names):
         involved = [name for name, weight in zip(names, vectors[:, 0], strict=True) if abs(weight) > 1e-6]
@@ -53,6 +47,7 @@ def _must_be_possible(names: Sequence[str], matrix: Floats) -> None:
             where="correlation",
             fix="Give the coefficients with more digits, or mend the one that is wrong",
         )
+    return matrix
 
 
 def square_root(matrix: Floats) -> Floats:
@@ -97,17 +92,23 @@ class Covariance:
         return cls(tuple(draws), tuple(unit for _, unit in draws.values()), np.asarray(matrix, dtype=np.float64))
 
 
-Draw = Callable[[np.random.Generator, int], list[Floats]]
-_HERMITE_NODES = 80
-_SEARCH_STEPS = 60
-_SERIES_REMAINDER = 2e-3
+Draw = Callable[[np.random.Generator, int], Iterable[Floats]]
+_HERMITE_NODES, _SEARCH_STEPS, _SERIES_REMAINDER = 80, 60, 2e-3
 
 
-def joint_draws(inputs: Mapping[str, Distribution], matrix: Floats) -> Draw:
+def joint_draws(
+    inputs: Mapping[str, Distribution], matrix: Floats
+) -> Callable[[np.random.Generator, int], list[Floats]]:
     """Function that draws all inputs together: ``draw(rng, n)`` gives one array (n,) an input."""
     names, given = list(inputs), list(inputs.values())
-    groups = [(group, _group_draw([names[i] for i in group], [given[i] for i in group], matrix[np.ix_(group, group)]))
-              for group in _groups(given, matrix)]  # fmt: skip
+    linked = matrix != 0
+    for i, a in enumerate(given):
+        for j, b in enumerate(given):
+            linked[i, j] |= bool(a.together) and a.together == b.together
+    groups = [
+        (group, _group_draw([names[i] for i in group], [given[i] for i in group], matrix[np.ix_(group, group)]))
+        for group in tied(linked.astype(float))
+    ]
 
     def draw(rng: np.random.Generator, n: int) -> list[Floats]:
         drawn: list[Floats] = [np.empty(0)] * len(given)
@@ -119,14 +120,6 @@ def joint_draws(inputs: Mapping[str, Distribution], matrix: Floats) -> Draw:
     return draw
 
 
-def _groups(inputs: Sequence[Distribution], matrix: Floats) -> list[list[int]]:
-    linked = matrix != 0
-    for i, a in enumerate(inputs):
-        for j, b in enumerate(inputs):
-            linked[i, j] |= bool(a.together) and a.together == b.together
-    return tied(linked.astype(float))
-
-
 def _group_draw(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats) -> Draw:
     if len(inputs) == 1:
         return lambda rng, n: [inputs[0].sample(rng, n)]
@@ -134,19 +127,11 @@ def _group_draw(names: Sequence[str], inputs: Sequence[Distribution], matrix: Fl
         if given.kind == "constant":
             raise CmmUqError(f"{name} is a constant and is correlated with nothing", where="correlation")
     if all(given.together and given.together == inputs[0].together for given in inputs):
-        return _rows(inputs)
+        columns = np.stack([given.draws for given in inputs if given.draws is not None])
+        return lambda rng, n: columns[:, rng.integers(columns.shape[1], size=n)]
     if all(given.kind in ("normal", "t") for given in inputs) and len({float(given.dof) for given in inputs}) == 1:
         return _elliptical(inputs, matrix)
     return _copula(names, inputs, matrix)
-
-
-def _rows(inputs: Sequence[Distribution]) -> Draw:
-    columns = np.stack([given.draws for given in inputs if given.draws is not None])
-
-    def draw(rng: np.random.Generator, n: int) -> list[Floats]:
-        return list(columns[:, rng.integers(columns.shape[1], size=n)])
-
-    return draw
 
 
 def _elliptical(inputs: Sequence[Distribution], matrix: Floats) -> Draw:
@@ -165,10 +150,9 @@ def _copula(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats
     from scipy import special
 
     underlying = np.eye(len(inputs))
-    for i in range(len(inputs)):
-        for j in range(i):
-            r = _underlying_correlation((names[j], inputs[j]), (names[i], inputs[i]), matrix[i, j])
-            underlying[i, j] = underlying[j, i] = r
+    for i, j in combinations(range(len(inputs)), 2):
+        r = _underlying_correlation((names[i], inputs[i]), (names[j], inputs[j]), matrix[i, j])
+        underlying[i, j] = underlying[j, i] = r
     if np.linalg.eigvalsh(underlying)[0] < -1e-9:
         raise CmmUqError(
             f"the correlations of {', '.join(names)} cannot be had together with their distributions",
@@ -178,11 +162,14 @@ def _copula(names: Sequence[str], inputs: Sequence[Distribution], matrix: Floats
     root = square_root(underlying)
 
     def draw(rng: np.random.Generator, n: int) -> list[Floats]:
-        probabilities = special.ndtr(root @ rng.standard_normal((len(inputs), n)))
-        inside = np.clip(probabilities, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
-        return [given.quantile(p) for given, p in zip(inputs, inside, strict=True)]
+        probabilities = _inside(special.ndtr(root @ rng.standard_normal((len(inputs), n))))
+        return [given.quantile(p) for given, p in zip(inputs, probabilities, strict=True)]
 
     return draw
+
+
+def _inside(probabilities: Floats) -> Floats:
+    return np.clip(probabilities, np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
 
 
 def _underlying_correlation(a: tuple[str, Distribution], b: tuple[str, Distribution], wanted: float) -> float:
@@ -193,16 +180,15 @@ def _underlying_correlation(a: tuple[str, Distribution], b: tuple[str, Distribut
         return 0.0
     nodes, weights = special.roots_hermitenorm(_HERMITE_NODES)
     weights = weights / np.sqrt(2 * np.pi)
-    inside = np.clip(special.ndtr(nodes), np.finfo(float).tiny, 1 - np.finfo(float).epsneg)
+    inside = _inside(special.ndtr(nodes))
     orders = np.arange(1, _HERMITE_NODES // 2)
     basis = special.eval_hermitenorm(orders[:, None], nodes) / np.sqrt(special.factorial(orders))[:, None]
     # by Mehler's formula the covariance of the two is a power series in the correlation of the normal variables
     terms = np.prod([basis @ (weights * given.quantile(inside)) for _, given in (a, b)], axis=0)
     spread = float(a[1].standard_deviation) * float(b[1].standard_deviation)
     if not np.isfinite(spread):
-        raise CmmUqError(
-            f"{a[0]} or {b[0]} has no standard deviation (ν ≤ 2), hence no correlation", where="correlation"
-        )
+        problem = f"{a[0]} or {b[0]} has no standard deviation (ν ≤ 2), hence no correlation"
+        raise CmmUqError(problem, where="correlation")
 
     def reached(r: float) -> float:
         return float(np.sum(terms * r**orders) / spread)

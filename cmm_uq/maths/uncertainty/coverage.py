@@ -1,16 +1,10 @@
 """Coverage intervals and joint regions from draws, and how heavy their tails are (JCGM 101:2008, JCGM 102:2011).
 
-Coverage intervals from draws of an output (JCGM 101:2008 7.7), exact for any number of draws in little memory.
-
-Of M draws in ascending order and q = pM, an interval of coverage p runs from draw r to draw r + q. Only the M − q lowest
-and the M − q highest draws can be its ends, so only these are kept.
-
-Near the shortest interval the length hardly changes with r, so that the r of the very shortest one is decided by noise
-and settles as slowly as M^(−1/3). :func:`settled_shortest_interval` takes the r where a smooth curve through the
-lengths is least: an interval of 7.7.1 like the others, as short as the shortest but for noise, whose ends scatter two to
+Of M draws in ascending order and q = pM, an interval of coverage p runs from draw r to draw r + q (JCGM 101:2008 7.7). Only
+the M − q lowest and the M − q highest draws can be its ends, so only these are kept. Near the shortest interval the length
+hardly changes with r, so that the r of the very shortest one is decided by noise and settles as slowly as M^(−1/3).
+:func:`settled_shortest_interval` takes the r where a smooth curve through the lengths is least: its ends scatter two to
 three times less.
-
-How heavy the tails of draws are, and how much of a standard deviation lies beyond the largest of them.
 
 The scatter between blocks says how well the standard deviation of draws is known only while their fourth moment exists. With
 heavier tails (t of few degrees of freedom, a ratio whose denominator comes near zero) every block lacks the same rare draws,
@@ -32,16 +26,16 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.type_a import check_coverage
 
-_PILOT = 100_000
-_MARGIN = 6.0
-_FEWEST_FOR_CURVE = 500
-_SPAN = 1.5
-_DEGREE = 4
-_POINTS = 200
-_EDGE = 0.01
-_LONGER = 0.01
-_FEWEST_FOR_FLATNESS = 5000
-_FLAT = 10.0
+_PILOT, _MARGIN = (
+    100_000,
+    6.0,
+)  # draws that say where the tails lie, and standard deviations of that estimate kept besides
+_FEWEST_FOR_CURVE, _SPAN, _DEGREE, _POINTS = 500, 1.5, 4, 200
+_EDGE = _LONGER = 0.01
+_FEWEST_FOR_FLATNESS, _FLAT = 5000, 10.0
+NO_VARIANCE = 0.5  # shape from which on the second moment does not exist
+_CANDIDATES, _PRIOR_WEIGHT, _PRIOR_SHAPE = 30, 10, 0.5
+_ERRORS = 2.0  # standard errors by which a shape is taken for heavier than it came out, to judge what was not drawn
 
 
 def inner_draws(trials: int, coverage: float) -> int:
@@ -64,7 +58,9 @@ def settled_shortest_interval(lowest: Floats, highest: Floats) -> tuple[float, f
     """
     lengths = highest - lowest
     n, first = len(lengths), int(np.argmin(lengths))
-    if _all_alike(lengths, lowest):
+    inner = slice(n // 20, n - n // 20)
+    # the lengths differ by no more than the places of single draws scatter
+    if n >= _FEWEST_FOR_FLATNESS and np.ptp(lengths[inner]) < _FLAT * np.ptp(lowest[inner]) / np.sqrt(n):
         return symmetric_interval(lowest, highest)
     if n < _FEWEST_FOR_CURVE or not _EDGE * n < first < (1 - _EDGE) * n:
         return shortest_interval(lowest, highest)
@@ -79,13 +75,6 @@ def settled_shortest_interval(lowest: Floats, highest: Floats) -> tuple[float, f
     if lengths[settled] > (1 + _LONGER) * lengths[first]:
         return shortest_interval(lowest, highest)
     return float(lowest[settled]), float(highest[settled])
-
-
-def _all_alike(lengths: Floats, lowest: Floats) -> bool:
-    """Whether the lengths differ by no more than the places of single draws scatter."""
-    n = len(lengths)
-    inner = slice(n // 20, n - n // 20)
-    return n >= _FEWEST_FOR_FLATNESS and bool(np.ptp(lengths[inner]) < _FLAT * np.ptp(lowest[inner]) / np.sqrt(n))
 
 
 def symmetric_interval(lowest: Floats, highest: Floats) -> tuple[float, float]:
@@ -104,26 +93,22 @@ def both_intervals(draws: Floats, coverage: float) -> Floats:
 class Tails:
     """The draws of one output that can be ends of a coverage interval, collected block by block.
 
-    All draws are kept until there are enough to say where the tails lie; from then on those in the tails, with a margin
-    of six standard deviations of that estimate.
+    All draws are kept until there are enough to say where the tails lie; from then on those in the tails, with a margin.
     """
 
     def __init__(self, coverage: float) -> None:
-        self.coverage = coverage
-        self.trials = 0
+        self.coverage, self.trials = coverage, 0
         self._below, self._above = np.inf, -np.inf
         self._low: list[Floats] = []
         self._high: list[Floats] = []
 
     def add(self, block: Floats) -> None:
-        """Take in draws in ascending order."""
+        """Draws in ascending order."""
         self.trials += len(block)
         self._low.append(block[: np.searchsorted(block, self._below, "right")])
         self._high.append(block[np.searchsorted(block, self._above, "left") :])
-        if self.trials >= _PILOT and np.isinf(self._below):
-            self._choose_thresholds()
-
-    def _choose_thresholds(self) -> None:
+        if self.trials < _PILOT or np.isfinite(self._below):
+            return
         draws = np.sort(np.concatenate(self._low))
         outside = 1 - self.coverage
         kept = int(len(draws) * outside * 1.05 + _MARGIN * np.sqrt(len(draws) * outside)) + 1
@@ -140,9 +125,7 @@ class Tails:
 
     def intervals(self) -> Floats:
         """Ends (4,) of the shortest (settled) and the symmetric interval of all draws so far."""
-        outer = max(1, self.trials - inner_draws(self.trials, self.coverage))
-        lowest = np.sort(np.concatenate(self._low))[:outer]
-        highest = np.sort(np.concatenate(self._high))[-outer:]
+        lowest, highest = self.extremes(max(1, self.trials - inner_draws(self.trials, self.coverage)))
         return np.array([*settled_shortest_interval(lowest, highest), *symmetric_interval(lowest, highest)])
 
 
@@ -160,10 +143,6 @@ class Ellipsoid:
         p = len(self.centre)
         ball = pi ** (p / 2) / gamma(p / 2 + 1)
         return float(ball * self.factor**p * np.sqrt(np.linalg.det(self.covariance)))
-
-    def contains(self, points: Floats) -> NDArray[np.bool_]:
-        """Which of the points (p, n) lie inside."""
-        return np.asarray(_distances(points, self.centre, self.covariance) <= self.factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,9 +164,8 @@ class SmallestRegion:
     """Cells of a mesh that hold the coverage probability in the smallest area."""
 
     inside: NDArray[np.bool_]  # (k, l) which cells belong to it
-    # x, y: edges (k + 1,) and (l + 1,) of the cells
-    x: Floats
-    y: Floats
+    x: Floats  # (k + 1,) edges of the cells
+    y: Floats  # (l + 1,)
 
     @property
     def area(self) -> float:
@@ -209,7 +187,8 @@ def elliptical_region(draws: Floats, coverage: float = 0.95) -> Ellipsoid:
     centre, covariance = draws.mean(axis=1), np.atleast_2d(np.cov(draws))
     if np.linalg.matrix_rank(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))) < len(draws):
         raise CmmUqError("the outputs depend on each other completely", fix="Leave out those that follow from others")
-    return Ellipsoid(centre, covariance, _quantile(_distances(draws, centre, covariance), coverage))
+    whitened = np.linalg.solve(np.linalg.cholesky(covariance), draws - centre[:, None])
+    return Ellipsoid(centre, covariance, _quantile(np.sqrt(np.sum(whitened**2, axis=0)), coverage))
 
 
 def rectangular_region(draws: Floats, coverage: float = 0.95) -> Rectangle:
@@ -240,31 +219,17 @@ def smallest_region(draws: Floats, coverage: float = 0.95, cells: int = 60) -> S
     return SmallestRegion(inside.reshape(counts.shape), x, y)
 
 
-def _distances(points: Floats, centre: Floats, covariance: Floats) -> Floats:
-    whitened = np.linalg.solve(np.linalg.cholesky(covariance), points - centre[:, None])
-    return np.asarray(np.sqrt(np.sum(whitened**2, axis=0)))
-
-
 def _quantile(distances: Floats, coverage: float) -> float:
     """Distance that the fraction ``coverage`` of the draws does not exceed."""
     return float(np.sort(distances)[int(np.ceil(coverage * len(distances))) - 1])
 
 
-NO_VARIANCE = 0.5  # shape from which on the second moment does not exist
-_CANDIDATES = 30
-_PRIOR_WEIGHT, _PRIOR_SHAPE = 10, 0.5
-# standard errors of the shape by which it is taken for heavier than it was found, when what was not drawn is judged
-_ERRORS = 2.0
-
-
 @dataclass(frozen=True)
 class Tail:
-    """One tail of the draws of an output."""
-
     shape: float  # k of the generalised Pareto distribution
-    # what the draws beyond the largest one of so many would add to the mean square about the mean; infinite where there is
-    # none
-    unseen: float
+    unseen: (
+        float  # what draws beyond the largest of so many would add to the mean square about the mean; may be infinite
+    )
 
 
 def draws_in_tail(trials: int) -> int:
@@ -277,9 +242,15 @@ def tail_of(largest: Floats, mean: float, trials: int) -> Tail:
     excess = largest[1:] - largest[0]
     if len(excess) < 5 or not excess[-1] > 0 or not np.isfinite(excess[-1]):
         return Tail(-np.inf, 0.0)
-    shape, scale = pareto(excess)
-    heavier = shape + _ERRORS * (1 + max(shape, 0.0)) / np.sqrt(len(excess))
-    return Tail(shape, _unseen(float(largest[0]) - mean, heavier, scale, len(excess), trials))
+    (shape, scale), count = pareto(excess), len(excess)
+    heavier = shape + _ERRORS * (1 + max(shape, 0.0)) / np.sqrt(count)
+    if heavier >= NO_VARIANCE:
+        return Tail(shape, float("inf"))
+    # ∫ (y − mean)² over what is exceeded once in all trials
+    further = scale * (np.log(count) if abs(heavier) < 1e-9 else (count**heavier - 1) / heavier)
+    start, spread = float(largest[0]) - mean + further, scale + heavier * further
+    beyond = start**2 + 2 * start * spread / (1 - heavier) + 2 * spread**2 / ((1 - heavier) * (1 - 2 * heavier))
+    return Tail(shape, float(beyond) / trials)
 
 
 def pareto(excess: Floats) -> tuple[float, float]:
@@ -297,13 +268,3 @@ def pareto(excess: Floats) -> tuple[float, float]:
     found = float(rate @ weight / weight.sum())
     shape = float(np.mean(np.log1p(-found * excess)))
     return (n * shape + _PRIOR_WEIGHT * _PRIOR_SHAPE) / (n + _PRIOR_WEIGHT), -shape / found
-
-
-def _unseen(threshold: float, shape: float, scale: float, count: int, trials: int) -> float:
-    """∫ (y − mean)² over what is exceeded once in all trials; ``threshold`` is from the mean."""
-    if shape >= NO_VARIANCE:
-        return float("inf")
-    further = scale * (np.log(count) if abs(shape) < 1e-9 else (count**shape - 1) / shape)
-    start, spread = threshold + further, scale + shape * further
-    beyond = start**2 + 2 * start * spread / (1 - shape) + 2 * spread**2 / ((1 - shape) * (1 - 2 * shape))
-    return float(beyond) / trials

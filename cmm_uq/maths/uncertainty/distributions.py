@@ -20,37 +20,23 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty import shapes
 from cmm_uq.maths.uncertainty.shapes import DistributionShape
 
-Number = float | Floats
-"""A float, or an array (n,) with one entry a point, where only the law of propagation is asked for."""
+Number = float | Floats  # or an array (n,) with one entry a point, where only the law of propagation is asked for
 
 
 @dataclass(frozen=True, eq=False)
 class Distribution:
-    """An input: location + scale × shape.
+    """An input: location + scale × shape."""
 
-    Parameters
-    ----------
-    kind : its name in JCGM 101 table 1, as budgets and model files write it.
-    mean : estimate.
-    u : standard uncertainty for the law of propagation.
-    location, scale : place and size of the shape.
-    shape : how it is drawn.
-    dof : degrees of freedom of ``u``; infinite when it is taken as known.
-    stated : what was given, for the reader of a budget (limits, beta, count, …).
-    together : name of the joint sample that ``draws`` are one column of; columns of one sample are drawn row by row.
-    draws : (k,) the earlier draws of a sampled input.
-    """
-
-    kind: str
-    mean: Number
-    u: Number
+    kind: str  # its name in JCGM 101 table 1, as budgets and model files write it
+    mean: Number  # estimate
+    u: Number  # standard uncertainty for the law of propagation
     location: Number
     scale: Number
-    shape: DistributionShape | None
-    dof: Number = np.inf
-    stated: Mapping[str, Number] = field(default_factory=dict)
-    together: str = ""
-    draws: Floats | None = None
+    shape: DistributionShape | None  # how it is drawn
+    dof: Number = np.inf  # degrees of freedom of ``u``; infinite when it is taken as known
+    stated: Mapping[str, Number] = field(default_factory=dict)  # limits, beta, count, …, for the reader of a budget
+    together: str = ""  # joint sample that ``draws`` are one column of; columns of one sample are drawn row by row
+    draws: Floats | None = None  # (k,) the earlier draws of a sampled input
 
     @property
     def standard_deviation(self) -> Number:
@@ -111,9 +97,8 @@ def rectangular_uncertain(low: Number, high: Number, limit: Number, dof: Number 
     """
     _positive(limit=limit)
     half_width = (np.asarray(high) - low) / 2
-    _need(
-        np.asarray(limit) < half_width, f"limits in doubt by {limit} overlap", "The doubt must be below half the width"
-    )
+    overlap = f"limits in doubt by {limit} overlap"
+    _need(np.asarray(limit) < half_width, overlap, "The doubt must be below half the width")
     doubt = limit / half_width
     nu = np.maximum(1.0, 0.5 / doubt**2) if dof is None else dof
     shape = shapes.rectangular_uncertain(float(doubt)) if np.ndim(doubt) == 0 else None

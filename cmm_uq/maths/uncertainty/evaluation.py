@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from html import escape
 from math import inf
@@ -16,7 +17,6 @@ from cmm_uq.base.errors import CmmUqError, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, after, commas, names, say
 from cmm_uq.base.overflow import must_be_finite, refusing_overflow
 from cmm_uq.base.points import Floats
-from cmm_uq.base.units import unit_as_written
 from cmm_uq.maths.uncertainty.budget import Budget, Labels, budget_of, joint_line, line_of
 from cmm_uq.maths.uncertainty.choice import (
     Method,
@@ -32,7 +32,6 @@ from cmm_uq.maths.uncertainty.correlation import correlation_of
 from cmm_uq.maths.uncertainty.distributions import constant
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.monte_carlo import HIGHEST_COVERAGE, LARGEST, Simulated, simulate, simulate_adaptively
-from cmm_uq.maths.uncertainty.propagation import Propagated
 from cmm_uq.maths.uncertainty.quantity import rounded
 from cmm_uq.maths.uncertainty.type_a import check_coverage, coverage_factor
 
@@ -42,16 +41,7 @@ _TRIALS_FOR_SENSITIVITY = 100_000
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of an evaluation.
-
-    Parameters
-    ----------
-    method : ``first``, ``second``, ``monte_carlo`` or ``auto``.
-    coverage : probability of the intervals.
-    digits : significant digits of u that Monte Carlo must support, and to which clause 8 compares.
-    seed : of the random numbers.
-    largest : trials that the adaptive Monte Carlo makes at most.
-    """
+    """What is asked of an evaluation."""
 
     method: str = "auto"  # ``first``, ``second``, ``monte_carlo`` or ``auto``
     coverage: float = 0.95  # probability of the intervals
@@ -73,16 +63,14 @@ class Request:
 class OutputResult:
     """One output: its result by the method chosen."""
 
-    # method, reason: how the result was obtained, and why so
     method: Method
-    reason: Text
-    # value, u: estimate and standard uncertainty
+    reason: Text  # why by this method
     value: float
     u: float
     dof: float  # effective degrees of freedom; infinite for Monte Carlo, whose intervals need none
     interval: tuple[float, float]  # coverage interval; the shortest one for Monte Carlo
     coverage_factor: float  # half the interval's length over u
-    budget: Budget  # what contributes
+    budget: Budget
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,7 +78,7 @@ class Evaluation:
     """All outputs of a model."""
 
     request: Request
-    stated: Mapping[str, OutputResult]  # result of each output by name
+    stated: Mapping[str, OutputResult]  # by name
     correlation: Floats  # (p, p) of the outputs; ``nan`` where one has no uncertainty
     ways: Ways  # results of every method that was asked for and possible
 
@@ -100,21 +88,17 @@ class Evaluation:
         return self.ways.simulated is None or bool(self.ways.simulated.stable)
 
     def __repr__(self) -> str:
-        said = [(name, *rounded(found.value, found.u), found.budget.unit) for name, found in self.stated.items()]
-        told = (
-            f"{name} = {value}, u = {u}{f' {unit}' if unit not in ('', '1') else ''}" for name, value, u, unit in said
-        )
-        return f"<Evaluation: {'; '.join(told)}>"
+        texts = []
+        for name, result in self.stated.items():
+            (value, u), unit = rounded(result.value, result.u), result.budget.unit
+            texts.append(f"{name} = {value}, u = {u}{f' {unit}' if unit not in ('', '1') else ''}")
+        return f"<Evaluation: {'; '.join(texts)}>"
 
     def _repr_html_(self) -> str:
         from cmm_uq.maths.uncertainty.budget_results import SUMMARY, summary_rows
 
-        rows = (SUMMARY, *summary_rows(self))
-        return f"<table>{''.join(f'<tr>{_cells(row)}</tr>' for row in rows)}</table>"
-
-
-def _cells(row: Sequence[str]) -> str:
-    return "".join(f"<td>{escape(cell)}</td>" for cell in row)
+        rows = ("".join(f"<td>{escape(cell)}</td>" for cell in row) for row in (SUMMARY, *summary_rows(self)))
+        return f"<table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
 
 def evaluate(model: MeasurementModel, request: Request | None = None, labels: Labels | None = None) -> Evaluation:
@@ -124,96 +108,80 @@ def evaluate(model: MeasurementModel, request: Request | None = None, labels: La
     ------
     CmmUqError : the method asked for is impossible here, or the input is.
     """
-    asked, told = request or Request(), labels or Labels()
+    request, labels = request or Request(), labels or Labels()
     model.must_be_at_one_point()
     fix = "State the inputs in units in which their numbers are neither huge nor tiny"
     with refusing_overflow("[inputs]", fix):
-        evaluation = _evaluated(model, asked, told)
-    for name, stated in evaluation.stated.items():
-        must_be_finite((stated.value, stated.u, *stated.interval), f"[model] outputs.{name}", fix)
+        evaluation = _evaluate(model, request, labels)
+    for name, result in evaluation.stated.items():
+        must_be_finite((result.value, result.u, *result.interval), f"[model] outputs.{name}", fix)
     return evaluation
 
 
-def _evaluated(model: MeasurementModel, asked: Request, told: Labels) -> Evaluation:
-    ways = _ways(model, asked)
-    chosen = [_chosen(model, ways, row, asked) for row in range(len(model.outputs))]
-    methods = {method for method, _ in chosen}
-    alone = one_at_a_time(model, asked.seed) if "monte_carlo" in methods else np.zeros(0)
-    stated: dict[str, OutputResult] = {}
-    for row, (name, (method, reason)) in enumerate(zip(model.outputs, chosen, strict=True)):
-        found = ways.propagated(method)
-        if method == "monte_carlo" and ways.simulated is not None:
-            stated[name] = _simulated(model, ways.simulated, row, reason, alone[row], told)
-        elif found is not None:
-            stated[name] = _propagated(model, found, row, method, reason, asked.coverage, told)
-    return Evaluation(asked, stated, correlation_of(_covariance(ways, methods)), ways)
+def _evaluate(model: MeasurementModel, request: Request, labels: Labels) -> Evaluation:
+    ways = _ways(model, request)
+    choices = [_choice(model, ways, row, request) for row in range(len(model.outputs))]
+    methods = {method for method, _ in choices}
+    drawn = ways.simulated if "monte_carlo" in methods else None
+    alone = one_at_a_time(model, request.seed) if drawn else np.zeros(0)
+    results: dict[str, OutputResult] = {}
+    for row, (name, (method, reason)) in enumerate(zip(model.outputs, choices, strict=True)):
+        propagated = ways.propagated(method)
+        if method == "monte_carlo" and drawn:
+            results[name] = _by_monte_carlo(model, drawn, row, reason, alone[row], labels)
+        elif propagated is not None:
+            dof, u, value = float(propagated.dof[row]), float(propagated.u[row]), float(propagated.value[row])
+            k = float(coverage_factor(dof, request.coverage))
+            budget = budget_of(model, propagated, row, labels=labels, coverage=request.coverage)
+            results[name] = OutputResult(method, reason, value, u, dof, (value - k * u, value + k * u), k, budget)
+    # correlation by the most general of the methods that state the outputs
+    general = drawn or (ways.second if "second" in methods or ways.first is None else ways.first)
+    covariance = np.zeros((0, 0)) if general is None else general.covariance
+    return Evaluation(request, results, correlation_of(covariance), ways)
 
 
-def _ways(model: MeasurementModel, asked: Request) -> Ways:
+def _ways(model: MeasurementModel, request: Request) -> Ways:
     ways = by_propagation(model)
-    if asked.method == "auto":
-        return _with_validation(model, ways, asked)
-    if asked.method == "monte_carlo":
-        simulated = simulate_adaptively(model, asked.coverage, asked.digits, asked.seed, asked.largest)
+    if request.method == "monte_carlo":
+        simulated = simulate_adaptively(model, request.coverage, request.digits, request.seed, request.largest)
         return replace(ways, simulated=simulated)
-    must_be_possible(model, ways, "first" if asked.method == "first" else "second")
-    return ways
-
-
-def _with_validation(model: MeasurementModel, ways: Ways, asked: Request) -> Ways:
+    if request.method != "auto":
+        must_be_possible(model, ways, "first" if request.method == "first" else "second")
+        return ways
     problem = NOTHING
     without = [name for name, given in model.inputs.items() if not np.isfinite(given.standard_deviation)]
     if without:
         problem = say(
             "{inputs} has too few degrees of freedom for a standard deviation (ν ≤ 2)", inputs=commas(names(without))
         )
-    elif asked.coverage > HIGHEST_COVERAGE:
+    elif request.coverage > HIGHEST_COVERAGE:
         problem = say(
             "a coverage probability above {highest_coverage} needs too many trials", highest_coverage=HIGHEST_COVERAGE
         )
     if problem:
         return replace(ways, problems={**ways.problems, "monte_carlo": problem})
-    candidates = [found for found in (ways.first, ways.second) if found is not None]
-    simulated = simulate_to_validate(model, candidates, asked.coverage, asked.digits, asked.seed, asked.largest)
-    return replace(ways, simulated=simulated)
+    candidates = [order for order in (ways.first, ways.second) if order is not None]
+    return replace(
+        ways,
+        simulated=simulate_to_validate(
+            model, candidates, request.coverage, request.digits, request.seed, request.largest
+        ),
+    )
 
 
-def _chosen(model: MeasurementModel, ways: Ways, row: int, asked: Request) -> tuple[Method, Text]:
-    if asked.method == "auto":
-        return choose(model, ways, row, asked.digits)
-    if asked.method == "monte_carlo":
-        return ("monte_carlo", after(say("Asked for."), stability(ways, row, asked.digits)))
-    method: Method = "first" if asked.method == "first" else "second"
-    return method, after(say("Asked for; not confirmed by Monte Carlo."), beside(ways, method, row, asked.digits))
+def _choice(model: MeasurementModel, ways: Ways, row: int, request: Request) -> tuple[Method, Text]:
+    if request.method == "auto":
+        return choose(model, ways, row, request.digits)
+    if request.method == "monte_carlo":
+        return "monte_carlo", after(say("Asked for."), stability(ways, row, request.digits))
+    method: Method = "first" if request.method == "first" else "second"
+    return method, after(say("Asked for; not confirmed by Monte Carlo."), beside(ways, method, row, request.digits))
 
 
-def _covariance(ways: Ways, methods: Collection[Method]) -> Floats:
-    """Covariance of the outputs by the most general of the methods that state them."""
-    if "monte_carlo" in methods and ways.simulated is not None:
-        return ways.simulated.covariance
-    found = ways.second if "second" in methods or ways.first is None else ways.first
-    return found.covariance if found is not None else np.zeros((0, 0))
-
-
-def _propagated(
-    model: MeasurementModel,
-    found: Propagated,
-    row: int,
-    method: Method,
-    reason: Text,
-    coverage: float,
-    labels: Labels,
+def _by_monte_carlo(
+    model: MeasurementModel, drawn: Simulated, row: int, reason: Text, alone: Floats, labels: Labels
 ) -> OutputResult:
-    dof, u, value = float(found.dof[row]), float(found.u[row]), float(found.value[row])
-    factor = float(coverage_factor(dof, coverage))
-    budget = budget_of(model, found, row, labels=labels, coverage=coverage)
-    return OutputResult(method, reason, value, u, dof, (value - factor * u, value + factor * u), factor, budget)
-
-
-def _simulated(
-    model: MeasurementModel, simulated: Simulated, row: int, reason: Text, alone: Floats, labels: Labels
-) -> OutputResult:
-    name, value, u = simulated.outputs[row], float(simulated.value[row]), float(simulated.u[row])
+    name, value, u = drawn.outputs[row], float(drawn.value[row]), float(drawn.u[row])
     lines = []
     for (quantity, given), variance in zip(model.inputs.items(), alone.tolist(), strict=True):
         line = line_of(quantity, given, labels)
@@ -224,9 +192,9 @@ def _simulated(
         "(JCGM 101 annex B); “together” is what they add or take away jointly, by correlation or "
         "nonlinearity."
     )
-    unit = unit_as_written(labels.units.get(name, ""))
-    budget = Budget(Verbatim(name), lines, value, unit, simulated.coverage, effective_dof=inf, statement=statement)
-    low, high = map(float, simulated.interval[row])
+    unit, coverage = labels.unit(name), drawn.coverage
+    budget = Budget(Verbatim(name), lines, value, unit, coverage, effective_dof=inf, statement=statement)
+    low, high = map(float, drawn.interval[row])
     return OutputResult("monte_carlo", reason, value, u, inf, (low, high), (high - low) / (2 * u) if u else 0.0, budget)
 
 
@@ -235,14 +203,11 @@ def one_at_a_time(model: MeasurementModel, seed: int = 0) -> Floats:
 
     Zero where the model gives no finite value that way.
     """
-    found = np.zeros((len(model.outputs), len(model.inputs)))
+    variances = np.zeros((len(model.outputs), len(model.inputs)))
     held = {name: constant(given.mean) for name, given in model.inputs.items()}
     for k, (name, given) in enumerate(model.inputs.items()):
-        if not np.any(np.asarray(given.u) > 0):
-            continue
-        try:
-            alone = MeasurementModel(model.function, {**held, name: given}, model.outputs)
-            found[:, k] = simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
-        except CmmUqError:
-            continue
-    return found
+        if np.any(np.asarray(given.u) > 0):
+            with suppress(CmmUqError):
+                alone = MeasurementModel(model.function, {**held, name: given}, model.outputs)
+                variances[:, k] = simulate(alone, _TRIALS_FOR_SENSITIVITY, seed=seed).u ** 2
+    return variances

@@ -1,24 +1,16 @@
-"""Numbers that carry their first and second derivatives through NumPy functions, exact to rounding.
-
-Partial derivatives of NumPy's elementary functions, first and second.
-
-One table for functions of one argument, one for functions of two. ``f`` is the function's value at the argument, passed
-on so that nothing is computed twice; ``None`` stands for a derivative that is zero everywhere. The rules hold for
-complex arguments too (a step along the imaginary axis differentiates once more), where NumPy itself would be in the way
-for the absolute value, the arc tangent of two arguments and the hypotenuse, which :data:`COMPLEX` therefore defines.
-
-Numbers that carry their derivatives: exact first and second derivatives of any function made of NumPy's functions.
+"""Jets: numbers that carry their first and second derivatives through NumPy's functions, exact to rounding.
 
 A :class:`Jet` behaves in arithmetic and in NumPy's elementary functions as its value does (a float or an array of
 points), and applies the chain rule beside it (truncated Taylor arithmetic: Griewank and Walther, Evaluating
 Derivatives, 2008, ch. 13). Derivatives are kept only for the inputs that a quantity depends on, each as wide as it must
-be, so that the cost follows the structure of the model. They are exact to rounding: there is no step to choose.
+be, so that the cost follows the structure of the model. The rules hold for complex arguments too (a step along the
+imaginary axis differentiates once more), where NumPy itself would be in the way for the absolute value, the arc tangent of
+two arguments and the hypotenuse, which :data:`COMPLEX` therefore defines.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from math import log
 from typing import Any
 
@@ -27,27 +19,10 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from cmm_uq.base.errors import CmmUqError
 
-Operand = Any  # A float or an array, real or complex
+Operand = Any  # a float or an array, real or complex
 Partial = Callable[..., Operand]
-
-
-@dataclass(frozen=True)
-class OneArgument:
-    """Derivatives of f(x): ``first(x, f)`` and ``second(x, f)``."""
-
-    first: Partial
-    second: Partial | None
-
-
-@dataclass(frozen=True)
-class TwoArguments:
-    """Partial derivatives of f(x, y), each a function of (x, y, f)."""
-
-    x: Partial
-    y: Partial
-    xx: Partial | None
-    xy: Partial | None
-    yy: Partial | None
+# functions of the arguments and of the function's value f there, so that nothing is computed twice; None where zero
+Rule = Partial | None
 
 
 def _power_term(coefficient: Operand, x: Operand, exponent: Operand) -> Operand:
@@ -64,65 +39,67 @@ def sign(x: Operand) -> Operand:
 
 LN2, LN10 = log(2.0), log(10.0)
 
-ONE: Mapping[np.ufunc, OneArgument] = {
-    np.negative: OneArgument(lambda _x, _f: -1.0, None),
-    np.positive: OneArgument(lambda _x, _f: 1.0, None),
-    np.absolute: OneArgument(lambda x, _f: sign(x), None),
-    np.square: OneArgument(lambda x, _f: 2.0 * x, lambda _x, _f: 2.0),
-    np.reciprocal: OneArgument(lambda _x, f: -f * f, lambda _x, f: 2.0 * f * f * f),
-    np.sqrt: OneArgument(lambda _x, f: 0.5 / f, lambda x, f: -0.25 / (f * x)),
-    np.cbrt: OneArgument(lambda _x, f: 1.0 / (3.0 * f * f), lambda x, f: -2.0 / (9.0 * f * f * x)),
-    np.exp: OneArgument(lambda _x, f: f, lambda _x, f: f),
-    np.exp2: OneArgument(lambda _x, f: LN2 * f, lambda _x, f: LN2 * LN2 * f),
-    np.expm1: OneArgument(lambda _x, f: f + 1.0, lambda _x, f: f + 1.0),
-    np.log: OneArgument(lambda x, _f: 1.0 / x, lambda x, _f: -1.0 / (x * x)),
-    np.log2: OneArgument(lambda x, _f: 1.0 / (LN2 * x), lambda x, _f: -1.0 / (LN2 * x * x)),
-    np.log10: OneArgument(lambda x, _f: 1.0 / (LN10 * x), lambda x, _f: -1.0 / (LN10 * x * x)),
-    np.log1p: OneArgument(lambda x, _f: 1.0 / (1.0 + x), lambda x, _f: -1.0 / ((1.0 + x) * (1.0 + x))),
-    np.sin: OneArgument(lambda x, _f: np.cos(x), lambda _x, f: -f),
-    np.cos: OneArgument(lambda x, _f: -np.sin(x), lambda _x, f: -f),
-    np.tan: OneArgument(lambda _x, f: 1.0 + f * f, lambda _x, f: 2.0 * f * (1.0 + f * f)),
-    np.arcsin: OneArgument(lambda x, _f: 1.0 / np.sqrt(1.0 - x * x), lambda x, _f: x / (1.0 - x * x) ** 1.5),
-    np.arccos: OneArgument(lambda x, _f: -1.0 / np.sqrt(1.0 - x * x), lambda x, _f: -x / (1.0 - x * x) ** 1.5),
-    np.arctan: OneArgument(lambda x, _f: 1.0 / (1.0 + x * x), lambda x, _f: -2.0 * x / (1.0 + x * x) ** 2),
-    np.sinh: OneArgument(lambda x, _f: np.cosh(x), lambda _x, f: f),
-    np.cosh: OneArgument(lambda x, _f: np.sinh(x), lambda _x, f: f),
-    np.tanh: OneArgument(lambda _x, f: 1.0 - f * f, lambda _x, f: -2.0 * f * (1.0 - f * f)),
-    np.arcsinh: OneArgument(lambda x, _f: 1.0 / np.sqrt(1.0 + x * x), lambda x, _f: -x / (1.0 + x * x) ** 1.5),
-    np.arccosh: OneArgument(lambda x, _f: 1.0 / np.sqrt(x * x - 1.0), lambda x, _f: -x / (x * x - 1.0) ** 1.5),
-    np.arctanh: OneArgument(lambda x, _f: 1.0 / (1.0 - x * x), lambda x, _f: 2.0 * x / (1.0 - x * x) ** 2),
-    np.deg2rad: OneArgument(lambda _x, _f: np.pi / 180.0, None),
-    np.radians: OneArgument(lambda _x, _f: np.pi / 180.0, None),
-    np.rad2deg: OneArgument(lambda _x, _f: 180.0 / np.pi, None),
-    np.degrees: OneArgument(lambda _x, _f: 180.0 / np.pi, None),
+# f'(x) and f"(x)
+ONE: Mapping[np.ufunc, tuple[Partial, Rule]] = {
+    np.negative: (lambda _x, _f: -1.0, None),
+    np.positive: (lambda _x, _f: 1.0, None),
+    np.absolute: (lambda x, _f: sign(x), None),
+    np.square: (lambda x, _f: 2.0 * x, lambda _x, _f: 2.0),
+    np.reciprocal: (lambda _x, f: -f * f, lambda _x, f: 2.0 * f * f * f),
+    np.sqrt: (lambda _x, f: 0.5 / f, lambda x, f: -0.25 / (f * x)),
+    np.cbrt: (lambda _x, f: 1.0 / (3.0 * f * f), lambda x, f: -2.0 / (9.0 * f * f * x)),
+    np.exp: (lambda _x, f: f, lambda _x, f: f),
+    np.exp2: (lambda _x, f: LN2 * f, lambda _x, f: LN2 * LN2 * f),
+    np.expm1: (lambda _x, f: f + 1.0, lambda _x, f: f + 1.0),
+    np.log: (lambda x, _f: 1.0 / x, lambda x, _f: -1.0 / (x * x)),
+    np.log2: (lambda x, _f: 1.0 / (LN2 * x), lambda x, _f: -1.0 / (LN2 * x * x)),
+    np.log10: (lambda x, _f: 1.0 / (LN10 * x), lambda x, _f: -1.0 / (LN10 * x * x)),
+    np.log1p: (lambda x, _f: 1.0 / (1.0 + x), lambda x, _f: -1.0 / ((1.0 + x) * (1.0 + x))),
+    np.sin: (lambda x, _f: np.cos(x), lambda _x, f: -f),
+    np.cos: (lambda x, _f: -np.sin(x), lambda _x, f: -f),
+    np.tan: (lambda _x, f: 1.0 + f * f, lambda _x, f: 2.0 * f * (1.0 + f * f)),
+    np.arcsin: (lambda x, _f: 1.0 / np.sqrt(1.0 - x * x), lambda x, _f: x / (1.0 - x * x) ** 1.5),
+    np.arccos: (lambda x, _f: -1.0 / np.sqrt(1.0 - x * x), lambda x, _f: -x / (1.0 - x * x) ** 1.5),
+    np.arctan: (lambda x, _f: 1.0 / (1.0 + x * x), lambda x, _f: -2.0 * x / (1.0 + x * x) ** 2),
+    np.sinh: (lambda x, _f: np.cosh(x), lambda _x, f: f),
+    np.cosh: (lambda x, _f: np.sinh(x), lambda _x, f: f),
+    np.tanh: (lambda _x, f: 1.0 - f * f, lambda _x, f: -2.0 * f * (1.0 - f * f)),
+    np.arcsinh: (lambda x, _f: 1.0 / np.sqrt(1.0 + x * x), lambda x, _f: -x / (1.0 + x * x) ** 1.5),
+    np.arccosh: (lambda x, _f: 1.0 / np.sqrt(x * x - 1.0), lambda x, _f: -x / (x * x - 1.0) ** 1.5),
+    np.arctanh: (lambda x, _f: 1.0 / (1.0 - x * x), lambda x, _f: 2.0 * x / (1.0 - x * x) ** 2),
+    np.deg2rad: (lambda _x, _f: np.pi / 180.0, None),
+    np.radians: (lambda _x, _f: np.pi / 180.0, None),
+    np.rad2deg: (lambda _x, _f: 180.0 / np.pi, None),
+    np.degrees: (lambda _x, _f: 180.0 / np.pi, None),
 }
 
-TWO: Mapping[np.ufunc, TwoArguments] = {
-    np.add: TwoArguments(lambda _x, _y, _f: 1.0, lambda _x, _y, _f: 1.0, None, None, None),
-    np.subtract: TwoArguments(lambda _x, _y, _f: 1.0, lambda _x, _y, _f: -1.0, None, None, None),
-    np.multiply: TwoArguments(lambda _x, y, _f: y, lambda x, _y, _f: x, None, lambda _x, _y, _f: 1.0, None),
-    np.divide: TwoArguments(
+# by x, y, xx, xy, yy
+TWO: Mapping[np.ufunc, tuple[Partial, Partial, Rule, Rule, Rule]] = {
+    np.add: (lambda _x, _y, _f: 1.0, lambda _x, _y, _f: 1.0, None, None, None),
+    np.subtract: (lambda _x, _y, _f: 1.0, lambda _x, _y, _f: -1.0, None, None, None),
+    np.multiply: (lambda _x, y, _f: y, lambda x, _y, _f: x, None, lambda _x, _y, _f: 1.0, None),
+    np.divide: (
         lambda _x, y, _f: 1.0 / y,
         lambda _x, y, f: -f / y,
         None,
         lambda _x, y, _f: -1.0 / (y * y),
         lambda _x, y, f: 2.0 * f / (y * y),
     ),
-    np.power: TwoArguments(
+    np.power: (
         lambda x, y, _f: _power_term(y, x, y - 1.0),
         lambda x, _y, f: f * np.log(x),
         lambda x, y, _f: _power_term(y * (y - 1.0), x, y - 2.0),
         lambda x, y, _f: x ** (y - 1.0) * (1.0 + y * np.log(x)),
         lambda x, _y, f: f * np.log(x) ** 2,
     ),
-    np.arctan2: TwoArguments(
+    np.arctan2: (
         lambda x, y, _f: y / (x * x + y * y),
         lambda x, y, _f: -x / (x * x + y * y),
         lambda x, y, _f: -2.0 * x * y / (x * x + y * y) ** 2,
         lambda x, y, _f: (x * x - y * y) / (x * x + y * y) ** 2,
         lambda x, y, _f: 2.0 * x * y / (x * x + y * y) ** 2,
     ),
-    np.hypot: TwoArguments(
+    np.hypot: (
         lambda x, _y, f: x / f,
         lambda _x, y, f: y / f,
         lambda _x, y, f: y * y / (f * f * f),
@@ -165,16 +142,12 @@ def value_of(ufunc: np.ufunc, *arguments: Operand) -> Operand:
     return ufunc(*arguments)
 
 
-First = dict[int, Operand]
-Second = dict[tuple[int, int], Operand]
+First = dict[int, Operand]  # derivative by input k, for the inputs that a quantity depends on
+Second = dict[tuple[int, int], Operand]  # by inputs (k, l), k ≤ l
 
 
 class Jet(NDArrayOperatorsMixin):
-    """A quantity with its derivatives by numbered inputs.
-
-    ``value``: float or array (n,). ``first``: derivative by input k, for the inputs that the quantity depends on.
-    ``second``: second derivative by inputs (k, l), k ≤ l; ``None`` when only first derivatives are carried.
-    """
+    """A quantity, float or array (n,), with its derivatives; ``second`` is None when only first ones are carried."""
 
     __slots__ = ("first", "second", "value")
 
@@ -193,10 +166,10 @@ class Jet(NDArrayOperatorsMixin):
         if method != "__call__" or options:
             raise _unknown(f"numpy.{ufunc.__name__}.{method}" if method != "__call__" else f"numpy.{ufunc.__name__}")
         if ufunc in ONE:
-            rule = ONE[ufunc]
+            slope, bent = ONE[ufunc]
             f = value_of(ufunc, self.value)
-            bent = rule.second if self.second is not None else None
-            return _compose(self, f, rule.first(self.value, f), bent and bent(self.value, f))
+            curvature = bent and bent(self.value, f) if self.second is not None else None
+            return _compose(self, f, slope(self.value, f), curvature)
         if ufunc in TWO:
             return _two_arguments(ufunc, *operands)
         if ufunc in COMPARISONS:
@@ -263,23 +236,21 @@ def _products(a: First, b: First) -> Second:
 
 
 def _two_arguments(ufunc: np.ufunc, x: Operand, y: Operand) -> Jet:
-    rule, xv, yv = TWO[ufunc], _value(x), _value(y)
+    by_x, by_y, by_xx, by_xy, by_yy = TWO[ufunc]
+    xv, yv = _value(x), _value(y)
     f = value_of(ufunc, xv, yv)
-
-    def at(partial: Partial | None) -> Operand | None:
-        return partial and partial(xv, yv, f)
-
     if not isinstance(y, Jet):
-        return _compose(x, f, at(rule.x), at(rule.xx) if x.second is not None else None)
+        return _compose(x, f, by_x(xv, yv, f), by_xx(xv, yv, f) if by_xx and x.second is not None else None)
     if not isinstance(x, Jet):
-        return _compose(y, f, at(rule.y), at(rule.yy) if y.second is not None else None)
-    first = _sum(_scaled(x.first, at(rule.x)), _scaled(y.first, at(rule.y)))
+        return _compose(y, f, by_y(xv, yv, f), by_yy(xv, yv, f) if by_yy and y.second is not None else None)
+    slope_x, slope_y = by_x(xv, yv, f), by_y(xv, yv, f)
+    first = _sum(_scaled(x.first, slope_x), _scaled(y.first, slope_y))
     if x.second is None or y.second is None:
         return Jet(f, first, None)
-    second = _sum(_scaled(x.second, at(rule.x)), _scaled(y.second, at(rule.y)))
-    for partial, a, b in ((rule.xx, x.first, x.first), (rule.xy, x.first, dict(y.first)), (rule.yy, y.first, y.first)):
-        if partial is not None:
-            second = _sum(second, _scaled(_products(a, b), at(partial)))
+    second = _sum(_scaled(x.second, slope_x), _scaled(y.second, slope_y))
+    for rule, a, b in ((by_xx, x.first, x.first), (by_xy, x.first, dict(y.first)), (by_yy, y.first, y.first)):
+        if rule is not None:
+            second = _sum(second, _scaled(_products(a, b), rule(xv, yv, f)))
     return Jet(f, first, second)
 
 

@@ -1,7 +1,5 @@
 """The measurement model: outputs as a function of inputs, what is known of them, and its exact derivatives.
 
-Derivatives of a measurement model, exact to rounding: for many outputs and many points at once.
-
 Jets give the first and second derivatives of whatever is written with NumPy's elementary functions. A model that they
 cannot follow (linear algebra, a foreign library) but that is analytic is differentiated by complex steps (Squire and
 Trapp, SIAM Review 40, 1998), checked against a coarse real step, since a model that is not analytic would go wrong
@@ -24,46 +22,31 @@ from cmm_uq.maths.uncertainty.correlation import Correlations, correlation_matri
 from cmm_uq.maths.uncertainty.distributions import Distribution
 from cmm_uq.maths.uncertainty.jets import Jet
 
-Function = Callable[..., Sequence[Any]]
-"""m quantities in, p quantities out; each a float, an array (n,) or a jet."""
-
-Differentiation = Literal["jets", "complex_step"]
-
+Function = Callable[..., Sequence[Any]]  # m quantities in, p out; each a float, an array (n,) or a jet
 _IMAGINARY_STEP = 1e-40
 _COARSE_STEP = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """What a model does near its estimates; ``...`` is the shape of the points, empty for a single one.
+    """What a model does near its estimates; ``...`` is the shape of the points, empty for a single one."""
 
-    Parameters
-    ----------
-    value : (p, ...) outputs.
-    jacobian : (p, m, ...) first derivatives by the inputs.
-    hessian : (p, m, m, ...) second derivatives; None when only first ones were asked for.
-    """
-
-    value: Floats
-    jacobian: Floats
-    hessian: Floats | None = None
+    value: Floats  # (p, ...)
+    jacobian: Floats  # (p, m, ...)
+    hessian: Floats | None = None  # (p, m, m, ...) second derivatives, where they were asked for
 
 
 def derivatives(function: Function, at: Sequence[Any], order: Literal[1, 2] = 1) -> Derivatives:
-    """Derivatives by jets.
+    """Derivatives by jets at m estimates, floats or arrays that broadcast, up to an order.
 
-    Parameters
-    ----------
-    function : the model.
-    at : m estimates, floats or arrays that broadcast.
-    order : highest derivative.
-
-    Raises
-    ------
-    CmmUqError : the model uses a function of which no exact derivative is known here.
+    Raises :class:`CmmUqError` where the model uses a function of which no exact derivative is known here.
     """
     outputs, shape = _jets(function, at, order), _shape(at)
-    value, jacobian = _value_and_jacobian(outputs, len(at), shape)
+    jacobian = np.zeros((len(outputs), len(at), *shape))
+    for row, output in enumerate(outputs):
+        for k, slope in output.first.items() if isinstance(output, Jet) else ():
+            jacobian[row, k] = slope
+    value = _stack([output.value if isinstance(output, Jet) else output for output in outputs], shape)
     return Derivatives(value, jacobian, _hessian(outputs, len(at), shape) if order > 1 else None)
 
 
@@ -75,17 +58,10 @@ def hessian_along(function: Function, at: Sequence[Any], direction: Sequence[Any
 
 
 def complex_step(function: Function, at: Sequence[Any], scale: Sequence[Any]) -> Derivatives:
-    """First derivatives of an analytic model by complex steps.
+    """First derivatives of an analytic model, which takes complex numbers, by complex steps.
 
-    Parameters
-    ----------
-    function : the model; must take complex numbers.
-    at : m estimates, floats or arrays that broadcast.
-    scale : m positive lengths over which the model changes smoothly, such as the standard uncertainties.
-
-    Raises
-    ------
-    CmmUqError : the model is not analytic (it takes absolute values, real parts or compares).
+    ``at``: m estimates, floats or arrays that broadcast. ``scale``: m positive lengths over which the model changes smoothly,
+    such as the standard uncertainties. Raises :class:`CmmUqError` where the model is not analytic.
     """
     shape = _shape(at)
     value = _stack(function(*at), shape)
@@ -99,18 +75,14 @@ def complex_step(function: Function, at: Sequence[Any], scale: Sequence[Any]) ->
         moved[k] = x + step
         above = _stack(function(*moved), shape)
         moved[k] = x - step
-        below = _stack(function(*moved), shape)
-        _must_agree(jacobian[:, k] * step, (above - below) / 2, 1e-12 * np.abs(value))
+        exact, coarse = jacobian[:, k] * step, (above - _stack(function(*moved), shape)) / 2
+        allowed = 1e-2 * np.maximum(np.abs(exact), np.abs(coarse)) + 1e-12 * np.abs(value)
+        if np.any(np.abs(exact - coarse) > allowed):
+            raise CmmUqError(
+                "complex steps and real steps give different derivatives: the model is not analytic near the estimate",
+                fix="Write it with NumPy's elementary functions and differentiate it by jets",
+            )
     return Derivatives(value, jacobian)
-
-
-def _must_agree(exact: Floats, coarse: Floats, rounding: Floats) -> None:
-    allowed = 1e-2 * np.maximum(np.abs(exact), np.abs(coarse)) + rounding
-    if np.any(np.abs(exact - coarse) > allowed):
-        raise CmmUqError(
-            "complex steps and real steps give different derivatives: the model is not analytic near the estimate",
-            fix="Write it with NumPy's elementary functions and differentiate it by jets",
-        )
 
 
 def _jets(function: Function, at: Sequence[Any], order: int) -> Sequence[Any]:
@@ -124,14 +96,6 @@ def _shape(at: Sequence[Any]) -> tuple[int, ...]:
 
 def _stack(outputs: Sequence[Any], shape: tuple[int, ...]) -> Floats:
     return np.stack([np.broadcast_to(np.asarray(y, dtype=np.float64), shape) for y in outputs])
-
-
-def _value_and_jacobian(outputs: Sequence[Any], m: int, shape: tuple[int, ...]) -> tuple[Floats, Floats]:
-    jacobian = np.zeros((len(outputs), m, *shape))
-    for row, output in enumerate(outputs):
-        for k, slope in output.first.items() if isinstance(output, Jet) else ():
-            jacobian[row, k] = slope
-    return _stack([output.value if isinstance(output, Jet) else output for output in outputs], shape), jacobian
 
 
 def _hessian(outputs: Sequence[Any], m: int, shape: tuple[int, ...], kind: type[np.generic] = np.float64) -> Any:
@@ -160,38 +124,30 @@ class MeasurementModel:
     inputs: Mapping[str, Distribution]
     outputs: Sequence[str] = ("y",)
     correlation: Correlations = field(default_factory=dict)
-    differentiation: Differentiation = "jets"
+    differentiation: Literal["jets", "complex_step"] = "jets"
 
     @property
     def names(self) -> list[str]:
-        """Names of the m inputs."""
         return list(self.inputs)
 
     @property
     def means(self) -> list[Any]:
-        """Estimates of the m inputs, floats or (n,)."""
+        """Of the m inputs, floats or (n,)."""
         return [given.mean for given in self.inputs.values()]
 
     @cached_property
     def correlation_matrix(self) -> Floats:
         """(m, m) correlation matrix of the inputs, columns of one earlier sample included."""
-        return correlation_matrix(self.names, {**self._within_samples(), **self.correlation})
-
-    def _within_samples(self) -> dict[tuple[str, str], float]:
-        found = {}
-        for a, first in self.inputs.items():
-            for b, second in self.inputs.items():
-                if a < b and first.together and first.together == second.together:
-                    found[a, b] = float(np.corrcoef(np.asarray(first.draws), np.asarray(second.draws))[0, 1])
-        return found
+        within = {
+            (a, b): float(np.corrcoef(np.asarray(first.draws), np.asarray(second.draws))[0, 1])
+            for a, first in self.inputs.items()
+            for b, second in self.inputs.items()
+            if a < b and first.together and first.together == second.together
+        }
+        return correlation_matrix(self.names, {**within, **self.correlation})
 
     def must_be_at_one_point(self) -> None:
-        """Refuse a model whose inputs have several values.
-
-        Raises
-        ------
-        CmmUqError : names such an input.
-        """
+        """Refuse inputs of several values."""
         for name, given in self.inputs.items():
             if np.ndim(given.mean) or np.ndim(given.u) or np.ndim(given.dof):
                 raise CmmUqError(f"{name} has several values", fix="Evaluate one point at a time, or use first_order")

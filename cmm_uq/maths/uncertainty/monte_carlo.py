@@ -14,7 +14,7 @@ import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
-from cmm_uq.maths.uncertainty.correlation import Draw, joint_draws
+from cmm_uq.maths.uncertainty.correlation import joint_draws
 from cmm_uq.maths.uncertainty.coverage import Tails, both_intervals, draws_in_tail, tail_of
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.type_a import check_coverage
@@ -22,8 +22,7 @@ from cmm_uq.maths.uncertainty.type_a import check_coverage
 BLOCK = 10_000
 LARGEST = 20_000_000
 HIGHEST_COVERAGE = 0.9999  # of the adaptive procedure, whose blocks have 100/(1 − p) trials (JCGM 101 7.9.4 b).
-_FEWEST_BLOCKS = 10
-_FEWEST_TRIALS = 1_000_000
+_FEWEST_BLOCKS, _FEWEST_TRIALS = 10, 1_000_000
 _BINS = 200
 
 
@@ -40,25 +39,23 @@ class Simulated:
     """Outputs of a measurement model by Monte Carlo."""
 
     outputs: Sequence[str]  # p names
-    trials: int  # number of draws
+    trials: int
     coverage: float  # probability of the intervals
-    seed: int  # of the random numbers
+    seed: int
     value: Floats  # (p,) means
     covariance: Floats  # (p, p)
     interval: Floats  # (p, 2) shortest coverage intervals
     symmetric_interval: Floats  # (p, 2) probabilistically symmetric coverage intervals
-    # (p, 6) standard deviations of value, u, and the ends of both intervals, from the scatter of blocks; ``nan`` for fewer
-    # than two blocks
-    standard_error: Floats
-    # whether every figure is known to its numerical tolerance, rare draws that did not come included; None when no digits
-    # were asked for
-    stable: bool | None
+    standard_error: Floats  # (p, 6) of value, u and the ends of both intervals; ``nan`` for fewer than two blocks
+    stable: (
+        bool | None
+    )  # all figures within their numerical tolerance, rare draws included; None when no digits are asked for
     shape: Floats  # (p,) of the heavier tail of each output (:mod:`cmm_uq.maths.uncertainty.coverage`).
-    # (p,) by how much u would be larger with draws that are too rare to have come; infinite where it does not exist
-    unseen: Floats
-    # edges, density: (p, b + 1) and (p, b) histogram of the output, for pictures
-    edges: Floats
-    density: Floats
+    unseen: (
+        Floats  # (p,) by how much u would be larger with draws too rare to have come; infinite where it does not exist
+    )
+    edges: Floats  # (p, b + 1) of the histogram of the output, for pictures
+    density: Floats  # (p, b)
 
     @cached_property
     def u(self) -> Floats:
@@ -74,11 +71,9 @@ def simulate(model: MeasurementModel, trials: int, coverage: float = 0.95, seed:
 def from_source(source: Source, trials: int, coverage: float = 0.95, seed: int = 0) -> Simulated:
     """Make a given number of trials of any source."""
     check_coverage(coverage)
-    fewest = int(np.ceil(2 / (1 - coverage)))
-    if trials < fewest:
-        raise CmmUqError(
-            f"{trials} trials cannot give a {coverage:.4g} coverage interval", fix=f"Make at least {fewest}"
-        )
+    if trials < (fewest := int(np.ceil(2 / (1 - coverage)))):
+        problem = f"{trials} trials cannot give a {coverage:.4g} coverage interval"
+        raise CmmUqError(problem, fix=f"Make at least {fewest}")
     run = _Run(source, coverage, seed)
     while run.trials < trials:
         run.advance(min(BLOCK, trials - run.trials))
@@ -168,13 +163,13 @@ def _source(model: MeasurementModel) -> Source:
                 f"{name} has {given.dof:g} degrees of freedom, and so no standard deviation to draw with",
                 fix="Repeat the readings (JCGM 101 6.4.9.5 needs four or more), or use the law of propagation",
             )
-    draw: Draw = joint_draws(model.inputs, model.correlation_matrix)
+    draw = joint_draws(model.inputs, model.correlation_matrix)
 
     def outputs(rng: np.random.Generator, n: int) -> Floats:
         inputs = draw(rng, n)
         with np.errstate(all="ignore"):
-            given = model(*inputs)
-        stacked = np.stack([np.broadcast_to(np.asarray(y, dtype=np.float64), (n,)) for y in given])
+            values = model(*inputs)
+        stacked = np.stack([np.broadcast_to(np.asarray(y, dtype=np.float64), (n,)) for y in values])
         finite = np.isfinite(stacked)
         if not finite.all():
             row = int(np.argmin(finite.all(axis=1)))
@@ -197,16 +192,13 @@ class _Run:
         self.source, self.coverage, self.seed = source, coverage, seed
         self._rng = np.random.default_rng(seed)
         p = len(source.outputs)
-        self.trials = 0
+        self.trials = self.blocks = 0
         self._mean, self._comoment = np.zeros(p), np.zeros((p, p))
         self._tails = [Tails(coverage) for _ in range(p)]
-        self.blocks = 0
         self._block_mean, self._block_squares = np.zeros((p, 6)), np.zeros((p, 6))
-        self._bins: tuple[Floats, Floats] | None = None
-        self._counts = np.zeros((p, _BINS))
+        self._width, self._edges, self._counts = np.zeros(0), np.zeros((0, _BINS + 1)), np.zeros((p, _BINS))
 
     def advance(self, n: int) -> None:
-        """Make n more trials."""
         outputs = self.source.draw(self._rng, n)
         total = self.trials + n
         with np.errstate(all="ignore"):  # what overflows is told by result()
@@ -220,30 +212,20 @@ class _Run:
         outputs.sort(axis=1)
         if n >= BLOCK:
             u = np.sqrt(np.diagonal(comoment) / (n - 1))
-            ends = [both_intervals(draws, self.coverage) for draws in outputs]
-            self._remember(np.column_stack([mean, u, np.array(ends)]))
-        for tails, draws in zip(self._tails, outputs, strict=True):
+            figures = np.column_stack([mean, u, np.array([both_intervals(draws, self.coverage) for draws in outputs])])
+            self.blocks += 1
+            with np.errstate(all="ignore"):
+                step = figures - self._block_mean
+                self._block_mean = self._block_mean + step / self.blocks
+                self._block_squares = self._block_squares + step * (figures - self._block_mean)
+        if not self._edges.size:  # the bins are laid about the first block
+            low, high = outputs[:, 0], outputs[:, -1]
+            extent = np.where(high > low, high - low, np.abs(low) + 1.0)
+            self._width = 1.2 * extent / _BINS
+            self._edges = (low - 0.1 * extent)[:, None] + self._width[:, None] * np.arange(_BINS + 1)
+        for row, (tails, draws) in enumerate(zip(self._tails, outputs, strict=True)):
             tails.add(draws)
-        self._count(outputs)
-
-    def _remember(self, figures: Floats) -> None:
-        """Count the figures (p, 6) of a block into the mean of blocks and their scatter."""
-        self.blocks += 1
-        with np.errstate(all="ignore"):
-            step = figures - self._block_mean
-            self._block_mean = self._block_mean + step / self.blocks
-            self._block_squares = self._block_squares + step * (figures - self._block_mean)
-
-    def _count(self, ordered: Floats) -> None:
-        """Add to the histogram; its bins are laid about the first block."""
-        if self._bins is None:
-            low, high = ordered[:, 0], ordered[:, -1]
-            width = np.where(high > low, high - low, np.abs(low) + 1.0)
-            self._bins = low - 0.1 * width, 1.2 * width / _BINS
-        start, width = self._bins
-        edges = start[:, None] + width[:, None] * np.arange(_BINS + 1)
-        for row, draws in enumerate(ordered):
-            self._counts[row] += np.diff(np.searchsorted(draws, edges[row]))
+            self._counts[row] += np.diff(np.searchsorted(draws, self._edges[row]))
 
     def figures(self) -> Floats:
         """(p, 6) value and u of all trials, and the mean ends of the blocks' intervals."""
@@ -259,40 +241,26 @@ class _Run:
 
     def tails(self) -> tuple[Floats, Floats]:
         """(p,) shape of the heavier tail of each output, and how much larger its u would be with draws that did not come."""
-        count, found = draws_in_tail(self.trials) + 1, []
+        count, shapes, unseen = draws_in_tail(self.trials) + 1, [], []
         for mean, square, tails in zip(self._mean, np.diagonal(self._comoment), self._tails, strict=True):
             lowest, highest = tails.extremes(count)
             both = tail_of(highest, mean, self.trials), tail_of(-lowest[::-1], -mean, self.trials)
             variance = square / (self.trials - 1)
-            more = np.sqrt(variance + sum(tail.unseen for tail in both)) - np.sqrt(variance)
-            found.append((max(tail.shape for tail in both), more))
-        shape, unseen = np.array(found).T
-        return shape, unseen
+            shapes.append(max(tail.shape for tail in both))
+            unseen.append(np.sqrt(variance + sum(tail.unseen for tail in both)) - np.sqrt(variance))
+        return np.array(shapes), np.array(unseen)
 
     def result(self, stable: bool | None) -> Simulated:
-        """What the trials say."""
         ends = np.array([tails.intervals() for tails in self._tails])
-        for name, variance, length in zip(
-            self.source.outputs, np.diagonal(self._comoment), ends[:, 3] - ends[:, 2], strict=True
-        ):
+        lengths, variances = ends[:, 3] - ends[:, 2], np.diagonal(self._comoment)
+        for name, variance, length in zip(self.source.outputs, variances, lengths, strict=True):
             if not np.isfinite(variance) or (variance == 0 and length > 0):
                 raise CmmUqError(
                     f"the variance of {name} is beyond what floating-point numbers hold",
                     fix="State the quantities in units that make their numbers moderate",
                 )
-        start, width = self._bins or (np.zeros(0), np.zeros(0))
-        return Simulated(
-            list(self.source.outputs),
-            self.trials,
-            self.coverage,
-            self.seed,
-            self._mean,
-            self._comoment / (self.trials - 1),
-            ends[:, :2],
-            ends[:, 2:],
-            self.standard_errors(),
-            stable,
-            *self.tails(),
-            start[:, None] + width[:, None] * np.arange(_BINS + 1),
-            self._counts / (self.trials * width[:, None]),
-        )
+        covariance = self._comoment / (self.trials - 1)
+        figures = self._mean, covariance, ends[:, :2], ends[:, 2:], self.standard_errors(), stable, *self.tails()
+        density = self._counts / (self.trials * self._width[:, None])
+        outputs = list(self.source.outputs)
+        return Simulated(outputs, self.trials, self.coverage, self.seed, *figures, self._edges, density)

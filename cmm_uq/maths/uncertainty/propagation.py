@@ -9,7 +9,7 @@ Everything works at one point or at many: ``...`` is the shape of the points.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,19 +31,16 @@ from cmm_uq.maths.uncertainty.type_a import coverage_factor, effective_dof
 class Propagated:
     """Outputs of a measurement model by the law of propagation."""
 
-    # inputs, outputs: names, m and p of them
-    inputs: Sequence[str]
-    outputs: Sequence[str]
-    value: Floats  # (p, ...) estimates.
-    covariance: Floats  # (p, p, ...) of the outputs.
-    dof: Floats  # (p, ...) effective degrees of freedom.
-    sensitivity: Floats  # (p, m, ...) derivatives at the estimates.
-    contribution: Floats  # (p, m, ...) sensitivity × standard uncertainty, with its sign.
+    inputs: Sequence[str]  # m names
+    outputs: Sequence[str]  # p names
+    value: Floats  # (p, ...)
+    covariance: Floats  # (p, p, ...) of the outputs
+    dof: Floats  # (p, ...) effective degrees of freedom
+    sensitivity: Floats  # (p, m, ...) derivatives at the estimates
+    contribution: Floats  # (p, m, ...) sensitivity × standard uncertainty, with its sign
     correlation: Floats  # (m, m) of the inputs
-    # (p, m, m, ...) parts of the variance that pairs of inputs add together by second derivatives, one entry a pair (above
-    # the diagonal) or input (on it); zero for first order.
-    bending: Floats
-    cubic: Floats  # (p, ...) part of the variance from third derivatives; zero for first order.
+    bending: Floats  # (p, m, m, ...) parts of the variance by second derivatives, pairs of inputs above the diagonal
+    cubic: Floats  # (p, ...) part of the variance from third derivatives; zero for first order, as is ``bending``
 
     @cached_property
     def u(self) -> Floats:
@@ -58,13 +55,8 @@ class Propagated:
 
 
 def first_order(model: MeasurementModel) -> Propagated:
-    """Propagate by the first derivatives.
-
-    Raises
-    ------
-    CmmUqError : the model or a derivative is not finite at the estimates.
-    """
-    u = _uncertainties(model)
+    """Propagate by the first derivatives; :class:`CmmUqError` where they or the model are not finite at the estimates."""
+    u = [np.asarray(given.u) for given in model.inputs.values()]
     if model.differentiation == "complex_step":
         found = complex_step(model, model.means, [np.maximum(v, np.finfo(float).tiny) for v in u])
     else:
@@ -79,39 +71,30 @@ def second_order(model: MeasurementModel) -> Propagated:
             "second derivatives by complex steps are not exact",
             fix="Write the model with NumPy's elementary functions, or use Monte Carlo",
         )
-    u = _uncertainties(model)
+    u = [np.asarray(given.u) for given in model.inputs.values()]
     found = derivatives(model, model.means, order=2)
-    linear = _first_order(model, found, u)
-    with np.errstate(all="ignore"):  # what is not finite is told below
-        return _second_order(model, found, linear, u)
-
-
-def _second_order(model: MeasurementModel, found: Derivatives, linear: Propagated, u: Sequence[Any]) -> Propagated:
-    correlation = model.correlation_matrix
-    spread = np.stack(np.broadcast_arrays(*u, found.value[0])[:-1])
-    scaled = np.asarray(found.hessian) * spread[:, None] * spread[None, :]
-    correlated = np.einsum("pij...,jk->pik...", scaled, correlation)
-    quadratic = 0.5 * np.einsum("pij...,qji...->pq...", correlated, correlated)
-    cubic = np.stack([_cubic(model, linear, spread, row) for row in range(len(linear.value))])
-    covariance = linear.covariance + quadratic + 0.5 * (cubic + np.swapaxes(cubic, 0, 1))
-    variance = _diagonal(covariance)
-    if np.any(variance < 0) or not np.all(np.isfinite(variance)):
-        raise CmmUqError(
-            "the terms of second order give no variance: the model bends too strongly within the uncertainty of its inputs",
-            fix="Use Monte Carlo",
-        )
-    return Propagated(
-        linear.inputs,
-        linear.outputs,
-        linear.value + 0.5 * np.einsum("pii...->p...", correlated),
-        covariance,
-        effective_dof(linear.contribution, correlation, _dof(model), variance),
-        linear.sensitivity,
-        linear.contribution,
-        correlation,
-        _by_pairs(correlated),
-        _diagonal(cubic),
-    )
+    linear, correlation = _first_order(model, found, u), model.correlation_matrix
+    with np.errstate(all="ignore"):  # what is not finite is refused below
+        spread = np.stack(np.broadcast_arrays(*u, found.value[0])[:-1])
+        scaled = np.asarray(found.hessian) * spread[:, None] * spread[None, :]
+        correlated = np.einsum("pij...,jk->pik...", scaled, correlation)
+        quadratic = 0.5 * np.einsum("pij...,qji...->pq...", correlated, correlated)
+        cubic = np.stack([_cubic(model, linear, spread, row) for row in range(len(linear.value))])
+        covariance = linear.covariance + quadratic + 0.5 * (cubic + np.swapaxes(cubic, 0, 1))
+        variance = _diagonal(covariance)
+        value = linear.value + 0.5 * np.einsum("pii...->p...", correlated)
+        bending = 0.5 * correlated * np.swapaxes(correlated, 1, 2)  # of ½ tr(HVHV)
+        m = len(correlation)
+        both = (np.triu(np.ones((m, m))) + np.triu(np.ones((m, m)), 1)).reshape(1, m, m, *(1,) * (bending.ndim - 3))
+        if np.any(variance < 0) or not np.all(np.isfinite(variance)):
+            raise CmmUqError(
+                "the terms of second order give no variance: the model bends too strongly within the uncertainty of its "
+                "inputs",
+                fix="Use Monte Carlo",
+            )
+        dof = effective_dof(linear.contribution, correlation, [given.dof for given in model.inputs.values()], variance)
+        both_ways = np.asarray(bending * both)  # entries (i, j) and (j, i) added above the diagonal
+        return replace(linear, value=value, covariance=covariance, dof=dof, bending=both_ways, cubic=_diagonal(cubic))
 
 
 def _cubic(model: MeasurementModel, linear: Propagated, spread: Floats, row: int) -> Floats:
@@ -119,14 +102,6 @@ def _cubic(model: MeasurementModel, linear: Propagated, spread: Floats, row: int
     towards = np.einsum("ij,j...->i...", linear.correlation, linear.contribution[row]) * spread
     turning = hessian_along(model, model.means, list(towards)) * spread[:, None] * spread[None, :]
     return np.asarray(np.einsum("pij...,ij->p...", turning, linear.correlation))
-
-
-def _by_pairs(correlated: Floats) -> Floats:
-    """Entries (p, m, m, ...) of ½ tr(HVHV), those of (i, j) and (j, i) added above the diagonal."""
-    terms = 0.5 * correlated * np.swapaxes(correlated, 1, 2)
-    m = terms.shape[1]
-    keep = (np.triu(np.ones((m, m))) + np.triu(np.ones((m, m)), 1)).reshape(1, m, m, *(1,) * (terms.ndim - 3))
-    return np.asarray(terms * keep)
 
 
 def _first_order(model: MeasurementModel, found: Derivatives, u: Sequence[Any]) -> Propagated:
@@ -142,32 +117,16 @@ def _first_order(model: MeasurementModel, found: Derivatives, u: Sequence[Any]) 
     else:
         covariance = np.einsum("pi...,ij,qj...->pq...", contribution, correlation, contribution)
     variance = np.maximum(_diagonal(covariance), 0.0)
+    dof = effective_dof(contribution, correlation, [given.dof for given in model.inputs.values()], variance)
     p, m, *shape = contribution.shape
-    return Propagated(
-        model.names,
-        list(model.outputs),
-        found.value,
-        covariance,
-        effective_dof(contribution, correlation, _dof(model), variance),
-        found.jacobian,
-        contribution,
-        correlation,
-        np.zeros((p, m, m, *(1 for _ in shape))),
-        np.zeros((p, *shape)),
-    )
+    none, no_cubic = np.zeros((p, m, m, *(1 for _ in shape))), np.zeros((p, *shape))
+    figures = found.value, covariance, dof, found.jacobian, contribution, correlation, none, no_cubic
+    return Propagated(model.names, list(model.outputs), *figures)
 
 
 def _diagonal(matrices: Floats) -> Floats:
     """(p, ...) from (p, p, ...)."""
     return np.asarray(np.einsum("pp...->p...", matrices))
-
-
-def _uncertainties(model: MeasurementModel) -> list[Any]:
-    return [np.asarray(given.u) for given in model.inputs.values()]
-
-
-def _dof(model: MeasurementModel) -> list[Any]:
-    return [given.dof for given in model.inputs.values()]
 
 
 def _must_be_finite(numbers: Floats, problem: str) -> None:

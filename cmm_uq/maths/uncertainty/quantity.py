@@ -1,17 +1,12 @@
-"""A result: estimate, standard uncertainty, interval; averaged over models, and as rounded text.
+"""A result: estimate, standard uncertainty, interval; as rounded text; averaged over models.
 
-Results as text: the uncertainty to at most two significant digits, the value to the same decimal place.
+Rounding is that of ILAC-P14:09/2020 5.4 with JCGM 100:2008 7.2.6: it comes last, to the nearest, ties away from zero (ISO
+80000-1:2022 annex B, rule B); an uncertainty that this would lower by more than 5 % is rounded up instead (EA-4/02 M:2022
+6.3), which can happen with one digit only. Numbers are read as the decimal they print as, so that 0.15 is a tie and the
+noise of binary arithmetic behind the 13th digit decides nothing.
 
-The rule is that of ILAC-P14:09/2020 5.4 with JCGM 100:2008 7.2.6: rounding comes last, to the nearest, ties away from
-zero (ISO 80000-1:2022 annex B, rule B); an uncertainty that this would lower by more than 5 % is rounded up instead
-(EA-4/02 M:2022 6.3), which can happen with one digit only. Numbers are read as the decimal they print as, so that 0.15
-is a tie and the noise of binary arithmetic behind the 13th digit decides nothing.
-
-What several models give, averaged over them by their probabilities: one quantity, or draws of several together.
-
-The distribution is the mixture of theirs (Bayesian model averaging: Hoeting et al. 1999, *Statistical Science* 14, 382); its
-variance is the mean of the variances and the variance of the means. Each is taken as normal on either side of its value,
-as wide as its own interval there.
+Over several models the distribution is the mixture of theirs (Bayesian model averaging: Hoeting et al. 1999, *Statistical
+Science* 14, 382), each taken as normal on either side of its value, as wide as its own interval there.
 """
 
 from __future__ import annotations
@@ -40,9 +35,8 @@ def expanded_of(draws: Floats, value: Floats) -> Floats:
 class Quantity:
     """A quantity with its uncertainty."""
 
-    # value, u: estimate and standard uncertainty, in ``unit``
-    value: float
-    u: float
+    value: float  # estimate, in ``unit``
+    u: float  # standard uncertainty, in ``unit``
     interval95: tuple[float, float]  # probabilistically symmetric 95 % coverage interval
     unit: Unit  # as printed
 
@@ -89,38 +83,42 @@ class Quantity:
 
 MINUS = "−"
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_PLAIN_DECIMALS = 12
-_PLAIN_INTEGER_DIGITS = 15
-_LARGEST_LOSS = Decimal("0.05")
+_PLAIN_DECIMALS, _PLAIN_INTEGER_DIGITS = 12, 15
+_LARGEST_LOSS = Decimal("0.05")  # of an uncertainty by rounding (EA-4/02)
+_TAIL = 0.025
+_HALVINGS = 80
+_NO_WIDTH = 1e-200
 
 
 def significant(u: float, digits: int = 2) -> Number:
-    """An uncertainty to some significant digits.
-
-    ``u``: standard or expanded uncertainty, not negative; infinite gives ``∞``. ``digits``: significant digits, 1 or 2 for
-    what a certificate states.
-    """
+    """A standard or expanded uncertainty, not negative, to some significant digits; infinite gives ``∞``."""
     return rounded(0.0, u, digits)[1]
 
 
 def rounded(value: float, u: float, digits: int = 2) -> tuple[Number, Number]:
-    """A value and its uncertainty, both to the decimal place that the uncertainty supports.
+    """A value and its standard or expanded uncertainty, both to the decimal place that ``digits`` digits of it support.
 
-    ``u``: its standard or expanded uncertainty, same unit, not negative. Zero leaves the value as it is; infinite leaves it
-    with ``digits`` significant digits. ``digits``: significant digits of ``u``.
-
-    Returns value and uncertainty with the Unicode minus sign; a common power of ten is split off only where the decimals
-    would run past twelve places or fifteen integer digits.
+    Zero uncertainty leaves the value as it is; an infinite one leaves it with ``digits`` significant digits. A common power
+    of ten is split off only where the decimals would run past twelve places or fifteen integer digits.
     """
     _check(value, u, digits)
-    exact = _decimal(value)
+    exact = Decimal(f"{value:.12e}")
     if u == 0:
-        return (_plain(exact.normalize()), Number("0"))
+        return _plain(exact.normalize()), Number("0")
     if isinf(u):
         return _plain(_to_place(exact, exact.adjusted() - digits + 1)) if value else Number("0"), Number("∞")
-    shown = _rounded_uncertainty(_decimal(u), digits)
+    exact_u = Decimal(f"{u:.12e}")
+    place = exact_u.adjusted() - digits + 1
+    shown = _to_place(exact_u, place)
+    if exact_u - shown > _LARGEST_LOSS * exact_u:
+        shown = _to_place(exact_u, place, ROUND_UP)
     place = shown.adjusted() - digits + 1
-    return _as_text(_to_place(exact, place), shown, place)
+    both = _to_place(exact, place), shown
+    exponent = max(number.adjusted() for number in both if number)
+    if -place <= _PLAIN_DECIMALS and exponent < _PLAIN_INTEGER_DIGITS:
+        return _plain(both[0], place), _plain(shown, place)
+    value_text, u_text = (_plain(number.scaleb(-exponent), place - exponent) + _power(exponent) for number in both)
+    return Number(value_text), Number(u_text)
 
 
 def alike(*values: float, decimals: int = 1) -> tuple[Number, ...]:
@@ -129,14 +127,14 @@ def alike(*values: float, decimals: int = 1) -> tuple[Number, ...]:
     A step of the last decimal is never more than a third of the largest modulus, unless that is zero.
     """
     largest = max(abs(value) for value in values)
-    _check(largest, 0.0, 1)
+    _check(largest)
     more = ceil(-log10(largest / 3)) if largest else 0
     return tuple(Number(f"{value:.{max(decimals, more)}f}") for value in values)
 
 
 def nominal(length: float) -> Number:
     """A length that is given, not measured, in full: no digit of it is left out, and none is made up."""
-    _check(length, 0.0, 1)
+    _check(length)
     return _plain(Decimal(f"{length:.6f}").normalize())
 
 
@@ -152,14 +150,14 @@ def figure(number: float, digits: int = 4) -> Number:
 
     Trailing zeros say nothing here and are left out; a power of ten is split off below 0.001 and from a million on.
     """
-    _check(number, 0.0, digits)
+    _check(number, digits=digits)
     mantissa, exponent = f"{number:.{digits - 1}e}".split("e")
     if -3 <= int(exponent) < 6:
         return _plain(Decimal(f"{number:.{digits}g}").normalize())
     return Number(_plain(Decimal(mantissa).normalize()) + _power(int(exponent)))
 
 
-def _check(value: float, u: float, digits: int) -> None:
+def _check(value: float, u: float = 0.0, digits: int = 1) -> None:
     if isnan(u) or u < 0:
         raise CmmUqError(f"an uncertainty of {u} cannot be stated", fix="It must be a number that is not negative")
     if not isfinite(value):
@@ -168,29 +166,9 @@ def _check(value: float, u: float, digits: int) -> None:
         raise CmmUqError(f"{digits} significant digits cannot be shown", fix="Use 1 or 2")
 
 
-def _decimal(number: float) -> Decimal:
-    return Decimal(f"{number:.12e}")
-
-
 def _to_place(number: Decimal, place: int, rounding: str = ROUND_HALF_UP) -> Decimal:
     """Rounded to a multiple of 10**place."""
     return number.scaleb(-place).to_integral_value(rounding).scaleb(place)
-
-
-def _rounded_uncertainty(u: Decimal, digits: int) -> Decimal:
-    place = u.adjusted() - digits + 1
-    nearest = _to_place(u, place)
-    return _to_place(u, place, ROUND_UP) if u - nearest > _LARGEST_LOSS * u else nearest
-
-
-def _as_text(value: Decimal, u: Decimal, place: int) -> tuple[Number, Number]:
-    exponent = max(value.adjusted() if value else u.adjusted(), u.adjusted())
-    if -place <= _PLAIN_DECIMALS and exponent < _PLAIN_INTEGER_DIGITS:
-        return _plain(value, place), _plain(u, place)
-    power = _power(exponent)
-    scaled_place = place - exponent
-    shown = (_plain(number.scaleb(-exponent), scaled_place) + power for number in (value, u))
-    return Number(next(shown)), Number(next(shown))
 
 
 def _power(exponent: int) -> str:
@@ -203,17 +181,11 @@ def _plain(number: Decimal, place: int | None = None) -> Number:
     return Number(text.replace("-", MINUS if number else ""))
 
 
-_TAIL = 0.025
-_HALVINGS = 80
-_NO_WIDTH = 1e-200
-
-
 def averaged(quantities: Sequence[Quantity], weights: Sequence[float]) -> Quantity:
-    """The quantity over all models."""
+    """The quantity over all models: the mean of their values, the mean of their variances and the variance of the means."""
     p = np.array(weights) / np.sum(weights)
-    value, u, low, high = (
-        np.array(each) for each in zip(*((q.value, q.u, *q.interval95) for q in quantities), strict=True)
-    )
+    columns = zip(*((q.value, q.u, *q.interval95) for q in quantities), strict=True)
+    value, u, low, high = (np.array(column) for column in columns)
     mean = float(p @ value)
     spread = float(np.sqrt(p @ (u**2 + (value - mean) ** 2)))
     ends = (_quantile(_TAIL, p, value, low, high), _quantile(1 - _TAIL, p, value, low, high))

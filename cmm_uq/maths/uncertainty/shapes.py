@@ -34,19 +34,14 @@ def _normal_inverse(p: Floats) -> Floats:
 POINT = DistributionShape(0.0, lambda _, n: np.zeros(n), np.zeros_like)
 NORMAL = DistributionShape(1.0, lambda rng, n: rng.standard_normal(n), _normal_inverse)
 RECTANGULAR = DistributionShape(1 / 3, lambda rng, n: 2 * rng.random(n) - 1, lambda p: 2 * p - 1)
-
 TRIANGULAR = DistributionShape(
     1 / 6,
     lambda rng, n: rng.random(n) + rng.random(n) - 1,
     lambda p: np.where(p < 0.5, np.sqrt(2 * p) - 1, 1 - np.sqrt(2 * (1 - p))),
 )
-
 ARCSINE = DistributionShape(
-    1 / 2,
-    lambda rng, n: np.sin(2 * np.pi * rng.random(n)),
-    lambda p: np.sin(np.pi * (p - 0.5)),
+    1 / 2, lambda rng, n: np.sin(2 * np.pi * rng.random(n)), lambda p: np.sin(np.pi * (p - 0.5))
 )
-
 EXPONENTIAL = DistributionShape(1.0, lambda rng, n: rng.standard_exponential(n), lambda p: -np.log1p(-p))
 
 

@@ -1,22 +1,18 @@
-"""Type A evaluation from repeated readings, and effective degrees of freedom.
-
-Type A evaluation: estimates, covariances and degrees of freedom from repeated readings, and from a straight line.
+"""Type A evaluation from repeated readings and from a straight line; effective degrees of freedom and coverage factors.
 
 Sources: JCGM 100:2008 4.2 (repeated readings), 5.2.3 and annex H.2 (simultaneous readings), annex H.3 (line by least
 squares); JCGM 101:2008 6.4.9 and JCGM 102:2011 5.3.2 for the t distributions that Monte Carlo draws.
 
-Effective degrees of freedom (Welch–Satterthwaite) and the coverage factors that follow.
-
-The formula of JCGM 100:2008 G.4.1 asks for independent inputs. Means of simultaneous readings are not: their covariances
-rest on the same readings, and a quantity computed from them has the degrees of freedom of the set (annex H.2, approach
-2), whatever the correlation. So each set of correlated inputs with equal finite degrees of freedom counts as one
-contribution here. Its known limits: it holds approximately, and poorly where a contribution with very few degrees of
-freedom dominates or where the model is not linear (JCGM 100 G.4.1; JCGM 101 D.3; Ballico, Metrologia 37, 2000).
+The formula of Welch and Satterthwaite (JCGM 100:2008 G.4.1) asks for independent inputs. Means of simultaneous readings are
+not: their covariances rest on the same readings, and a quantity computed from them has the degrees of freedom of the set
+(annex H.2, approach 2), whatever the correlation. So each set of correlated inputs with equal finite degrees of freedom
+counts as one contribution here. Its known limits: it holds approximately, and poorly where a contribution with very few
+degrees of freedom dominates or where the model is not linear (JCGM 100 G.4.1; JCGM 101 D.3; Ballico, Metrologia 37, 2000).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -26,6 +22,8 @@ from cmm_uq.base.points import Floats
 from cmm_uq.maths.uncertainty.correlation import correlation_of, tied
 from cmm_uq.maths.uncertainty.distributions import Distribution, normal, student_t
 from cmm_uq.maths.uncertainty.quantity import Quantity
+
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,18 +40,11 @@ def repeated_readings(readings: Sequence[float] | Floats) -> Distribution:
 
 
 def simultaneous_readings(readings: Mapping[str, Sequence[float] | Floats]) -> JointInputs:
-    """Means of quantities that were read together n times, and their correlation (JCGM 100 5.2.3, annex H.2).
-
-    Parameters
-    ----------
-    readings : n readings of each quantity, in the same order.
-    """
+    """Means of quantities that were read together n times, in the same order, and their correlation (JCGM 100 annex H.2)."""
     table = _table(readings)
     n = table.shape[1]
     covariance = np.atleast_2d(np.cov(table)) / n
-    means, u = table.mean(axis=1), np.sqrt(np.diagonal(covariance))
-    inputs = {name: student_t(float(x), float(s), n - 1.0) for name, x, s in zip(readings, means, u, strict=True)}
-    return JointInputs(inputs, _pairs(list(readings), correlation_of(covariance)))
+    return _joint(list(readings), table.mean(axis=1), covariance, lambda x, u: student_t(x, u, n - 1.0))
 
 
 def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) -> JointInputs:
@@ -63,9 +54,17 @@ def multivariate_normal(names: Sequence[str], mean: Floats, covariance: Floats) 
         raise CmmUqError("the covariance matrix is not symmetric with one row a quantity", where=", ".join(names))
     if not np.all(np.diagonal(matrix) > 0):
         raise CmmUqError("a variance is not positive", where=", ".join(names), fix="Leave constants out of the matrix")
-    u = np.sqrt(np.diagonal(matrix))
-    inputs = {name: normal(float(x), float(s)) for name, x, s in zip(names, mean, u, strict=True)}
-    return JointInputs(inputs, _pairs(names, correlation_of(matrix)))
+    return _joint(names, mean, matrix, normal)
+
+
+def _joint(
+    names: Sequence[str], mean: Floats, covariance: Floats, distribution: Callable[[float, float], Distribution]
+) -> JointInputs:
+    u, r = np.sqrt(np.diagonal(covariance)), np.clip(correlation_of(covariance), -1.0, 1.0)
+    pairs = {(names[i], names[j]): float(r[i, j]) for j in range(len(names)) for i in range(j) if r[i, j] != 0}
+    return JointInputs(
+        {name: distribution(float(x), float(s)) for name, x, s in zip(names, mean, u, strict=True)}, pairs
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +86,8 @@ class StraightLine:
 
     def inputs(self, intercept: str, slope: str) -> JointInputs:
         """Intercept and slope as correlated inputs of a measurement model."""
-        u, r = np.sqrt(np.diagonal(self.covariance)), correlation_of(self.covariance)[0, 1]
-        return JointInputs(
-            {
-                intercept: student_t(self.intercept, float(u[0]), float(self.dof)),
-                slope: student_t(self.slope, float(u[1]), float(self.dof)),
-            },
-            {(intercept, slope): float(r)},
-        )
+        estimates, dof = np.array([self.intercept, self.slope]), float(self.dof)
+        return _joint([intercept, slope], estimates, self.covariance, lambda x, u: student_t(x, u, dof))
 
 
 def straight_line(x: Sequence[float] | Floats, y: Sequence[float] | Floats, reference: float = 0.0) -> StraightLine:
@@ -120,9 +113,8 @@ def _table(readings: Mapping[str, Sequence[float] | Floats]) -> Floats:
     table = np.array([np.asarray(column, dtype=np.float64) for column in readings.values()])
     for name, column in zip(readings, table, strict=True):
         if len(column) < 2:
-            raise CmmUqError(
-                f"{len(column)} reading of {name} says nothing of its scatter", fix="Read it at least twice"
-            )
+            problem = f"{len(column)} reading of {name} says nothing of its scatter"
+            raise CmmUqError(problem, fix="Read it at least twice")
         if not np.all(np.isfinite(column)):
             raise CmmUqError(f"a reading of {name} is not finite")
         if np.ptp(column) == 0:
@@ -133,25 +125,13 @@ def _table(readings: Mapping[str, Sequence[float] | Floats]) -> Floats:
     return table
 
 
-def _pairs(names: Sequence[str], matrix: Floats) -> dict[tuple[str, str], float]:
-    kept = np.clip(matrix, -1.0, 1.0)
-    return {(names[i], names[j]): float(kept[i, j]) for j in range(len(names)) for i in range(j) if kept[i, j] != 0}
-
-
-_ROUNDING = 1e-9
-
-
 def effective_dof(contributions: Floats, matrix: Floats, dof: Sequence[Floats | float], variance: Floats) -> Floats:
-    """Effective degrees of freedom of the outputs.
+    """Effective degrees of freedom (p, ...) of the outputs, infinite where all that contributes is known.
 
     ``contributions``: (p, m, ...) sensitivity × standard uncertainty of each input, with its sign. ``matrix``: (m, m)
     correlation of the inputs. ``dof``: m degrees of freedom, floats or (...). ``variance``: (p, ...) combined variance,
-    which may hold further terms of infinite degrees of freedom.
-
-    Returns (p, ...) degrees of freedom, infinite where all that contributes is known.
-
-    A set of correlated inputs whose degrees of freedom differ was not read simultaneously; the formula does not cover it,
-    and the smallest of them is taken for the whole set.
+    which may hold further terms of infinite degrees of freedom. A set of correlated inputs whose degrees of freedom differ
+    was not read simultaneously; the formula does not cover it, and the smallest of them is taken for the whole set.
     """
     # fourth powers leave a double's range long before u does; a power of two in common changes no digit of the ratio
     _, exponent = np.frexp(np.max(np.abs(contributions), initial=0.0))

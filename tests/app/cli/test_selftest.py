@@ -13,7 +13,7 @@ from cmm_uq.maths.uncertainty.reference import jcgm_100, selftest
 from cmm_uq.maths.uncertainty.reference.case import ReferenceCase
 from tests.app.cli.process import run
 
-SUM = ReferenceCase("sum", "arithmetic", {"a": (2.0, 0.1)}, lambda: {"a": 2.5})
+SUM = ReferenceCase("sum", "arithmetic", {"a": (2.0, 0.1)}, lambda: [2.5])
 
 
 def test_every_published_figure_is_reproduced_and_named_with_its_source() -> None:

@@ -62,7 +62,7 @@ def test_the_end_gauge_of_annex_h1() -> None:
 
 
 def test_shares_add_up_to_one_and_nested_ones_to_their_line() -> None:
-    rows = end_gauge().as_rows()
+    rows = end_gauge().as_dataframe().to_dict("records")
     assert sum(row["share"] for row in rows if row["depth"] == 0) == pytest.approx(1)
     nested = [row["share"] for row in rows if row["depth"] == 1]
     assert len(nested) == 3

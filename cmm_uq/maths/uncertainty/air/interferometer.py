@@ -39,17 +39,13 @@ class Interferometer:
     origins : where the figures come from, by the names of the model's inputs.
     """
 
-    # displacement counted in vacuum wavelengths, mm; its uncertainty is that of resolution and noise
     vacuum_mm: Distribution
-    air: Air  # at the time of the reading
-    dead_path_mm: Distribution | None = None  # between the interferometer and the place of zeroing, mm
-    # n₀ − 1 when the counter was zeroed; None means the air has not changed since
+    air: Air
+    dead_path_mm: Distribution | None = None
     zero_refractivity: Distribution | None = None
-    angle_rad: Distribution | None = None  # between beam and motion, rad
-    # material_c, cte_per_k: temperature and expansion coefficient of what is measured; None leaves the length as it is
+    angle_rad: Distribution | None = None
     material_c: Distribution | None = None
     cte_per_k: Distribution | None = None
-    # where the figures come from, by the names of the model's inputs
     origins: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -72,15 +68,8 @@ def interferometer_model(setup: Interferometer, equation: str = "ciddor") -> Mea
     chosen = equation_by_name(equation)
     check_range(setup.air, chosen)
     nominal = setup.air.inputs["wavelength_nm"].mean
-    given = {
-        "vacuum_mm": setup.vacuum_mm,
-        "dead_path_mm": setup.dead_path_mm,
-        "zero_refractivity": setup.zero_refractivity,
-        "angle_rad": setup.angle_rad,
-        "material_c": setup.material_c,
-        "cte_per_k": setup.cte_per_k,
-    }
-    inputs = {name: known for name, known in given.items() if known is not None}
+    names = ("vacuum_mm", "dead_path_mm", "zero_refractivity", "angle_rad", "material_c", "cte_per_k")
+    inputs: dict[str, Distribution] = {name: given for name in names if (given := getattr(setup, name)) is not None}
     inputs |= {**setup.air.inputs, "equation": normal(0.0, chosen.u)}
     if setup.dead_path_mm is None:
         inputs["dead_path_mm"] = constant(0.0)

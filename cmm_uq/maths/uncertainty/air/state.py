@@ -39,8 +39,7 @@ class AirEquation:
     """An equation for the refractivity of air."""
 
     name: str  # as budgets cite it
-    # n − 1 of temperature (°C), pressure (Pa), relative humidity (%), CO2 (ppm), vacuum wavelength (nm)
-    refractivity: Callable[..., Any]
+    refractivity: Callable[..., Any]  # n − 1 of temperature, pressure, relative humidity, CO2 and vacuum wavelength
     u: float  # standard uncertainty of the equation itself, as its source or NIST's comparison states it
     wavelength_nm: Range = (300.0, 1700.0)  # range of vacuum wavelengths
     temperature_c: Range = (-40.0, 100.0)  # range of temperatures
@@ -54,33 +53,22 @@ EQUATIONS: Mapping[str, AirEquation] = {
     "harris_2004": AirEquation("Harris 2004", harris_2004, 5.0e-8, (632.0, 634.0), (0.0, 40.0)),
 }
 
-_PRESSURE_PA: Range = (10e3, 140e3)
-_HUMIDITY_PCT: Range = (0.0, 100.0)
-_CO2_PPM: Range = (0.0, 2000.0)
-
 
 @dataclass(frozen=True, eq=False)
 class Air:
     """What is known of the air on the way of a beam; ``None`` where it was not measured.
 
-    Parameters
-    ----------
-    temperature_c : °C.
-    pressure_pa : Pa.
-    humidity_pct : relative humidity, %.
-    dew_point_c : instead of the relative humidity, °C.
-    co2_ppm : carbon dioxide, parts per million by volume.
-    wavelength_nm : vacuum wavelength, nm.
-    altitude_m : of the place; the mean pressure there stands in for one that was not measured.
+    The humidity is relative, %; the dew point may be given instead. Carbon dioxide is in parts per million by volume, the
+    wavelength that in vacuum. The mean pressure at the altitude stands in for one that was not measured.
     """
 
-    temperature_c: Distribution  # °C
-    pressure_pa: Distribution | None = None  # Pa
-    humidity_pct: Distribution | None = None  # relative humidity, %
-    dew_point_c: Distribution | None = None  # instead of the relative humidity, °C
-    co2_ppm: Distribution | None = None  # carbon dioxide, parts per million by volume
-    wavelength_nm: Distribution | None = None  # vacuum wavelength, nm
-    altitude_m: float = 0.0  # of the place; the mean pressure there stands in for one that was not measured
+    temperature_c: Distribution
+    pressure_pa: Distribution | None = None
+    humidity_pct: Distribution | None = None
+    dew_point_c: Distribution | None = None
+    co2_ppm: Distribution | None = None
+    wavelength_nm: Distribution | None = None
+    altitude_m: float = 0.0
 
     def __post_init__(self) -> None:
         if self.humidity_pct is not None and self.dew_point_c is not None:
@@ -101,23 +89,14 @@ class Air:
     @property
     def inputs(self) -> dict[str, Distribution]:
         """All inputs of an equation, measured or assumed."""
-        measured = {
-            "temperature_c": self.temperature_c,
-            "pressure_pa": self.pressure_pa,
-            "humidity_pct": self.humidity_pct,
-            "dew_point_c": self.dew_point_c,
-            "co2_ppm": self.co2_ppm,
-            "wavelength_nm": self.wavelength_nm,
-        }
+        measured = {name: getattr(self, name) for name in _UNITS if name != "equation"}
         return {name: given for name, given in measured.items() if given is not None} | self.assumed
 
     @property
     def labels(self) -> Labels:
         """Units, and where each figure comes from."""
-        origins = dict.fromkeys(self.inputs, say("measured")) | dict.fromkeys(
-            self.assumed, say("judgement: not measured")
-        )
-        return Labels(_UNITS, {**origins, "equation": say("literature")})
+        assumed = dict.fromkeys(self.assumed, say("judgement: not measured"))
+        return Labels(_UNITS, {**dict.fromkeys(self.inputs, say("measured")), **assumed, "equation": say("literature")})
 
 
 _UNITS: Mapping[str, str] = {
@@ -139,9 +118,8 @@ def standard_pressure(altitude_m: Number) -> Any:
 def equation_by_name(name: str) -> AirEquation:
     """Equation of :data:`EQUATIONS`."""
     if name not in EQUATIONS:
-        raise CmmUqError(
-            f"there is no equation {name!r} for the refractive index of air", fix=suggestion(name, EQUATIONS)
-        )
+        problem = f"there is no equation {name!r} for the refractive index of air"
+        raise CmmUqError(problem, fix=suggestion(name, EQUATIONS))
     return EQUATIONS[name]
 
 
@@ -174,9 +152,9 @@ def check_range(air: Air, equation: AirEquation) -> None:
     """Refuse estimates out of the range of an equation."""
     ranges = {
         "temperature_c": equation.temperature_c,
-        "pressure_pa": _PRESSURE_PA,
-        "humidity_pct": _HUMIDITY_PCT,
-        "co2_ppm": _CO2_PPM,
+        "pressure_pa": (10e3, 140e3),
+        "humidity_pct": (0.0, 100.0),
+        "co2_ppm": (0.0, 2000.0),
         "wavelength_nm": equation.wavelength_nm,
     }
     inputs = air.inputs

@@ -59,47 +59,29 @@ def length_test_uncertainty(
     u_beside_mm : of the short gauge measured beside lengths that are not bidirectional by themselves; no line where 0.
     calibration_dof : degrees of freedom that the artefact's certificate states.
     """
-    return Budget(
-        say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm),
-        [
-            BudgetLine(
-                say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=unit("mm"), dof=calibration_dof
-            ),
-            _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
-            BudgetLine(
-                say("temperature of the artefact"),
-                u_temperature_k,
-                JUDGEMENT,
-                temperature_c,
-                unit("K"),
-                sensitivity=length_mm * cte_per_k,
-            ),
-            BudgetLine(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=unit("mm")),
-            BudgetLine(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=unit("mm")),
-            *(
-                [BudgetLine(say("calibration of the short gauge"), u_beside_mm, CERTIFICATE, unit=unit("mm"))]
-                if u_beside_mm
-                else []
-            ),
-        ],
-        unit=unit("mm"),
-        factor=FACTOR,
-        statement=TEST,
-    )
+    mm, slope = unit("mm"), length_mm * cte_per_k
+    lines = [
+        BudgetLine(say("calibration of the artefact"), u_calibration_mm, CERTIFICATE, unit=mm, dof=calibration_dof),
+        _expansion(say("expansion coefficient of the artefact"), u_cte_per_k, length_mm, temperature_c),
+        BudgetLine(
+            say("temperature of the artefact"), u_temperature_k, JUDGEMENT, temperature_c, unit("K"), sensitivity=slope
+        ),
+        BudgetLine(say("alignment of the artefact"), u_alignment_mm, JUDGEMENT, unit=mm),
+        BudgetLine(say("fixturing of the artefact"), u_fixturing_mm, JUDGEMENT, unit=mm),
+    ]
+    if u_beside_mm:
+        lines.append(BudgetLine(say("calibration of the short gauge"), u_beside_mm, CERTIFICATE, unit=mm))
+    measurand = say("test value of the error of length measurement, {length_mm:g} mm", length_mm=length_mm)
+    return Budget(measurand, lines, unit=mm, factor=FACTOR, statement=TEST)
 
 
 def probing_test_uncertainty(form_mm: float, u_form_mm: float) -> Budget:
     """Test uncertainty of a probing error P from the test sphere's form F (ISO/TS 23165:2006), mm."""
-    return Budget(
-        say("test value of the probing error"),
-        [
-            BudgetLine(say("form of the test sphere, F/2"), form_mm / 2, CERTIFICATE, unit=unit("mm")),
-            BudgetLine(say("calibration of the form"), u_form_mm, CERTIFICATE, unit=unit("mm")),
-        ],
-        unit=unit("mm"),
-        factor=FACTOR,
-        statement=TEST,
-    )
+    lines = [
+        BudgetLine(say("form of the test sphere, F/2"), form_mm / 2, CERTIFICATE, unit=unit("mm")),
+        BudgetLine(say("calibration of the form"), u_form_mm, CERTIFICATE, unit=unit("mm")),
+    ]
+    return Budget(say("test value of the probing error"), lines, unit=unit("mm"), factor=FACTOR, statement=TEST)
 
 
 def use_by_calibrated_workpiece(
@@ -139,33 +121,20 @@ def use_by_calibrated_workpiece(
             f"{len(readings)} readings of the calibrated workpiece",
             fix=f"ISO 15530-3 asks for {FEWEST_READINGS} in ten cycles or more",
         )
-    own = unit("rad" if angle else "mm")
+    length_unit = unit("rad" if angle else "mm")
     length = calibrated_mm if expanding_mm is None else abs(expanding_mm)
-    return Budget(
-        say("systematic error of the measurement process"),
-        [
-            BudgetLine(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=own),
-            BudgetLine(
-                say("scatter of the process"),
-                float(readings.std(ddof=1)),
-                REPEATS,
-                unit=own,
-                dof=len(readings) - 1.0,
-            ),
-            _expansion(
-                say("expansion coefficient of the calibrated workpiece"),
-                u_cte_calibrated_per_k,
-                length,
-                temperature_c,
-            ),
-            _expansion(say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, length, temperature_c),
-            BudgetLine(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=own),
-        ],
-        float(readings.mean()) - calibrated_mm,
-        own,
-        factor=FACTOR,
-        statement=_use(say("ISO 15530-3, by a calibrated workpiece")),
-    )
+    scatter, dof = float(readings.std(ddof=1)), len(readings) - 1.0
+    calibrated = say("expansion coefficient of the calibrated workpiece")
+    lines = [
+        BudgetLine(say("calibration of the workpiece"), u_calibration_mm, CERTIFICATE, unit=length_unit),
+        BudgetLine(say("scatter of the process"), scatter, REPEATS, unit=length_unit, dof=dof),
+        _expansion(calibrated, u_cte_calibrated_per_k, length, temperature_c),
+        _expansion(say("expansion coefficient of the workpieces"), u_cte_workpieces_per_k, length, temperature_c),
+        BudgetLine(say("form and surface of the workpieces"), u_form_mm, JUDGEMENT, unit=length_unit),
+    ]
+    bias, measurand = float(readings.mean()) - calibrated_mm, say("systematic error of the measurement process")
+    statement = _use(say("ISO 15530-3, by a calibrated workpiece"))
+    return Budget(measurand, lines, bias, length_unit, factor=FACTOR, statement=statement)
 
 
 def expanded_without_correction(budget: Budget) -> float:
@@ -185,19 +154,10 @@ def use_by_simulation(
     errors = np.asarray(simulated_errors_mm, dtype=np.float64)
     if len(errors) < 100:
         raise CmmUqError(f"{len(errors)} simulated measurements", fix="Simulate a hundred or more")
-    return Budget(
-        say("error of the measurement task"),
-        [
-            BudgetLine(
-                say("simulated scatter"), float(errors.std(ddof=1)), SIMULATION, unit=unit("mm"), dof=len(errors) - 1.0
-            ),
-            *not_simulated,
-        ],
-        float(errors.mean()),
-        unit("mm"),
-        coverage=coverage,
-        statement=_use(say("ISO 15530-4, by simulation")),
-    )
+    scatter, dof = float(errors.std(ddof=1)), len(errors) - 1.0
+    lines = [BudgetLine(say("simulated scatter"), scatter, SIMULATION, unit=unit("mm"), dof=dof), *not_simulated]
+    bias, statement = float(errors.mean()), _use(say("ISO 15530-4, by simulation"))
+    return Budget(say("error of the measurement task"), lines, bias, unit("mm"), coverage=coverage, statement=statement)
 
 
 def _expansion(name: Text, u_cte_per_k: float, length_mm: float, temperature_c: float) -> BudgetLine:

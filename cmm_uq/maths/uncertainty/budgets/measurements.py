@@ -1,18 +1,12 @@
 """Budgets of measurements: ballbar, triangle, sphere, lengths and temperature.
 
-Length of a ballbar from one position of it: the budget of Harris 2004 as printed, and one that holds.
-
 Harris 2004 (sections 6.2.3 and 6.4.1) adds the digitizer's specification and the rms residual of the sphere fit as
 standard uncertainties of a centre, and worst-case scale errors as standard uncertainties of the length. A fit to
 thousands of points leaves far less scatter in the centre, limits are not standard uncertainties, and what all positions
 share does not average out. :func:`ballbar_length` keeps these apart.
 
-Centre and radius of a fitted sphere: what the scatter of the points leaves open, and what the ball's form adds.
-
-The covariance of a least-squares fit is σ²(JᵀJ)⁻¹ and shrinks with the number of points. The form of the ball does not:
-seen from the same side it moves the centre in the same way every time. It is a line of its own.
-
-Lengths and temperature: standardisation to 20 °C, and the error of a scale against a reference.
+The covariance of a least-squares fit of a sphere is σ²(JᵀJ)⁻¹ and shrinks with the number of points. The form of the ball
+does not: seen from the same side it moves the centre in the same way every time. It is a line of its own.
 
 Near 20 °C the product of expansion coefficient and temperature is flat in one or the other, so that first order loses
 what second order or Monte Carlo keeps (JCGM 100:2008 H.1.7): evaluate these models with method ``auto``.
@@ -38,7 +32,6 @@ from cmm_uq.maths.uncertainty.budget import (
     SPECIFICATION,
     Budget,
     BudgetLine,
-    Labels,
     joint_line,
 )
 from cmm_uq.maths.uncertainty.correlation import Correlations
@@ -63,15 +56,14 @@ class BallbarPosition:
     u_temperature_k, cte_per_k : of the bar, where its length at 20 °C is asked for.
     """
 
-    length_mm: float  # distance of the centres
-    direction: Floats  # (3,) unit vector along the bar
-    centre_covariance_mm2: Floats  # (3, 3) of one fitted centre, from the scatter of its points
-    form_shift_mm: float = 0.0  # how far, at most, a ball's form moves its centre along the bar
-    probe_mm: float = 0.0  # limits of what the probing system may shift a ball by, systematically
-    probe_common: float = 0.0  # correlation of that shift between the two balls; one when both are seen the same way
-    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)  # (3,) limits of the scale errors of x, y, z over the bar's full length
-    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)  # (3,) standard uncertainties of the squarenesses xy, yz, zx
-    # u_temperature_k, cte_per_k: of the bar, where its length at 20 °C is asked for
+    length_mm: float
+    direction: Floats
+    centre_covariance_mm2: Floats
+    form_shift_mm: float = 0.0
+    probe_mm: float = 0.0
+    probe_common: float = 0.0
+    scale_mm: Sequence[float] = (0.0, 0.0, 0.0)
+    u_squareness_rad: Sequence[float] = (0.0, 0.0, 0.0)
     u_temperature_k: float = 0.0
     cte_per_k: float = 0.0
     origins: dict[str, str] = field(default_factory=dict)
@@ -89,41 +81,30 @@ def ballbar_length(position: BallbarPosition) -> Budget:
     """
     w, length = np.asarray(position.direction), position.length_mm
     scatter = float(w @ position.centre_covariance_mm2 @ w)
-    lines = [
-        BudgetLine(say("scatter of the points, ball {ball}", ball=ball), sqrt(scatter), REPEATS, unit=unit("mm"))
-        for ball in (1, 2)
-    ]
+    lines = [_line(say("scatter of the points, ball {ball}", ball=ball), sqrt(scatter), REPEATS) for ball in (1, 2)]
     lines += [_limit(say("form of ball {ball}", ball=ball), position.form_shift_mm, CERTIFICATE) for ball in (1, 2)]
     lines += [
         _limit(say("probing system at ball {ball}", ball=ball), position.probe_mm, SPECIFICATION) for ball in (1, 2)
     ]
     if position.probe_mm and position.probe_common:
         # the length is a difference, so what shifts both balls alike cancels
-        shared = -2 * position.probe_common * position.probe_mm**2 / 3
-        both = joint_line(say("both balls shifted alike by the probing system"), shared)
-        lines.append(replace(both, shared=True))
+        alike = -2 * position.probe_common * position.probe_mm**2 / 3
+        lines.append(replace(joint_line(say("both balls shifted alike by the probing system"), alike), shared=True))
     lines += [
         _limit(say("scale {axis}", axis=Verbatim(axis)), position.scale_mm[k], CERTIFICATE, float(w[k] ** 2))
         for k, axis in enumerate("xyz")
     ]
     for name, (i, j), u in zip(("xy", "yz", "zx"), ((0, 1), (1, 2), (2, 0)), position.u_squareness_rad, strict=True):
-        slope = float(abs(w[i] * w[j])) * length
-        lines.append(
-            BudgetLine(
-                say("squareness {name}", name=Verbatim(name)),
-                u,
-                CERTIFICATE,
-                unit=unit("rad"),
-                sensitivity=slope,
-                shared=True,
-            )
-        )
-    warm, slope = position.u_temperature_k, position.cte_per_k * length
-    lines.append(
-        BudgetLine(say("temperature of the bar"), warm, JUDGEMENT, unit=unit("K"), sensitivity=slope, shared=True)
-    )
-    told = [replace(line, origin=foreign(position.origins.get(line.name, line.origin))) for line in lines if line.part]
-    return Budget(say("length of the ballbar, one position"), told, length, unit("mm"))
+        words, slope = say("squareness {name}", name=Verbatim(name)), float(abs(w[i] * w[j])) * length
+        lines.append(BudgetLine(words, u, CERTIFICATE, unit=unit("rad"), sensitivity=slope, shared=True))
+    words, warm, slope = say("temperature of the bar"), position.u_temperature_k, position.cte_per_k * length
+    lines.append(BudgetLine(words, warm, JUDGEMENT, unit=unit("K"), sensitivity=slope, shared=True))
+    lines = [replace(line, origin=foreign(position.origins.get(line.name, line.origin))) for line in lines if line.part]
+    return Budget(say("length of the ballbar, one position"), lines, length, unit("mm"))
+
+
+def _line(name: Text, u_mm: float, origin: Text) -> BudgetLine:
+    return BudgetLine(name, u_mm, origin, unit=unit("mm"))
 
 
 def _limit(name: Text, limit_mm: float, origin: Text, sensitivity: float = 1.0) -> BudgetLine:
@@ -131,22 +112,19 @@ def _limit(name: Text, limit_mm: float, origin: Text, sensitivity: float = 1.0) 
     return BudgetLine(name, u, origin, 0.0, unit("mm"), "rectangular", sensitivity=sensitivity, shared=True)
 
 
+def _harris_point() -> list[BudgetLine]:
+    return [
+        _line(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION),
+        _line(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals")),
+    ]
+
+
 def harris_compensated() -> Budget:
     """Harris 2004 section 6.2.3: one length from compensated points, as printed (± 20 µm, 19 before rounding)."""
-    centre = Budget(
-        say("centre of a sphere"),
-        [
-            BudgetLine(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
-            BudgetLine(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
-        ],
-        unit=unit("mm"),
-    )
-    return Budget(
-        say("length of the ballbar, as printed in Harris 2004 section 6.2.3"),
-        [centre.as_line(say("centre of ball 1")), centre.as_line(say("centre of ball 2"))],
-        unit=unit("mm"),
-        statement=_PRINTED,
-    )
+    centre = Budget(say("centre of a sphere"), _harris_point(), unit=unit("mm"))
+    lines = [centre.as_line(say("centre of ball 1")), centre.as_line(say("centre of ball 2"))]
+    measurand = say("length of the ballbar, as printed in Harris 2004 section 6.2.3")
+    return Budget(measurand, lines, unit=unit("mm"), statement=_PRINTED)
 
 
 def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budget:
@@ -154,24 +132,12 @@ def harris_uncompensated(scale_um: Sequence[float] = (12.0, 18.0, 6.0)) -> Budge
 
     ``scale_um``: (3,) largest scale errors of x, y, z; those of 20 °C, or (21, 30, 12) at 25 °C and (26, 38, 20) at 30 °C.
     """
-    return Budget(
-        say("length of the ballbar, as printed in Harris 2004 section 6.4.1"),
-        [
-            BudgetLine(say("digitizer point accuracy"), 9 * MICROMETRE, SPECIFICATION, unit=unit("mm")),
-            BudgetLine(say("rms residual of the sphere fit"), 10 * MICROMETRE, say("residuals"), unit=unit("mm")),
-            *(
-                BudgetLine(
-                    say("largest scale error of {axis}", axis=Verbatim(axis)),
-                    limit * MICROMETRE,
-                    say("error map"),
-                    unit=unit("mm"),
-                )
-                for axis, limit in zip("xyz", scale_um, strict=True)
-            ),
-        ],
-        unit=unit("mm"),
-        statement=_PRINTED,
-    )
+    scales = [
+        _line(say("largest scale error of {axis}", axis=Verbatim(axis)), limit * MICROMETRE, say("error map"))
+        for axis, limit in zip("xyz", scale_um, strict=True)
+    ]
+    measurand = say("length of the ballbar, as printed in Harris 2004 section 6.4.1")
+    return Budget(measurand, [*_harris_point(), *scales], unit=unit("mm"), statement=_PRINTED)
 
 
 _PRINTED = say(
@@ -200,11 +166,8 @@ def triangle_angles(
         def opposite(side: Any, p: Any, q: Any) -> Any:
             return np.arccos((p * p + q * q - side * side) / (2.0 * p * q))
 
-        return {
-            "alpha": opposite(a_mm, b_mm, c_mm),
-            "beta": opposite(b_mm, c_mm, a_mm),
-            "gamma": opposite(c_mm, a_mm, b_mm),
-        }
+        sides = {"alpha": (a_mm, b_mm, c_mm), "beta": (b_mm, c_mm, a_mm), "gamma": (c_mm, a_mm, b_mm)}
+        return {name: opposite(*of) for name, of in sides.items()}
 
     inputs = {"a_mm": a_mm, "b_mm": b_mm, "c_mm": c_mm}
     return MeasurementModel(angles, inputs, ("alpha", "beta", "gamma"), correlation or {})
@@ -249,11 +212,9 @@ def sphere_budgets(
         if not variance > 0:
             raise CmmUqError(f"a variance of {variance} mm² of {name}", fix="Give the covariance matrix of the fit")
         lines = [BudgetLine(say("scatter of the points"), sqrt(variance), REPEATS, unit=unit("mm"), dof=dof)]
-        shift = float(form_shift_mm[k])
-        if shift:
-            lines.append(
-                BudgetLine(say("form of the ball"), shift / sqrt(3), form_origin, 0.0, unit("mm"), "rectangular")
-            )
+        if shift := float(form_shift_mm[k]):
+            u = shift / sqrt(3)
+            lines.append(BudgetLine(say("form of the ball"), u, form_origin, 0.0, unit("mm"), "rectangular"))
         budgets[name] = Budget(Verbatim(name), [*lines, *further], float(estimate_mm[k]), unit("mm"))
     return budgets
 
@@ -268,11 +229,6 @@ UNITS: Mapping[str, str] = {
     "length": "mm",
     "scale_error": "1",
 }
-
-
-def labels(origins: Mapping[str, str] | None = None) -> Labels:
-    """Units of both models' quantities, and the origins given."""
-    return Labels(UNITS, origins or {})
 
 
 def _stretch(cte_per_k: Any, temperature_c: Any) -> Any:

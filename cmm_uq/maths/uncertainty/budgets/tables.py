@@ -36,15 +36,10 @@ from cmm_uq.maths.uncertainty.budgets.measurements import (
     sphere_covariance,
 )
 
-Coefficient = Annotated[float, Field(ge=0, le=1e-3)]
-"""Of expansion, or its standard uncertainty, 1/K."""
-
-Kelvin = Annotated[float, Field(ge=0, le=100)]
-"""A standard uncertainty of a temperature."""
-
+Coefficient = Annotated[float, Field(ge=0, le=1e-3)]  # of expansion, or its standard uncertainty, 1/K
+Kelvin = Annotated[float, Field(ge=0, le=100)]  # a standard uncertainty of a temperature
 Readings = Annotated[list[Position], Field(max_length=LISTED.most)]
-Three = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]
-"""Of x, y, z."""
+Three = Annotated[list[Uncertainty], Field(min_length=3, max_length=3)]  # of x, y, z
 
 
 def _none() -> list[float]:
@@ -63,7 +58,6 @@ class BudgetTable(JobTable):
         """By the name of the output, mm."""
 
     def correlation(self) -> Floats:
-        """Of the outputs."""
         return np.eye(len(self.budgets()))
 
     def remarks(self) -> Mapping[str, float]:
@@ -94,7 +88,6 @@ class CalibratedWorkpiece(BudgetTable):
     """Standard uncertainty by form and roughness of the workpieces to be measured."""
 
     def budgets(self) -> Mapping[str, Budget]:
-        """Of the systematic error b, by which results are corrected."""
         return {
             "systematic_error": use_by_calibrated_workpiece(
                 self.readings_mm, self.calibrated_mm, self.u_calibration_um * MICROMETRE, temperature_c=self.temperature_c,
@@ -132,7 +125,6 @@ class SimulatedTask(BudgetTable):
     """Contributions that the simulation leaves out."""
 
     def budgets(self) -> Mapping[str, Budget]:
-        """Of the error that the simulation found."""
         lines = [
             BudgetLine(Verbatim(one.name), one.u_um * MICROMETRE, foreign(one.source), unit=unit("mm"))
             for one in self.not_simulated
@@ -157,7 +149,6 @@ class MachineTest(BudgetTable):
         """Of the test value."""
 
     def budgets(self) -> Mapping[str, Budget]:
-        """Of the test value."""
         return {self.symbol: self.uncertainty().of(self.error_um * MICROMETRE)}
 
 
@@ -187,7 +178,6 @@ class LengthTest(MachineTest):
     """Standard uncertainty of the length by the clamping."""
 
     def uncertainty(self) -> Budget:
-        """See :meth:`MachineTest.uncertainty`."""
         return length_test_uncertainty(
             self.length_mm, self.u_calibration_um * MICROMETRE, temperature_c=self.temperature_c, cte_per_k=self.cte_per_k,
             u_cte_per_k=self.u_cte_per_k, u_temperature_k=self.u_temperature_k,
@@ -209,7 +199,6 @@ class ProbingTest(MachineTest):
     """Standard uncertainty of that form deviation."""
 
     def uncertainty(self) -> Budget:
-        """See :meth:`MachineTest.uncertainty`."""
         return probing_test_uncertainty(self.form_um * MICROMETRE, self.u_form_um * MICROMETRE)
 
 
@@ -296,7 +285,6 @@ class FittedSphere(BudgetTable):
         return sphere_budgets([*self.centre_mm, self.radius_mm], scatter, limits)
 
     def correlation(self) -> Floats:
-        """Of x, y, z and radius."""
         scatter, form = self._covariances()
         u = np.sqrt(np.diag(scatter + form))
         return np.asarray((scatter + form) / np.outer(u, u))

@@ -1,6 +1,4 @@
-"""Arithmetic expressions as text: parsed, checked, and turned into calls of NumPy.
-
-Arithmetic expressions as text: parsed, checked, and turned into calls of NumPy's functions; never run as code.
+"""Arithmetic expressions as text: parsed, checked, and turned into calls of NumPy's functions; never run as code.
 
 An expression knows numbers, names, ``+ - * / **``, brackets, the functions of :data:`FUNCTIONS` and ``pi``. It is kept as
 a list of steps for a stack, so that neither its depth nor its length can overflow anything, and works on floats, arrays,
@@ -74,14 +72,11 @@ class Step:
 
 @dataclass(frozen=True)
 class Expression:
-    """A parsed expression."""
-
     text: str  # as written
     steps: tuple[Step, ...]  # in the order of a stack
 
     @property
     def names(self) -> set[str]:
-        """Names of the quantities that it uses."""
         return {str(step.item) for step in self.steps if step.kind == "name"}
 
     def __call__(self, values: Mapping[str, Any]) -> Any:
@@ -101,10 +96,7 @@ class Expression:
 
 
 def parse(text: str, known: Collection[str], where: str | None = None) -> Expression:
-    """Parse an expression of known quantities.
-
-    ``text``: such as ``"sqrt(x1**2 + x2**2)"``.
-    """
+    """Parse an expression of known quantities, such as ``"sqrt(x1**2 + x2**2)"``."""
     if len(text) > LONGEST:
         raise CmmUqError(f"an expression of {len(text)} characters", where=where, fix=f"{LONGEST} are the most")
     if _LONG_NUMERAL.search(text):
@@ -215,18 +207,3 @@ class _Translation:
 
     def _refused(self, problem: str, fix: str | None) -> CmmUqError:
         return CmmUqError(problem, where=self.where, fix=fix)
-
-
-@dataclass(frozen=True)
-class Located:
-    """Adds the place to an error that does not know it."""
-
-    where: str
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: object, trace: object) -> None:
-        if isinstance(error, CmmUqError):
-            where = f"{self.where} {error.where}" if error.where else self.where
-            raise CmmUqError(error.problem, where=where, fix=error.fix) from error

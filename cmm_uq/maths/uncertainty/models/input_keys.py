@@ -1,6 +1,4 @@
-"""Inputs of a model file: distributions from their keys, and units where text meets numbers.
-
-Units where text meets numbers: checked, converted, and carried through an expression (by pint, loaded when needed).
+"""Inputs of a model file: distributions from their keys; units checked, converted, carried through an expression by pint.
 
 Inside a model, numbers are in the units stated for them. The unit of an output follows where the expression says it; a
 number written in an expression takes whatever unit makes a sum consistent, so a unit is derived only where it is certain.
@@ -37,17 +35,7 @@ _AGREEMENT = 1e-9
 
 
 def distribution_from(kind: str, keys: Keys) -> Distribution:
-    """Distribution of an input.
-
-    Parameters
-    ----------
-    kind : name in JCGM 101:2008 table 1, ``sampled`` or ``constant``.
-    keys : the numbers given for it, any of :data:`NUMERIC`.
-
-    Raises
-    ------
-    CmmUqError : an unknown distribution, a key missing, superfluous or contradicting another.
-    """
+    """Distribution by its name in JCGM 101:2008 table 1, ``sampled`` or ``constant``, from any of :data:`NUMERIC`."""
     if kind not in KINDS:
         raise CmmUqError(f"there is no distribution {kind!r}", fix=suggestion(kind, KINDS))
     allowed, build = KINDS[kind]
@@ -88,8 +76,8 @@ def _standard_uncertainty(keys: Keys) -> float:
 
 def _normal(keys: Keys) -> Distribution:
     if "samples" in keys:
-        found = _readings(keys)
-        return make.normal(found.mean, found.u, found.dof)
+        mean = _readings(keys)
+        return make.normal(mean.mean, mean.u, mean.dof)
     (value,) = _need(keys, "value")
     return make.normal(value, _standard_uncertainty(keys), keys.get("dof", np.inf))
 
@@ -126,11 +114,7 @@ def _limits(keys: Keys, ratio: float) -> tuple[float, float]:
 
 
 def _bounded(build: Callable[..., Distribution], variance: float) -> Callable[[Keys], Distribution]:
-    def from_keys(keys: Keys) -> Distribution:
-        low, high = _limits(keys, 1 / sqrt(variance))
-        return build(low, high, dof=keys.get("dof", np.inf))
-
-    return from_keys
+    return lambda keys: build(*_limits(keys, 1 / sqrt(variance)), dof=keys.get("dof", np.inf))
 
 
 def _trapezoidal(keys: Keys) -> Distribution:
@@ -200,19 +184,14 @@ KINDS: Mapping[str, tuple[tuple[str, ...], Callable[[Keys], Distribution]]] = {
 _LONGEST = 60
 _SPELLED = re.compile(r"[\w\s.*/^()·%°′″µμΩ−+\-⁰¹²³⁴⁵⁶⁷⁸⁹⁻]*")
 _POWER = re.compile(r"(?:\*\*|\^)\s*\(?\s*[-−+]?\d{1,2}(?:[./]\d{1,2})?\s*\)?(?!\s*(?:\*\*|\^|\d))")
+# what is left of a unit without its powers must hold no further power, and no number but 1: pint would compute it
 _NOT_PLAIN = re.compile(r"\*\*|\^|(?<!\w)(?!1\b)\d|[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]{4,}")
-"""What is left of a unit without its powers must hold no further power, and no number but 1: pint would compute it."""
 _QUANTITY = re.compile(r"\s*([-+−]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?)\s*(.*)", re.DOTALL)
+_OF_PINT = AttributeError, ValueError, TypeError, AssertionError, SyntaxError, KeyError, ZeroDivisionError
 _CELSIUS = re.compile(r"\b(?:degC|celsius|degree_Celsius)\b|°C")
 
 
 def unit_of(text: str, where: str | None = None) -> pint.Unit:
-    """Unit by its name.
-
-    Raises
-    ------
-    CmmUqError : no such unit.
-    """
     import pint
 
     problem = f"{text[:_LONGEST]!r} is no known unit"
@@ -221,48 +200,23 @@ def unit_of(text: str, where: str | None = None) -> pint.Unit:
         raise CmmUqError(problem, where=where, fix=fix)
     try:
         return pint_units().Unit(text.strip().replace("−", "-"))
-    except (
-        pint.PintError,
-        tokenize.TokenError,
-        AttributeError,
-        ValueError,
-        TypeError,
-        AssertionError,
-        SyntaxError,
-        KeyError,
-        ZeroDivisionError,
-    ) as error:
+    except (pint.PintError, tokenize.TokenError, *_OF_PINT) as error:
         raise CmmUqError(problem, where=where, fix=fix) from error
 
 
 def number_in(text: str, unit: str, *, difference: bool, where: str | None = None) -> float:
-    """Number of a quantity written with its unit, in another unit.
-
-    Parameters
-    ----------
-    text : such as ``"25 nm"``.
-    unit : to express it in.
-    difference : whether it is a width or an uncertainty, so that °C and K are the same.
-
-    Raises
-    ------
-    CmmUqError : no number, no unit, or units of different kinds.
-    """
+    """Number of a quantity such as ``"25 nm"`` in another unit; of a difference (width, uncertainty) °C and K are the same."""
     import pint
 
-    found = _QUANTITY.fullmatch(text)
-    if not found or not unit:
-        raise CmmUqError(
-            f"{text[:_LONGEST]!r} is no number",
-            where=where,
-            fix="Write a number, or a number with a unit beside `unit`",
-        )
-    written, wanted = found[2], unit
-    if difference:
-        written, wanted = (_CELSIUS.sub("kelvin", spelled) for spelled in (written, wanted))
-    number = float(found[1].replace("−", "-"))
+    quantity = _QUANTITY.fullmatch(text)
+    if not quantity or not unit:
+        fix = "Write a number, or a number with a unit beside `unit`"
+        raise CmmUqError(f"{text[:_LONGEST]!r} is no number", where=where, fix=fix)
+    spelled = (_CELSIUS.sub("kelvin", each) if difference else each for each in (quantity[2], unit))
+    number = float(quantity[1].replace("−", "-"))
     try:
-        converted = pint_units().Quantity(number, unit_of(written, where)).to(unit_of(wanted, where))
+        written, other = (unit_of(each, where) for each in spelled)
+        converted = pint_units().Quantity(number, written).to(other)
     except pint.PintError as error:
         raise CmmUqError(f"{text!r} cannot be expressed in {unit}", where=where, fix="Mend one of the units") from error
     return float(converted.magnitude)

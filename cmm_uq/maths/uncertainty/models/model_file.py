@@ -1,6 +1,4 @@
-"""A measurement model of one's own in a TOML file: read, checked, evaluated, and given back.
-
-A measurement model of one's own in a TOML file: read, checked, evaluated, and given back as results and rows.
+"""A measurement model of one's own in a TOML file: read, checked and evaluated.
 
 The file names the outputs as expressions, the inputs with what is known of each, and their correlations. Every mistake is
 an error that names file and key.
@@ -10,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
@@ -29,16 +28,9 @@ from cmm_uq.maths.uncertainty.budget import REPEATS, Labels
 from cmm_uq.maths.uncertainty.distributions import Distribution
 from cmm_uq.maths.uncertainty.evaluation import METHODS, Evaluation, Request, evaluate
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
-from cmm_uq.maths.uncertainty.models.expression import Expression, Located, name_problem, parse
-from cmm_uq.maths.uncertainty.models.input_keys import (
-    DIFFERENCES,
-    KINDS,
-    NUMERIC,
-    derived_unit,
-    distribution_from,
-    number_in,
-    unit_of,
-)
+from cmm_uq.maths.uncertainty.models import input_keys
+from cmm_uq.maths.uncertainty.models.expression import Expression, name_problem, parse
+from cmm_uq.maths.uncertainty.models.input_keys import KINDS, NUMERIC, derived_unit, unit_of
 from cmm_uq.maths.uncertainty.models.ready import KEY, READY, ReadyBudget, read_ready_budget, ready_model
 from cmm_uq.maths.uncertainty.type_a import simultaneous_readings
 
@@ -181,27 +173,25 @@ class _Reader:
         model, given = self._table(data, "model", ""), self._table(data, "inputs", "")
         correlation = self._correlation(data)
         if not given:
-            raise CmmUqError("there are no inputs", where=self.file, fix="Describe each in a table [inputs.<name>]")
+            raise self._refused("there are no inputs", "", "Describe each in a table [inputs.<name>]")
         self._known(model, MODEL, "[model]")
         inputs = {name: self._input(name, keys) for name, keys in given.items()}
         inputs, within = self._simultaneous(inputs, given)
         for a, b in within:
             if (a, b) in correlation or (b, a) in correlation:
-                raise CmmUqError(
-                    f"the correlation of {a} and {b} follows from their simultaneous readings",
-                    where=self._where("[correlation]"),
-                    fix="Leave the line out",
-                )
+                problem = f"the correlation of {a} and {b} follows from their simultaneous readings"
+                raise self._refused(problem, "[correlation]", "Leave the line out")
         joint = {**within, **correlation}
+        expressions: dict[str, Expression] = {}
+        descriptions = {name: keys["description"] for name, keys in given.items() if "description" in keys}
         if "ready" in model:
-            expressions: dict[str, Expression] = {}
+            units = {name: keys.get("unit", "") for name, keys in given.items()}
             with self._located(""):
-                whole, own = ready_model(
-                    model, inputs, {name: keys.get("unit", "") for name, keys in given.items()}, joint
-                )
-            labels = replace(own, origins={**own.origins, **_origins(given)})
+                whole, labels = ready_model(model, inputs, units, joint)
+            labels = replace(labels, origins={**labels.origins, **_origins(given)})
+            descriptions = {say("Ready model"): READY[model["ready"]].title} | descriptions
         else:
-            expressions = self._outputs(model, inputs)
+            expressions.update(self._outputs(model, inputs))
             whole = MeasurementModel(
                 lambda **values: {name: expression(values) for name, expression in expressions.items()},
                 inputs,
@@ -211,59 +201,57 @@ class _Reader:
             labels = self._labels(given, model, expressions)
         with self._located(""):
             _ = whole.correlation_matrix
-        return ModelFile(
-            self._text(model, "title", "[model]") or stem,
-            expressions,
-            whole,
-            self._request(model),
-            labels,
-            ({say("Ready model"): READY[model["ready"]].title} if "ready" in model else {})
-            | {name: keys["description"] for name, keys in given.items() if "description" in keys},
-            content,
-        )
+        title = self._text(model, "title", "[model]") or stem
+        return ModelFile(title, expressions, whole, self._request(model), labels, descriptions, content)
 
     def _where(self, key: str) -> str:
         return f"{self.file} {key}".strip()
 
-    def _located(self, key: str) -> Located:
-        return Located(self._where(key))
+    def _refused(self, problem: str, key: str, fix: str | None = None) -> CmmUqError:
+        return CmmUqError(problem, where=self._where(key), fix=fix)
+
+    @contextmanager
+    def _located(self, key: str) -> Iterator[None]:
+        """Adds the place to an error that does not know it."""
+        try:
+            yield
+        except CmmUqError as error:
+            raise self._refused(error.problem, f"{key} {error.where or ''}".strip(), error.fix) from error
 
     def _known(self, table: Mapping[str, Any], allowed: tuple[str, ...], key: str) -> None:
         for name in table:
             if name not in allowed:
-                raise CmmUqError(f"there is no key {name!r}", where=self._where(key), fix=suggestion(name, allowed))
+                raise self._refused(f"there is no key {name!r}", key, suggestion(name, allowed))
 
     def _table(self, data: Mapping[str, Any], name: str, within: str) -> Mapping[str, Any]:
         if name not in data:
-            raise CmmUqError(f"[{name}] is missing", where=self._where(within), fix=f"Add a table [{name}]")
-        if not isinstance(data[name], dict):
-            raise CmmUqError(f"{name} is not a table", where=self._where(within), fix=f"Write it as [{name}]")
-        found: Mapping[str, Any] = data[name]
-        if len(found) > INPUTS.most:
-            raise CmmUqError(
-                f"{name} has {len(found)} entries", where=self._where(within), fix=f"{INPUTS.most} are the most"
-            )
-        return found
+            raise self._refused(f"[{name}] is missing", within, f"Add a table [{name}]")
+        table = data[name]
+        if not isinstance(table, dict):
+            raise self._refused(f"{name} is not a table", within, f"Write it as [{name}]")
+        if len(table) > INPUTS.most:
+            raise self._refused(f"{name} has {len(table)} entries", within, f"{INPUTS.most} are the most")
+        return table
 
     def _text(self, table: Mapping[str, Any], name: str, key: str) -> str:
         if not isinstance(table.get(name, ""), str):
-            raise CmmUqError(f"{name} is not text", where=self._where(key), fix='Put it in quotes: "…"')
+            raise self._refused(f"{name} is not text", key, 'Put it in quotes: "…"')
         return str(table.get(name, ""))
 
     def _number(self, number: Any, key: str) -> float:
         if isinstance(number, bool) or not isinstance(number, (int, float)) or not isfinite(number):
-            raise CmmUqError(f"{number!r} is not a finite number", where=self._where(key), fix="Write it as in 0.05")
+            raise self._refused(f"{number!r} is not a finite number", key, "Write it as in 0.05")
         if number and not _SMALLEST < abs(number) < _LARGEST:
             problem = f"{number:g} is too {'large' if abs(number) > 1 else 'small'} to be squared and added up"
-            raise CmmUqError(problem, where=self._where(key), fix="State it in another unit")
+            raise self._refused(problem, key, "State it in another unit")
         return float(number)
 
     def _input(self, name: str, keys: Any) -> Distribution:
         key = f"[inputs.{name}]"
         if problem := name_problem(name):
-            raise CmmUqError(problem, where=self._where(key), fix="Choose another name")
+            raise self._refused(problem, key, "Choose another name")
         if not isinstance(keys, dict):
-            raise CmmUqError(f"{name} is not a table", where=self._where("[inputs]"), fix=f"Write it as {key}")
+            raise self._refused(f"{name} is not a table", "[inputs]", f"Write it as {key}")
         self._known(keys, (*TEXTS, *sorted(NUMERIC)), key)
         for text in TEXTS:
             self._text(keys, text, key)
@@ -274,23 +262,24 @@ class _Reader:
         with self._located(key):
             if kind is None:
                 raise CmmUqError("'distribution' is missing", fix="Give one, such as 'normal' or 'rectangular'")
-            return distribution_from(kind, numbers)
+            return input_keys.distribution_from(kind, numbers)
 
     def _numbers(self, keys: Mapping[str, Any], name: str, key: str) -> Any:
         given = keys[name]
         if name == "samples":
             if not isinstance(given, list):
-                raise CmmUqError("samples is not a list", where=self._where(key), fix="Write it as in [1.2, 1.3]")
+                raise self._refused("samples is not a list", key, "Write it as in [1.2, 1.3]")
             return np.array([self._number(sample, key) for sample in given])
         if isinstance(given, str):
-            return number_in(given, keys.get("unit", ""), difference=name in DIFFERENCES, where=self._where(key))
+            difference = name in input_keys.DIFFERENCES
+            return input_keys.number_in(given, keys.get("unit", ""), difference=difference, where=self._where(key))
         return self._number(given, key)
 
     def _simultaneous(
         self, inputs: Mapping[str, Distribution], given: Mapping[str, Any]
     ) -> tuple[dict[str, Distribution], dict[tuple[str, str], float]]:
         """Inputs read together, marked by the same ``simultaneous``, with the correlations of their readings."""
-        found = dict(inputs)
+        marked = dict(inputs)
         correlations: dict[tuple[str, str], float] = {}
         sets: dict[str, list[str]] = {}
         for name, keys in given.items():
@@ -300,32 +289,30 @@ class _Reader:
             key = f"[inputs.{names[0]}] simultaneous"
             for name in names:
                 if "samples" not in given[name]:
-                    raise CmmUqError(f"{name} has no samples", where=self._where(key), fix="Give its readings")
+                    raise self._refused(f"{name} has no samples", key, "Give its readings")
             kinds = {inputs[name].kind for name in names}
+            samples = {name: given[name]["samples"] for name in names}
             if kinds == {"sampled"}:
-                lengths = {len(given[name]["samples"]) for name in names}
-                if len(lengths) != 1:
-                    raise CmmUqError("the numbers of draws differ", where=self._where(key), fix="Give whole rows")
-                found.update({name: replace(inputs[name], together=label) for name in names})
+                if len({len(draws) for draws in samples.values()}) != 1:
+                    raise self._refused("the numbers of draws differ", key, "Give whole rows")
+                marked.update({name: replace(inputs[name], together=label) for name in names})
             elif kinds <= {"normal", "t"}:
                 with self._located(key):
-                    joint = simultaneous_readings({name: given[name]["samples"] for name in names})
-                correlations.update(joint.correlation)
+                    correlations.update(simultaneous_readings(samples).correlation)
             else:
-                raise CmmUqError("readings and draws are mixed", where=self._where(key), fix="Use one distribution")
-        return found, correlations
+                raise self._refused("readings and draws are mixed", key, "Use one distribution")
+        return marked, correlations
 
     def _outputs(self, model: Mapping[str, Any], inputs: Mapping[str, Distribution]) -> dict[str, Expression]:
         outputs = self._table(model, "outputs", "[model]")
         if not outputs:
-            raise CmmUqError("there are no outputs", where=self._where("[model]"), fix='outputs = { y = "…" }')
+            raise self._refused("there are no outputs", "[model]", 'outputs = { y = "…" }')
         parsed = {}
         for name in outputs:
-            where = self._where(f"[model] outputs.{name}")
-            problem = name_problem(name) or (f"{name!r} is also an input" if name in inputs else None)
-            if problem:
-                raise CmmUqError(problem, where=where, fix="Choose another name")
-            parsed[name] = parse(self._text(outputs, name, f"[model] outputs.{name}"), inputs.keys(), where)
+            key = f"[model] outputs.{name}"
+            if problem := name_problem(name) or (f"{name!r} is also an input" if name in inputs else None):
+                raise self._refused(problem, key, "Choose another name")
+            parsed[name] = parse(self._text(outputs, name, key), inputs.keys(), self._where(key))
         return parsed
 
     def _correlation(self, data: Mapping[str, Any]) -> dict[tuple[str, str], float]:
@@ -333,26 +320,23 @@ class _Reader:
         for key, number in self._table({"correlation": {}, **data}, "correlation", "").items():
             names = [name.strip() for name in key.split(",")]
             if len(names) != 2:
-                raise CmmUqError(
-                    f"{key!r} is not a pair of inputs", where=self._where("[correlation]"), fix='Write "x1,x2" = 0.9'
-                )
+                raise self._refused(f"{key!r} is not a pair of inputs", "[correlation]", 'Write "x1,x2" = 0.9')
             pairs[names[0], names[1]] = self._number(number, f"[correlation] {key}")
         return pairs
 
     def _request(self, model: Mapping[str, Any]) -> Request:
-        asked: dict[str, Any] = {}
+        request: dict[str, Any] = {}
         if "method" in model:
-            asked["method"] = self._text(model, "method", "[model] method")
-        if "coverage" in model:
-            asked["coverage"] = self._number(model["coverage"], "[model] coverage")
-        for name in ("digits", "seed"):
+            request["method"] = self._text(model, "method", "[model] method")
+        for name in ("coverage", "digits", "seed"):
             if name in model:
-                number = self._number(model[name], f"[model] {name}")
-                if number != int(number):
-                    raise CmmUqError(f"{number} is not an integer", where=self._where(f"[model] {name}"))
-                asked[name] = int(number)
+                request[name] = number = self._number(model[name], f"[model] {name}")
+                if name != "coverage":
+                    if number != int(number):
+                        raise self._refused(f"{number} is not an integer", f"[model] {name}")
+                    request[name] = int(number)
         with self._located("[model]"):
-            return Request(**asked)
+            return Request(**request)
 
     def _labels(
         self, given: Mapping[str, Any], model: Mapping[str, Any], expressions: Mapping[str, Expression]
@@ -361,8 +345,7 @@ class _Reader:
         stated = self._table({"units": {}, **model}, "units", "[model]")
         self._known(stated, tuple(expressions), "[model] units")
         for name, expression in expressions.items():
-            unit = self._text(stated, name, "[model] units")
-            if unit:
+            if unit := self._text(stated, name, "[model] units"):
                 unit_of(unit, self._where(f"[model] units.{name}"))
             elif any(units[used] not in ("", "1") for used in expression.names):
                 unit = derived_unit(expression, units) or ""

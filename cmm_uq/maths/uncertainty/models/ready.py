@@ -1,9 +1,7 @@
 """Ready measurement models and budgets, called by name in a TOML file.
 
-Ready measurement models of a model file: ``[model] ready = "length_at_20"`` in place of outputs.
-
-The inputs of the file are those of the model, by their names; what is said of each, and of their correlations, stays the
-file's.
+``[model] ready = "length_at_20"`` stands in place of outputs: the inputs of the file are those of the model, by their names;
+what is said of each, and of their correlations, stays the file's.
 """
 
 from __future__ import annotations
@@ -25,12 +23,7 @@ from cmm_uq.base.messages import Text, Verbatim, number, say
 from cmm_uq.maths.uncertainty.air.interferometer import Interferometer, interferometer_model
 from cmm_uq.maths.uncertainty.air.state import Air
 from cmm_uq.maths.uncertainty.budget import Budget, Labels
-from cmm_uq.maths.uncertainty.budgets.measurements import (
-    labels as temperature_labels,
-    length_at_20,
-    scale_error,
-    triangle_angles,
-)
+from cmm_uq.maths.uncertainty.budgets.measurements import UNITS, length_at_20, scale_error, triangle_angles
 from cmm_uq.maths.uncertainty.budgets.tables import TABLES, BudgetTable
 from cmm_uq.maths.uncertainty.choice import Ways
 from cmm_uq.maths.uncertainty.correlation import Correlations
@@ -44,41 +37,24 @@ Built = tuple[MeasurementModel, Labels]
 
 @dataclass(frozen=True)
 class ReadyModel:
-    """A model by its name."""
-
     title: Text  # what it gives, in words
     inputs: Mapping[str, bool]  # names, and whether each is needed
     # of the inputs and the correlations: the model, and units and origins of its quantities
     build: Callable[[Mapping[str, Distribution], Correlations], Built]
 
-    def of(self, given: Mapping[str, Distribution], correlation: Correlations) -> Built:
-        """The model of these inputs."""
-        for name in given:
-            if name not in self.inputs:
-                raise CmmUqError(f"{name!r} is no input of this model", fix=suggestion(name, self.inputs))
-        for name, needed in self.inputs.items():
-            if needed and name not in given:
-                raise CmmUqError(f"the input {name!r} is missing", fix=f"Describe it in a table [inputs.{name}]")
-        return self.build(given, correlation)
 
-
-def _by(function: Callable[..., MeasurementModel], found: Labels) -> Callable[..., Built]:
-    return lambda given, correlation: (function(**given, correlation=dict(correlation)), found)
-
-
-def _of_signature(function: Callable[..., MeasurementModel]) -> dict[str, bool]:
-    return {
-        name: parameter.default is Parameter.empty
-        for name, parameter in signature(function).parameters.items()
-        if name != "correlation"
-    }
+def _of_function(title: Text, function: Callable[..., MeasurementModel], units: Mapping[str, str]) -> ReadyModel:
+    parameters = {name: each.default is Parameter.empty for name, each in signature(function).parameters.items()}
+    del parameters["correlation"]
+    return ReadyModel(
+        title, parameters, lambda given, correlation: (function(**given, correlation=dict(correlation)), Labels(units))
+    )
 
 
 def _interferometer(given: Mapping[str, Distribution], correlation: Correlations) -> Built:
-    of_air = {field.name for field in fields(Air)}
-    air = Air(**{name: known for name, known in given.items() if name in of_air})  # type: ignore[arg-type]
-    own = {name: known for name, known in given.items() if name not in of_air}
-    setup = Interferometer(own.pop("vacuum_mm"), air, **own)  # type: ignore[arg-type]
+    of_air = {field.name for field in fields(Air)} & given.keys()
+    air = Air(**{name: given[name] for name in of_air})  # type: ignore[arg-type]
+    setup = Interferometer(air=air, **{name: given[name] for name in given.keys() - of_air})  # type: ignore[arg-type]
     model = interferometer_model(setup)
     return MeasurementModel(model.function, model.inputs, model.outputs, dict(correlation)), setup.labels
 
@@ -88,46 +64,42 @@ _INTERFEROMETER = {
     "co2_ppm": False, "wavelength_nm": False, "dead_path_mm": False, "zero_refractivity": False, "angle_rad": False,
     "material_c": False, "cte_per_k": False,
 }  # fmt: skip
+_ANGLES = {"a_mm": "mm", "b_mm": "mm", "c_mm": "mm", "alpha": "rad", "beta": "rad", "gamma": "rad"}
 
-_ANGLES = Labels({"a_mm": "mm", "b_mm": "mm", "c_mm": "mm", "alpha": "rad", "beta": "rad", "gamma": "rad"})
-
-READY: Mapping[str, ReadyModel] = MappingProxyType({
-    "length_at_20": ReadyModel(
-        say("Length at 20 °C"), _of_signature(length_at_20), _by(length_at_20, temperature_labels())
-    ),
-    "scale_error": ReadyModel(
-        say("Relative error of a scale"), _of_signature(scale_error), _by(scale_error, temperature_labels())
-    ),
-    "triangle_angles": ReadyModel(
-        say("Angles of a triangle from its sides"), _of_signature(triangle_angles), _by(triangle_angles, _ANGLES)
-    ),
-    "interferometer": ReadyModel(say("Length by laser interferometer"), _INTERFEROMETER, _interferometer),
-})  # fmt: skip
-"""By name."""
+READY: Mapping[str, ReadyModel] = MappingProxyType(
+    {
+        "length_at_20": _of_function(say("Length at 20 °C"), length_at_20, UNITS),
+        "scale_error": _of_function(say("Relative error of a scale"), scale_error, UNITS),
+        "triangle_angles": _of_function(say("Angles of a triangle from its sides"), triangle_angles, _ANGLES),
+        "interferometer": ReadyModel(say("Length by laser interferometer"), _INTERFEROMETER, _interferometer),
+    }
+)
 
 
 def ready_model(
     model: Mapping[str, Any], inputs: Mapping[str, Distribution], units: Mapping[str, str], correlation: Correlations
 ) -> Built:
-    """The ready model that ``[model]`` of a file names.
-
-    ``model``: ``[model]``.
-    """
+    """The ready model that ``[model]`` of a file names, of the file's inputs."""
+    where = "[model] ready"
     for key in ("outputs", "units"):
         if key in model:
-            raise CmmUqError(
-                f"{key} is given, and the ready model has its own", where="[model] ready", fix="Leave one of them out"
-            )
+            problem = f"{key} is given, and the ready model has its own"
+            raise CmmUqError(problem, where=where, fix="Leave one of them out")
     name = model["ready"]
     if not isinstance(name, str) or name not in READY:
-        raise CmmUqError(f"there is no ready model {name!r}", where="[model] ready", fix=suggestion(str(name), READY))
-    whole, labels = READY[name].of(inputs, correlation)
+        raise CmmUqError(f"there is no ready model {name!r}", where=where, fix=suggestion(str(name), READY))
+    ready = READY[name]
+    for key in inputs:
+        if key not in ready.inputs:
+            raise CmmUqError(f"{key!r} is no input of this model", fix=suggestion(key, ready.inputs))
+    for key, needed in ready.inputs.items():
+        if needed and key not in inputs:
+            raise CmmUqError(f"the input {key!r} is missing", fix=f"Describe it in a table [inputs.{key}]")
+    whole, labels = ready.build(inputs, correlation)
     for key, unit in units.items():
-        if unit and unit != labels.units[key]:
-            raise CmmUqError(
-                f"{key} is taken in {labels.units[key]}", where=f"[inputs.{key}] unit",
-                fix=f"Give it in {labels.units[key]}, or leave the unit out",
-            )  # fmt: skip
+        if unit and unit != (own := labels.units[key]):
+            fix = f"Give it in {own}, or leave the unit out"
+            raise CmmUqError(f"{key} is taken in {own}", where=f"[inputs.{key}] unit", fix=fix)
     return whole, labels
 
 
@@ -140,10 +112,7 @@ class _BudgetFile(JobTable):
 
 @dataclass(frozen=True, eq=False)
 class ReadyBudget:
-    """What a file with a ready budget says.
-
-    ``how``: it is evaluated.
-    """
+    """What a file with a ready budget says."""
 
     title: str  # of the page
     table: BudgetTable  # the method and its figures
@@ -163,16 +132,11 @@ class ReadyBudget:
     @property
     def descriptions(self) -> Mapping[str, Text]:
         """The method, and further figures that it asks for."""
-        told: dict[str, Text] = {say("Method"): self.table.meaning}
-        return told | {Verbatim(name): number(value, ".6g") for name, value in self.table.remarks().items()}
+        remarks: dict[str, Text] = {Verbatim(name): number(value, ".6g") for name, value in self.table.remarks().items()}
+        return {say("Method"): self.table.meaning, **remarks}
 
     def evaluate(self, seed: int | None = None) -> Evaluation:
-        """Its budgets as results; nothing in them is random, so a seed changes nothing.
-
-        Raises
-        ------
-        CmmUqError : the method refuses the figures.
-        """
+        """Its budgets as results; nothing in them is random, so a seed changes nothing."""
         budgets = self.table.budgets()
         stated = {name: _stated(budget) for name, budget in budgets.items()}
         coverage = {budget.coverage for budget in budgets.values()}
@@ -184,25 +148,22 @@ class ReadyBudget:
 
 
 def _stated(budget: Budget) -> OutputResult:
-    value, U = budget.value or 0.0, budget.expanded
-    reason = (
-        say("U = k u with k = 2, which the standard prescribes")
-        if budget.factor is not None
-        else say("U = k u with k from the effective degrees of freedom")
-    )
+    value, U, reason = budget.value or 0.0, budget.expanded, say("U = k u with k from the effective degrees of freedom")
+    if budget.factor is not None:
+        reason = say("U = k u with k = 2, which the standard prescribes")
     return OutputResult("first", reason, value, budget.u, budget.dof, (value - U, value + U), budget.k, budget)
 
 
 def read_ready_budget(content: bytes, path: Path) -> ReadyBudget:
     """Read and check a file with a ready budget."""
-    found = checked(content, path, lambda data: _file_of(data, path))
-    return ReadyBudget(found.budget.title or path.stem, found.budget, content)
 
+    def table_of(data: dict[str, Any]) -> type[_BudgetFile]:
+        table = data[KEY]
+        method = str(table.get("method", "")) if isinstance(table, dict) else ""
+        if method not in TABLES:
+            problem = f"there is no ready budget {method!r}" if method else "is missing"
+            raise CmmUqError(problem, where=f"{path}: [{KEY}] method", fix=suggestion(method, TABLES))
+        return create_model("BudgetFile", __base__=_BudgetFile, budget=(TABLES[method], ...))
 
-def _file_of(data: dict[str, Any], path: Path) -> type[_BudgetFile]:
-    table = data[KEY]
-    method = str(table.get("method", "")) if isinstance(table, dict) else ""
-    if method not in TABLES:
-        said = f"there is no ready budget {method!r}" if method else "is missing"
-        raise CmmUqError(said, where=f"{path}: [{KEY}] method", fix=suggestion(method, TABLES))
-    return create_model("BudgetFile", __base__=_BudgetFile, budget=(TABLES[method], ...))
+    budget = checked(content, path, table_of).budget
+    return ReadyBudget(budget.title or path.stem, budget, content)

@@ -1,12 +1,14 @@
-"""Reference cases of JCGM 101:2008 (GUM supplement 1), clause 9."""
+"""Reference cases of JCGM 101:2008, clause 9, and of JCGM 102:2011 (GUM supplements 1 and 2)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 
 from cmm_uq.maths.uncertainty.choice import compare
+from cmm_uq.maths.uncertainty.coverage import elliptical_factor
 from cmm_uq.maths.uncertainty.distributions import (
     Distribution,
     arcsine,
@@ -18,17 +20,21 @@ from cmm_uq.maths.uncertainty.distributions import (
 from cmm_uq.maths.uncertainty.evaluation import Request, evaluate
 from cmm_uq.maths.uncertainty.measurement_model import MeasurementModel
 from cmm_uq.maths.uncertainty.monte_carlo import Simulated, simulate, simulate_adaptively
-from cmm_uq.maths.uncertainty.propagation import first_order, second_order
-from cmm_uq.maths.uncertainty.reference.case import SEED, Figures, ReferenceCase
+from cmm_uq.maths.uncertainty.propagation import Propagated, first_order, second_order
+from cmm_uq.maths.uncertainty.reference.case import SEED, ReferenceCase
 from cmm_uq.maths.uncertainty.reference.jcgm_100 import comparison
 
-_SIDE = np.sqrt(3)
+_NORMAL, _FLAT, _WIDE = (
+    normal(0.0, 1.0),
+    rectangular(-np.sqrt(3), np.sqrt(3)),
+    rectangular(-10 * np.sqrt(3), 10 * np.sqrt(3)),
+)
 _DELTA_MASS, _DELTA_BLOCK = 0.0005, 0.5
 
 
 def gauge_block() -> MeasurementModel:
     """JCGM 101:2008 9.5: deviation from 50 mm, nm and °C."""
-    inputs: dict[str, Distribution] = {
+    inputs = {
         "ls": student_t(623.0, 25.0, 18),
         "d": student_t(215.0, 6.0, 24),
         "d1": student_t(0.0, 4.0, 5),
@@ -56,102 +62,83 @@ def mass() -> MeasurementModel:
     )
 
 
-def comparison_loss(x1: float, r: float = 0.0) -> MeasurementModel:
+def comparison_loss(x1: float) -> MeasurementModel:
     """JCGM 101:2008 9.4, in units of 10⁻⁶."""
-    inputs = {"x1": normal(x1, 0.005), "x2": normal(0.0, 0.005)}
-    return MeasurementModel(lambda x1, x2: 1e6 * (x1**2 + x2**2), inputs, correlation={("x1", "x2"): r} if r else {})
+    return MeasurementModel(lambda x1, x2: 1e6 * (x1**2 + x2**2), {"x1": normal(x1, 0.005), "x2": normal(0.0, 0.005)})
 
 
-def _sum_of_four(*inputs: Distribution) -> MeasurementModel:
-    return MeasurementModel(lambda a, b, c, d: a + b + c + d, dict(zip("abcd", inputs, strict=True)))
+def _figures(result: Simulated | Propagated) -> tuple[float, ...]:
+    """Value, u and the ends of the (95 %, or shortest) coverage interval of the first output."""
+    if isinstance(result, Simulated):
+        return result.value[0], result.u[0], *result.interval[0]
+    return result.value[0], result.u[0], *(end[0] for end in result.interval(0.95))
 
 
-def _drawn(found: Simulated) -> Figures:
-    return {
-        "value": float(found.value[0]),
-        "u": float(found.u[0]),
-        "low": float(found.interval[0, 0]),
-        "high": float(found.interval[0, 1]),
-    }
-
-
-def _four(*inputs: Distribution) -> Callable[[], Figures]:
-    def compute() -> Figures:
-        model = _sum_of_four(*inputs)
-        found = simulate(model, 1_000_000, seed=SEED)
-        return {
-            "u": float(found.u[0]),
-            "U by Monte Carlo": float(np.ptp(found.symmetric_interval[0])) / 2,
-            "U by first order": float(first_order(model).interval(0.95)[1][0]),
-        }
-
-    return compute
-
-
-def _mass() -> Figures:
-    drawn = _drawn(simulate_adaptively(mass(), digits=2, seed=SEED))
-    first, second = first_order(mass()), second_order(mass())
-    figures = {f"Monte Carlo {name}": figure for name, figure in drawn.items()}
-    for title, found in (("first order", first), ("second order", second)):
-        low, high = found.interval(0.95)
-        figures |= {f"{title} u": float(found.u[0]), f"{title} low": float(low[0]), f"{title} high": float(high[0])}
-    return figures
-
-
-def _clause_8() -> Figures:
-    found = evaluate(mass(), Request(digits=1, seed=SEED))
-    two = evaluate(mass(), Request(digits=2, seed=SEED))
-    figures: dict[str, float] = {}
-    if found.ways.first is not None and found.ways.simulated is not None:
-        first = compare(found.ways.first, found.ways.simulated, 0, 1)
-        figures |= {"d of first order": max(first.low, first.high), "δ for one digit": first.tolerance}
-    return figures | {
-        "second order chosen for one digit": float(found.stated["y"].method == "second"),
-        "Monte Carlo chosen for two digits": float(two.stated["y"].method == "monte_carlo"),
-    }
-
-
-def _loss(x1: float, r: float = 0.0) -> Callable[[], Figures]:
-    def compute() -> Figures:
-        model = comparison_loss(x1, r)
+def _four(*inputs: Distribution) -> Callable[[], list[float]]:
+    def compute() -> list[float]:
+        model = MeasurementModel(lambda a, b, c, d: a + b + c + d, dict(zip("abcd", inputs, strict=True)))
         drawn = simulate(model, 1_000_000, seed=SEED)
-        first, second = first_order(model), second_order(model)
-        return {
-            **_drawn(drawn),
-            "u by first order": float(first.u[0]),
-            "low by first order": float(first.interval(0.95)[0][0]),
-            "high by first order": float(first.interval(0.95)[1][0]),
-            "value by second order": float(second.value[0]),
-            "u by second order": float(second.u[0]),
-        }
+        return [drawn.u[0], np.ptp(drawn.symmetric_interval[0]) / 2, first_order(model).interval(0.95)[1][0]]
 
     return compute
 
 
-def _gauge_block() -> Figures:
-    model = gauge_block()
-    drawn = _drawn(simulate_adaptively(model, coverage=0.99, digits=2, seed=SEED))
-    return {**drawn, "u by first order": float(first_order(model).u[0])}
+def _mass() -> list[float]:
+    drawn = simulate_adaptively(mass(), digits=2, seed=SEED)
+    propagated = (_figures(propagate(mass()))[1:] for propagate in (first_order, second_order))
+    return [*_figures(drawn), *chain(*propagated)]
 
 
-CASES: Sequence[ReferenceCase] = (
-    ReferenceCase(
-        "Sum of four normal quantities",
-        "JCGM 101:2008 9.2.2, recomputed",
-        {"u": (2.0, 0.05), "U by Monte Carlo": (3.91993, 0.05), "U by first order": (3.91993, 5e-6)},
-        _four(*(normal(0.0, 1.0),) * 4),
-    ),
-    ReferenceCase(
-        "Sum of four rectangular quantities",
-        "JCGM 101:2008 9.2.3, recomputed",
-        {"u": (2.0, 0.05), "U by Monte Carlo": (3.87941, 0.05), "U by first order": (3.91993, 5e-6)},
-        _four(*(rectangular(-_SIDE, _SIDE),) * 4),
-    ),
-    ReferenceCase(
-        "One of the four ten times wider",
-        "JCGM 101:2008 9.2.4, recomputed",
-        {"u": (10.149, 0.5), "U by Monte Carlo": (17.0158, 0.05), "U by first order": (19.891, 5e-4)},
-        _four(*(rectangular(-_SIDE, _SIDE),) * 3, rectangular(-10 * _SIDE, 10 * _SIDE)),
+def _clause_8() -> list[float]:
+    one, two = (evaluate(mass(), Request(digits=digits, seed=SEED)) for digits in (1, 2))
+    if one.ways.first is None or one.ways.simulated is None:
+        return [np.nan] * 4
+    first = compare(one.ways.first, one.ways.simulated, 0, 1)
+    chosen = one.stated["y"].method == "second", two.stated["y"].method == "monte_carlo"
+    return [max(first.low, first.high), first.tolerance, *chosen]
+
+
+def _loss(x1: float) -> Callable[[], list[float]]:
+    def compute() -> list[float]:
+        model = comparison_loss(x1)
+        second = second_order(model)
+        drawn = simulate(model, 1_000_000, seed=SEED)
+        return [*_figures(drawn), first_order(model).u[0], second.value[0], second.u[0]]
+
+    return compute
+
+
+def _gauge_block() -> list[float]:
+    drawn = simulate_adaptively(gauge_block(), coverage=0.99, digits=2, seed=SEED)
+    return [*_figures(drawn), first_order(gauge_block()).u[0]]
+
+
+def _polar(x1: float) -> Callable[[], list[float]]:
+    def compute() -> list[float]:
+        model = MeasurementModel(
+            lambda x1, x2: {"modulus": np.sqrt(x1**2 + x2**2), "phase": np.arctan2(x2, x1)},
+            {"x1": normal(x1, 0.010), "x2": normal(0.0, 0.010)},
+            ("modulus", "phase"),
+        )
+        drawn = simulate(model, 1_000_000, seed=SEED)
+        return [drawn.value[0], drawn.u[0], drawn.value[1], drawn.u[1]]
+
+    return compute
+
+
+CASES = (
+    *(
+        ReferenceCase(
+            title,
+            f"JCGM 101:2008 {clause}, recomputed",
+            {"u": u, "U by Monte Carlo": (drawn, 0.05), "U by first order": first},
+            _four(*inputs),
+        )
+        for title, clause, u, drawn, first, inputs in (
+            ("Sum of four normal quantities", "9.2.2", (2.0, 0.05), 3.91993, (3.91993, 5e-6), [_NORMAL] * 4),
+            ("Sum of four rectangular quantities", "9.2.3", (2.0, 0.05), 3.87941, (3.91993, 5e-6), [_FLAT] * 4),
+            ("One of the four ten times wider", "9.2.4", (10.149, 0.5), 17.0158, (19.891, 5e-4), [*[_FLAT] * 3, _WIDE]),
+        )
     ),
     ReferenceCase(
         "Mass calibration",
@@ -206,7 +193,7 @@ CASES: Sequence[ReferenceCase] = (
         "Comparison loss by first order, in 10⁻⁶",
         "JCGM 101:2008 9.4.2",
         {"low by first order": (1520, 0.5), "high by first order": (3480, 0.5)},
-        _loss(0.050),
+        lambda: _figures(first_order(comparison_loss(0.050)))[2:],
     ),
     ReferenceCase(
         "Gauge block, 99 %, nm",
@@ -219,5 +206,24 @@ CASES: Sequence[ReferenceCase] = (
             "u by first order": (32, 0.5),
         },
         _gauge_block,
+    ),
+    *(
+        ReferenceCase(
+            f"Polar from rectangular coordinates, x1 = {x1:g}",
+            "JCGM 102:2011 9.3",
+            {"modulus": (modulus, 1e-4), "u(modulus)": (u, 1e-4), "phase": (0.0, 0.01), "u(phase)": (u_phase, 2e-3)},
+            _polar(x1),
+        )
+        for x1, modulus, u, u_phase in (
+            (0.001, 0.0126, 0.0066, 1.744),
+            (0.010, 0.0155, 0.0078, 1.118),
+            (0.1, 0.1005, 0.0100, 0.101),
+        )
+    ),
+    ReferenceCase(
+        "Factor of the 95 % ellipse",
+        "JCGM 102:2011 table 1",
+        {"two outputs": (2.4477, 5e-5)},
+        lambda: [elliptical_factor(2)],
     ),
 )

@@ -16,11 +16,11 @@ from cmm_uq.maths.uncertainty.budgets.machine import (
     use_by_simulation,
 )
 from cmm_uq.maths.uncertainty.budgets.measurements import (
+    UNITS,
     BallbarPosition,
     ballbar_length,
     harris_compensated,
     harris_uncompensated,
-    labels,
     length_at_20,
     scale_error,
     sphere_budgets,
@@ -139,7 +139,7 @@ def test_a_warm_length_is_brought_to_20_degrees() -> None:
     part = dict(zip(found.inputs, np.abs(found.contribution[0]), strict=True))
     assert part["workpiece_c"] == pytest.approx(1000 * 11.5e-6 * 0.1, rel=1e-4)
     assert part["workpiece_cte_per_k"] == pytest.approx(1000 * 2 * 1e-6 / np.sqrt(3), rel=1e-4)
-    assert labels().units["workpiece_cte_per_k"] == "1/K"
+    assert UNITS["workpiece_cte_per_k"] == "1/K"
 
 
 def test_scale_and_workpiece_of_the_same_steel_expand_together() -> None:
