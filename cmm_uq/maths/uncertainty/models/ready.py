@@ -132,7 +132,9 @@ class ReadyBudget:
     @property
     def descriptions(self) -> Mapping[str, Text]:
         """The method, and further figures that it asks for."""
-        remarks: dict[str, Text] = {Verbatim(name): number(value, ".6g") for name, value in self.table.remarks().items()}
+        remarks: dict[str, Text] = {
+            Verbatim(name): number(value, ".6g") for name, value in self.table.remarks().items()
+        }
         return {say("Method"): self.table.meaning, **remarks}
 
     def evaluate(self, seed: int | None = None) -> Evaluation:
