@@ -39,14 +39,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 LONG = (
-    "documents/test_every_layout.py", "commands/test_verify_part_machine.py", "commands/test_verify_part.py",
-    "kinds/test_contract.py", "hostile/test_kills_and_collisions.py", "diagnosis/test_diagnosis.py",
-    "kinds/shift_plate/test_plane.py", "commands/test_new.py", "site/test_snippets.py", "commands/test_part.py",
-    "cli/test_ends.py", "commands/test_planning.py", "cli/test_outside_effect.py", "site/test_site.py",
-    "records/test_pending.py", "hostile/test_kernels.py", "serving/test_in_browser.py", "conformity/test_grid.py",
-    "commands/test_analysis.py",
+    "app/commands/test_verify_part.py", "app/commands/test_verify_part_machine.py", "app/commands/test_reissue.py",
+    "artefacts/test_contract.py", "test_one_verdict.py", "analysis/parts/test_zones.py", "certificate/test_one_page.py",
+    "site/test_site.py", "artefacts/test_certificate_figures.py", "hostile/test_kills_and_collisions.py",
+    "artefacts/shift_plate/test_plane.py", "site/test_notebooks.py", "certificate/diagnosis/test_overview.py",
+    "certificate/test_every_layout.py", "hostile/test_kernels.py", "app/commands/test_planning.py",
+    "app/cli/test_outside_effect.py", "certificate/test_compose.py", "app/commands/test_batch.py",
+    "laboratory/schedule/test_cluster.py", "app/commands/test_new.py", "laboratory/records/test_pending.py",
+    "app/commands/test_analysis.py", "app/cli/test_report.py", "analysis/diagnosis/test_diagnosis.py",
 )  # fmt: skip
-"""Files of twenty seconds and more: each runs on one core, so none is to be begun when the others are done."""
+"""Files that take longest, longest first: each runs on one core, so none is to be begun when the others are done."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -63,8 +65,8 @@ def pytest_make_collect_report(
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the files that take longest; those of a folder otherwise stay in their order, in every worker."""
-    long = {ROOT / "tests" / name for name in LONG}
-    items.sort(key=lambda item: (item.path not in long, item.path.parts))
+    first = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
+    items.sort(key=lambda item: (first.get(item.path, len(LONG)), item.path.parts))
 
 
 def pytest_collection_finish() -> None:
