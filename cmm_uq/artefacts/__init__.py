@@ -29,7 +29,6 @@ BUILT_IN: Mapping[str, str] = MappingProxyType({
 
 
 def names() -> tuple[str, ...]:
-    """Of all kinds, those of other packages last."""
     return (*BUILT_IN, *(plugin.name for plugin in _offered() if plugin.name not in BUILT_IN))
 
 
@@ -44,7 +43,6 @@ def kind_named(name: str) -> Kind | None:
 
 
 def kind_of(job: Job) -> Kind:
-    """The kind of a job."""
     return _known(job.facts.artefact.kind)
 
 

@@ -86,15 +86,12 @@ class Ballbar(Artefact):
 
     @property
     def set_up(self) -> Text:
-        """See :attr:`Artefact.set_up`."""
         return say("Position of the bar")
 
     def own_faults(self) -> Iterable[Effect]:
-        """See :meth:`Artefact.own_faults`: a bar has one length; that of each set-up by itself is the set-up's offset."""
         return (temperature_of(self._facts, self.points),)
 
     def lengths(self) -> Floats:
-        """Indicated lengths brought to 20 °C with the bar's stated expansion, (m,) mm."""
         bars = self._bars(self.points.xyz)
         return np.asarray(np.linalg.norm(bars, axis=1) / self.expansion, dtype=np.float64)
 
@@ -106,15 +103,12 @@ class Ballbar(Artefact):
         return Indications(self.lengths() - size.nominal, size.nominal * every, size.sd * every, self.rows)
 
     def ends(self) -> Floats:
-        """Both ends of each bar, (m, 2, 3) mm, in the recorded frame."""
         return np.asarray(self.points.xyz[self.rows], dtype=np.float64)
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
-        """See :meth:`Artefact.bidirectional`: distances of centres never are."""
         return np.zeros(len(rows), dtype=bool)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`: same middle, same direction, the bar's length."""
         bars = self._bars(true_xyz)
         half = 0.5 * bars / np.linalg.norm(bars, axis=1, keepdims=True) * (sizes[0] * self.expansion)[:, None]
         middle = true_xyz[self.rows].mean(axis=1)
@@ -123,7 +117,6 @@ class Ballbar(Artefact):
         return placed
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`: relative displacement of the ends along the bar."""
         relative = displacement[self.rows[:, 1]] - displacement[self.rows[:, 0]]
         return np.asarray(np.einsum("mi,mik->mk", self._directions(xyz), relative), dtype=np.float64)
 
@@ -191,7 +184,6 @@ _PARALLELS = (
 
 
 def ballbar(facts: ArtefactFacts, plan: PlanFacts) -> Pattern:
-    """Both balls."""
     half = 0.5 * planned_length(facts, plan)
     one = Pattern(np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]), np.array([1, 2]), np.ones(2, dtype=np.int64))
     return one.repeated(plan.repeats)

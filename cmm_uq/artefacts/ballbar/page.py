@@ -44,7 +44,6 @@ def figures(result: Result) -> BallbarFigures:
 
 
 def results(result: Result) -> dict[str, Any]:
-    """The same for results.json."""
     found = figures(result)
     return {
         "lengths": found.lengths.as_data(),
@@ -80,7 +79,6 @@ def _budget(result: Result, bar: Ballbar) -> Budget:
 
 
 def _second_way(result: Result, bar: Ballbar) -> DistanceSolution | Text:
-    """The distance equations of all used lengths, or why they have no solution."""
     size, ends, used = bar.sizes[0], bar.ends(), result.model.used
     if not size.certified:
         return say("The length of the bar is not certified.")
@@ -95,7 +93,6 @@ _ROWS_SHOWN = 60
 
 
 def sections(result: Result) -> list[Section]:
-    """Lengths by position, and residuals in the volume."""
     found, size = figures(result), result.artefact.sizes[0]
     lengths, name = found.lengths, (say("certified length") if size.certified else say("mean length"))
     deviations, residuals, expanded = lengths.deviation_um, lengths.residual_um, lengths.expanded_um

@@ -134,13 +134,11 @@ def _spread(places: Floats, count: int) -> list[int]:
 
 
 def swept_bar(setting: Setting) -> tuple[SetUp, ...]:
-    """As many swept positions as the plan's grid has points, all around the fixed ball."""
     count = setting.plan.number or setting.plan.grid[0] * setting.plan.grid[1]
     return swept(setting.volume, planned_length(setting.artefact, setting.plan), count, setting.plan.repeats)
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    """About the fixed ball of the start, or about the middle of the volume."""
     plan, centre = setting.plan, None if start is None else _centre(start.artefact)
     return swept(setting.volume, planned_length(setting.artefact, plan), plan.candidates, plan.repeats, centre)
 

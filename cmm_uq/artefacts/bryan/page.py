@@ -53,7 +53,6 @@ def _second_way(result: Result, bar: Bryan) -> DistanceSolution | Text:
 
 
 def results(result: Result) -> dict[str, Any]:
-    """The same for results.json."""
     found = figures(result)
     return {
         "lengths": found.lengths.as_data(),
@@ -69,7 +68,6 @@ IN_TWO_STEPS = say(
 
 
 def sections(result: Result) -> list[Section]:
-    """Distances by position, residuals in the volume, what to adjust."""
     found = figures(result)
     lengths = found.lengths
     deviations, residuals = lengths.deviation_um, lengths.residual_um

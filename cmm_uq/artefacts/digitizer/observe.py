@@ -89,19 +89,15 @@ class Centre:
         self.noise_scale: Floats = np.ones(3 * count)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """All at their mean."""
         return np.broadcast_to(true_xyz.mean(axis=0), true_xyz.shape).copy()
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """Every coordinate."""
         return displacement.reshape(3 * len(xyz), displacement.shape[2])
 
     def size_change(self) -> Floats:
-        """A centre has no size."""
         return np.zeros((len(self.rows), 0))
 
     def placing(self, xyz: Floats) -> Floats:
-        """Three coordinates in common."""
         return np.tile(np.eye(3), (len(xyz), 1))
 
 
@@ -150,21 +146,17 @@ class DigitizerArtefact(Artefact):
         self.sizes = (*self._offset_sizes(), *self.target.sizes, *self._set_up_sizes())
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`: where the mount was for the points to lie on one sphere."""
         own = len(self.target.sizes)
         carried = self._carried(sizes[:3]) + self._set_up @ sizes[3 + own :]
         return self.target.fit(true_xyz + carried, sizes[3 : 3 + own]) - carried
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`: away from the sphere's centre, or every coordinate."""
         return self.target.project(self._seen_at, displacement)
 
     def placing(self, xyz: Floats) -> Floats | Freedoms:
-        """See :meth:`Artefact.placing`: the place of the sphere."""
         return self.target.placing(self._seen_at)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`: of offset, sphere, and set-ups."""
         moved = np.concatenate([self.attitude, -self._set_up], axis=2)
         shown = self.target.project(self._seen_at, moved)
         return np.hstack([shown[:, :3], self.target.size_change(), shown[:, 3:]])
@@ -204,7 +196,6 @@ class DigitizerArtefact(Artefact):
         )
 
     def _set_up_sizes(self) -> tuple[Size, ...]:
-        """In the order of :attr:`_set_up`."""
         found = []
         for number in self.poses.numbers.tolist():
             if self.u_turn:

@@ -29,19 +29,14 @@ _SAME_ATTITUDE = 0.01  # degrees within which an attitude is one of the source's
 
 @dataclass(frozen=True, eq=False)
 class AttitudePose:
-    """One attitude, aligned by itself.
+    """One attitude, aligned by itself."""
 
-    ``measurement`` number; ``angles_deg`` (3,) α, β, γ; ``points`` recorded in it; ``reading_mm`` (3,) [D0 E0 F0];
-    ``off_um`` (3,) that reading minus the one that the result gives, µm; ``rms_um`` root mean square of its residuals,
-    µm; ``None`` where none of its observations are used.
-    """
-
-    measurement: int
-    angles_deg: Floats
-    points: int
-    reading_mm: Floats
-    off_um: Floats
-    rms_um: float | None
+    measurement: int  # number
+    angles_deg: Floats  # (3,) α, β, γ
+    points: int  # recorded in it
+    reading_mm: Floats  # (3,) [D0 E0 F0]
+    off_um: Floats  # (3,) that reading minus the one that the result gives, µm
+    rms_um: float | None  # root mean square of its residuals, µm; ``None`` where none of its observations are used
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +47,10 @@ class DigitizerFigures:
 
     @property
     def digitizer(self) -> DigitizerArtefact:
-        """With its recording."""
         return cast("DigitizerArtefact", self.result.artefact)
 
     @property
     def offset(self) -> tuple[Quantity, ...]:
-        """U1, V1, W1, mm."""
         return tuple(self.result.sizes[f"{name}_mm"] for name in OFFSET)
 
     @cached_property
@@ -87,7 +80,6 @@ class DigitizerFigures:
 
     @cached_property
     def poses(self) -> tuple[AttitudePose, ...]:
-        """Every attitude."""
         digitizer, found = self.digitizer, []
         offset = np.array([one.value for one in self.offset])
         used = self.result.model.used
@@ -143,7 +135,6 @@ MEANING = say("The mount lies at [U1 V1 W1] in the digitizer's frame u, v, w, wh
 
 
 def sections(result: Result) -> list[Section]:
-    """The offset, the attitudes, the residuals."""
     found = DigitizerFigures(result)
     offset = (_offset(found), *_assumed(found.digitizer), _two_ways(found))
     return [
@@ -172,7 +163,6 @@ def _offset(found: DigitizerFigures) -> Table:
 
 
 def _assumed(digitizer: DigitizerArtefact) -> list[Block]:
-    """What of the set-ups enters the uncertainty, and what does not."""
     known: list[Text] = []
     missing: list[Text] = []
     if digitizer.u_turn:

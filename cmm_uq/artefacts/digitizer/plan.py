@@ -170,7 +170,6 @@ def three_attitudes(setting: Setting) -> tuple[SetUp, ...]:
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    """None: the wrist has the attitudes that it has."""
     raise CmmUqError("the attitudes of a digitizer are those of its wrist, and none are searched for",
                      where="job.toml [plan] criterion", fix="Leave it out, or record further attitudes")  # fmt: skip
 

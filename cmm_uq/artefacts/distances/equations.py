@@ -101,23 +101,18 @@ PLACINGS: dict[Text, tuple[int, int, int]] = {
 
 @dataclass(frozen=True, eq=False)
 class DistanceSolution:
-    """What the distance equations say of a machine.
+    """What the distance equations say of a machine."""
 
-    ``e`` (6,) e1 … e6; ``covariance`` (6, 6) of them, from the residuals; ``residuals`` (m,) calibrated distance minus
-    the one that e1 … e6 make of the readings, mm; ``residual_sd`` mm; 0 without degrees of freedom;
-    ``relative_length_u`` relative standard uncertainty of the distance, where it is certified; 0 where it is taken as
-    known; ``bias`` (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not
-    taken off, and counts as a standard uncertainty; ``open_scales`` whether nothing says the distance, so that scales
-    are not determined.
-    """
-
-    e: Floats
-    covariance: Floats
-    residuals: Floats
-    residual_sd: float
+    e: Floats  # (6,) e1 … e6
+    covariance: Floats  # (6, 6) of them, from the residuals
+    residuals: Floats  # (m,) calibrated distance minus the one that e1 … e6 make of the readings, mm
+    residual_sd: float  # mm; 0 without degrees of freedom
+    # relative standard uncertainty of the distance, where it is certified; 0 where it is taken as known
     relative_length_u: float = 0.0
+    # (6,) what the way to the distances makes of the three scales, ppm, and squarenesses, ″; it is not taken off,
+    # and counts as a standard uncertainty
     bias: Floats = field(default_factory=lambda: np.zeros(UNKNOWNS))
-    open_scales: bool = False
+    open_scales: bool = False  # whether nothing says the distance, so that scales are not determined
 
     @property
     def scales_ppm(self) -> Floats:
@@ -200,7 +195,6 @@ class DistanceSolution:
 
 
 def second_way_data(second_way: DistanceSolution | Text, at_least: AtLeast) -> dict[str, Any]:
-    """A solution, or why there is none, and what its uncertainties are conditional on, for results.json."""
     if isinstance(second_way, str):
         return {"distance_equations": {"refused": second_way}}
     return {

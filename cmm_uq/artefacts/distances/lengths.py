@@ -29,21 +29,17 @@ from cmm_uq.maths.uncertainty.quantity import Quantity
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """Every recorded length, used or not.
+    """Every recorded length, used or not."""
 
-    ``measurement``, ``repeat`` (m,); ``length`` (m,) as indicated, at 20 °C, mm; ``reference`` that it is compared
-    with, mm; ``residual_um`` (m,) what the fitted model leaves, µm; ``expanded_um``, ``coverage_factor`` U of each for
-    the noise of its points, µm, and its k; ``used``, ``flagged`` (m,) whether the error factors rest on it, and whether
-    the screening found its measurement odd.
-    """
-
-    measurement: Ints
+    measurement: Ints  # measurement, repeat: (m,)
     repeat: Ints
-    length: Floats
-    reference: float
-    residual_um: Floats
-    expanded_um: float
+    length: Floats  # (m,) as indicated, at 20 °C, mm
+    reference: float  # that it is compared with, mm
+    residual_um: Floats  # (m,) what the fitted model leaves, µm
+    expanded_um: float  # expanded_um, coverage_factor: U of each for the noise of its points, µm, and its k
     coverage_factor: float
+    # used, flagged: (m,) whether the error factors rest on it, and whether the screening found its measurement
+    # odd
     used: NDArray[np.bool_]
     flagged: NDArray[np.bool_]
 
@@ -53,7 +49,6 @@ class Lengths:
         return np.asarray((self.length - self.reference) / MICROMETRE, dtype=np.float64)
 
     def as_data(self) -> dict[str, Any]:
-        """For results.json."""
         return {
             "reference_mm": self.reference,
             "U_um": self.expanded_um,
@@ -84,15 +79,11 @@ def lengths_of(result: Result, length: Floats, reference: float) -> Lengths:
 
 @dataclass(frozen=True)
 class Adjustment:
-    """One screw to turn.
+    """One screw to turn."""
 
-    ``effect`` error factor that it takes away; ``what`` what is turned or entered, and the sense of a positive figure;
-    ``axis`` whose guide or scale it is.
-    """
-
-    effect: str
-    what: Text
-    axis: str
+    effect: str  # error factor that it takes away
+    what: Text  # what is turned or entered, and the sense of a positive figure
+    axis: str  # whose guide or scale it is
 
 
 ADJUSTMENTS: Mapping[str, Adjustment] = MappingProxyType(
@@ -118,25 +109,20 @@ ANGLES: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True)
 class AdjustmentSetting:
-    """What to turn or enter on a machine.
+    """What to turn or enter on a machine."""
 
-    ``adjustment`` which screw; ``parameter`` of its effect that it takes away, a key with its unit; ``figure`` to set,
-    ppm or ″; ``over_travel`` what it moves at the far end of its axis, µm; ``None`` where the travel is not stated.
-    """
-
-    adjustment: Adjustment
-    parameter: str
-    figure: Quantity
+    adjustment: Adjustment  # which screw
+    parameter: str  # of its effect that it takes away, a key with its unit
+    figure: Quantity  # to set, ppm or ″
+    # what it moves at the far end of its axis, µm; ``None`` where the travel is not stated
     over_travel: Quantity | None
 
     @property
     def beyond_doubt(self) -> bool:
-        """Whether the 95 % interval does not contain zero."""
         low, high = self.figure.interval95
         return not low <= 0 <= high
 
     def as_data(self) -> dict[str, Any]:
-        """For results.json."""
         return {
             "effect": self.adjustment.effect, "what": self.adjustment.what, self.parameter: quantity_data(self.figure),
             "over_travel_um": None if self.over_travel is None else quantity_data(self.over_travel),

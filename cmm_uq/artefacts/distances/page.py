@@ -15,7 +15,6 @@ from cmm_uq.maths.uncertainty.quantity import rounded
 def section(
     result: Result, settings: tuple[AdjustmentSetting, ...], second_way: DistanceSolution | Text, *remarks: Text
 ) -> Section:
-    """What to turn or enter, by the fitted model; beside it the six factors by the distance equations."""
     blocks = [*_adjustments(settings), *_second_way(result, second_way, remarks)]
     return Section(say("The adjustment that the machine needs"), tuple(blocks), opinion=True)
 
@@ -101,7 +100,6 @@ def _second_way(result: Result, solution: DistanceSolution | Text, remarks: tupl
 
 
 def _why_they_differ(solution: DistanceSolution) -> Text:
-    """What an uncertainty of the distance equations is conditional on, and that of the fitted model is not."""
     if solution.relative_length_u:
         return say(
             "Distance equations: U from their residuals and from the certified length, conditional on white noise; k of "

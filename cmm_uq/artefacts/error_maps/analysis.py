@@ -19,20 +19,15 @@ from cmm_uq.maths.inference.ensembles import Progress
 
 @dataclass(frozen=True, eq=False)
 class MapsDiagnosed:
-    """A job of error maps with its diagnosis.
+    """A job of error maps with its diagnosis."""
 
-    ``job`` what was read; ``maps`` its error maps, in the order in which it names them; ``findings`` what is odd among
-    the maps' figures; ``diagnosis`` what changes with temperature, and which maps contradict the others.
-    """
-
-    job: Job
-    maps: tuple[ErrorMap, ...]
-    findings: tuple[Finding, ...]
-    diagnosis: MapsDiagnosis
+    job: Job  # what was read
+    maps: tuple[ErrorMap, ...]  # its error maps, in the order in which it names them
+    findings: tuple[Finding, ...]  # what is odd among the maps' figures
+    diagnosis: MapsDiagnosis  # what changes with temperature, and which maps contradict the others
 
 
 def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress | None = None) -> MapsDiagnosed:
-    """Diagnose a set of error maps."""
     maps, columns, findings = compared_maps(job)
     findings += squareness_findings(maps)
     found = diagnose_maps(columns, job.facts.model.effects, alpha=alpha, seed=seed, progress=progress)
@@ -40,7 +35,6 @@ def diagnose_error_maps(job: Job, *, seed: int, alpha: float, progress: Progress
 
 
 def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list[Finding]]:
-    """Error maps of a job, what they have in common, and what is odd among that."""
     maps = maps_of(job)
     if len(maps) < 2:
         raise CmmUqError("one error map has nothing to be compared with", where=WHERE,
@@ -61,5 +55,4 @@ def compared_maps(job: Job) -> tuple[tuple[ErrorMap, ...], list[MapColumn], list
 
 
 def refuse_unfit(job: Job) -> None:
-    """Refuse error maps that cannot be compared; see :func:`compared_maps`."""
     compared_maps(job)

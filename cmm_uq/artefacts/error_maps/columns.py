@@ -24,26 +24,20 @@ _TURNED = 0.3  # part of the misfit that is left when a column with the wrong si
 
 @dataclass(frozen=True, eq=False)
 class MapColumn:
-    """One error of one carriage in k maps, at the p positions that they share.
+    """One error of one carriage in k maps, at the p positions that they share."""
 
-    ``axis`` the carriage; ``component`` 0 … 5: displacements along x, y, z, rotations about x, y, z; ``positions`` (p,)
-    mm; ``values`` (k, p) mm; of rotations the displacement at a lever of one metre; ``temperatures`` (k,) °C.
-    """
-
-    axis: str
-    component: int
-    positions: Floats
-    values: Floats
-    temperatures: Floats
+    axis: str  # the carriage
+    component: int  # 0 … 5: displacements along x, y, z, rotations about x, y, z
+    positions: Floats  # (p,) mm
+    values: Floats  # (k, p) mm; of rotations the displacement at a lever of one metre
+    temperatures: Floats  # (k,) °C
 
     @property
     def title(self) -> Text:
-        """In words."""
         return title_of(self.axis, self.component)
 
     @property
     def is_scale(self) -> bool:
-        """Whether it is the displacement along the carriage's own axis."""
         return AXES[self.component % 3] == self.axis and self.component < 3
 
     @property
@@ -71,14 +65,11 @@ def title_of(axis: str, component: int) -> Text:
 
 @dataclass(frozen=True, eq=False)
 class _Looked:
-    """One error of one carriage as it stands in all maps: what of it can be compared, and what is odd.
-
-    ``column`` is ``None`` where too little is left; ``copied`` are the groups of maps with the same figures.
-    """
+    """One error of one carriage as it stands in all maps: what of it can be compared, and what is odd."""
 
     title: Text
-    column: MapColumn | None
-    copied: tuple[tuple[int, ...], ...]
+    column: MapColumn | None  # is ``None`` where too little is left
+    copied: tuple[tuple[int, ...], ...]  # are the groups of maps with the same figures
     findings: tuple[Finding, ...]
     measured: bool
 

@@ -39,7 +39,6 @@ def copies(values: Floats, unit: float) -> list[tuple[int, ...]]:
 
 
 def _same(one: Floats, other: Floats, unit: float) -> bool:
-    """Whether two courses (p,) are one."""
     apart = one - other
     if np.ptp(apart) <= _LAST_DIGIT:
         return True
@@ -57,7 +56,6 @@ def _no_coincidence(readings: Floats) -> bool:
 
 
 def _digits(course: Floats, unit: float) -> int:
-    """After the point of the figures of a course (p,), as far as any of them needs."""
     figures = course / unit
     enough = (n for n in _DIGITS if np.all(np.abs(figures * 10**n - np.round(figures * 10**n)) < _EXACT * 10**n))
     return next(enough, _DIGITS.stop)

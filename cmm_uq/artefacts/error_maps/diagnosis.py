@@ -27,27 +27,21 @@ _NAMED = 0.05  # probability from which another explanation is named
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """How the maps of one error differ beyond any known effect.
+    """How the maps of one error differ beyond any known effect."""
 
-    ``column`` the error; ``rival`` the explanation in words, with the map that differs if one does; ``probability`` of
-    it; ``instead`` others that could stand in its place; ``maps`` numbers of the maps that it, or one of those, has
-    differ from the others, from 0 as their temperatures; ``region`` of the position, mm, where it exceeds half its
-    largest value and its band does not hold zero; ``p_value`` of "these maps differ by noise alone", corrected for all
-    errors that were compared; ``amplitude`` largest value, in the column's unit; ``curve`` position in mm, difference
-    and its standard uncertainty in the column's unit, each (p,); ``turned`` whether the map would agree if its sign
-    were turned.
-    """
-
-    column: MapColumn
-    rival: CandidateCause
-    probability: float
-    instead: tuple[Text, ...]
+    column: MapColumn  # the error
+    rival: CandidateCause  # the explanation in words, with the map that differs if one does
+    probability: float  # of it
+    instead: tuple[Text, ...]  # others that could stand in its place
+    # numbers of the maps that it, or one of those, has differ from the others, from 0 as their temperatures
     maps: frozenset[int]
+    # of the position, mm, where it exceeds half its largest value and its band does not hold zero
     region: tuple[float, float]
-    p_value: float
-    amplitude: float
+    p_value: float  # of "these maps differ by noise alone", corrected for all errors that were compared
+    amplitude: float  # largest value, in the column's unit
+    # position in mm, difference and its standard uncertainty in the column's unit, each (p,)
     curve: tuple[Floats, Floats, Floats]
-    turned: bool
+    turned: bool  # whether the map would agree if its sign were turned
 
     @property
     def amplitude_um(self) -> float:
@@ -57,25 +51,19 @@ class Difference:
 
 @dataclass(frozen=True, eq=False)
 class MapsDiagnosis:
-    """See the module's docstring.
+    """See the module's docstring."""
 
-    ``verdict`` ``consistent``, ``explained``, ``partial`` or ``unexplained``; ``p_value``, ``alpha`` of "the maps
-    differ by noise alone", and the rate of false alarms asked for; ``comparisons`` every error that was compared;
-    ``effects`` what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ;
-    ``differences`` beyond them, the most significant first; ``displacement``, ``rotation`` noise of a reading, µm and
-    ″; ``None`` where no such error was compared; ``improvement`` parts of the travel predicted from the rest; a
-    rotation counts as µm at one metre.
-    """
-
-    verdict: str
-    p_value: float
+    verdict: str  # ``consistent``, ``explained``, ``partial`` or ``unexplained``
+    p_value: float  # p_value, alpha: of "the maps differ by noise alone", and the rate of false alarms asked for
     alpha: float
-    comparisons: tuple[ColumnComparison, ...]
+    comparisons: tuple[ColumnComparison, ...]  # every error that was compared
+    # what is asserted, most probable first; ``explained`` is the part of how the maps of this error differ
     effects: tuple[OmittedEffect, ...]
-    differences: tuple[Difference, ...]
+    differences: tuple[Difference, ...]  # beyond them, the most significant first
+    # displacement, rotation: noise of a reading, µm and ″; ``None`` where no such error was compared
     displacement: Quantity | None
     rotation: Quantity | None
-    improvement: Improvement
+    improvement: Improvement  # parts of the travel predicted from the rest; a rotation counts as µm at one metre
 
     def p_of(self, compared: ColumnComparison) -> float:
         """Of "these maps differ by noise alone" for one error, corrected for all that were compared."""
@@ -90,7 +78,6 @@ def diagnose_maps(
     seed: int,
     progress: Progress | None = None,
 ) -> MapsDiagnosis:
-    """Diagnose what error maps of one machine have in common and where they differ."""
     comparisons, effects, differences = [], [], []
     for i, column in enumerate(columns):
         compared = column_comparison(column, named, seed)
@@ -152,7 +139,6 @@ def _difference(compared: ColumnComparison, index: int, p_value: float) -> Diffe
 
 
 def _improvement(comparisons: Sequence[ColumnComparison], alpha: float) -> Improvement:
-    """Over all columns, with what was found in those that differ."""
     rms: list[list[Floats]] = [[], [], [], []]
     gains = [np.zeros(0)]
     for compared in comparisons:

@@ -126,7 +126,6 @@ def squareness_data(maps: Sequence[ErrorMap]) -> list[dict[str, float]]:
 
 
 def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
-    """Maps with all three figures the same: they were measured once."""
     if not _stated(maps):
         return []
     same: dict[tuple[float, ...], list[float]] = {}
@@ -149,7 +148,6 @@ def squareness_findings(maps: Sequence[ErrorMap]) -> list[Finding]:
 
 
 def squareness_sections(maps: Sequence[ErrorMap]) -> tuple[Section, ...]:
-    """The figures as a section of the page; none where no map states any."""
     if not _stated(maps):
         return ()
     ordered = _by_temperature(maps)
@@ -212,7 +210,6 @@ def expansion(compared: ColumnComparison, index: int) -> Floats:
 
 
 def _weighted(compared: ColumnComparison, index: int) -> Iterator[Normals]:
-    """Of each combination with each kind of noise, weighted by their probability."""
     linear = [_linear(compared, index, size) for size in _SIZES_PPM]
     for key, probability in compared.combinations.probability.items():
         if index not in key or probability < _FOLLOWED:

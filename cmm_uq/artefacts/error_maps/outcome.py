@@ -11,7 +11,6 @@ from cmm_uq.certificate.plots.style import lettered_in
 
 
 def outcome(found: MapsDiagnosed, seed: int) -> Outcome:
-    """What there is to write of it."""
     verdict = found.diagnosis.verdict
     short = summary_of(found.job.facts, verdict, told(found), found.findings)
     with lettered_in(found.job.facts.job.language):

@@ -25,7 +25,6 @@ _SHOWN = 3  # differences that are told; the page has all
 
 
 def overview_of(found: MapsDiagnosed) -> Overview:
-    """The overview of a diagnosis of error maps."""
     d = found.diagnosis
     rows = (
         (say("Found"), _found(d)), (say("Where"), _where(d)), (say("How sure"), _sure(d)),
@@ -35,7 +34,6 @@ def overview_of(found: MapsDiagnosed) -> Overview:
 
 
 def told(found: MapsDiagnosed) -> list[Text]:
-    """Verdict, the overview and what else follows, a sentence or two each."""
     d = found.diagnosis
     said: list[Text] = [VERDICTS[d.verdict]]
     said += [say("{label}: {text}", label=label, text=text) for label, text in overview_of(found).rows]

@@ -23,7 +23,6 @@ from cmm_uq.certificate.wording import probability
 
 
 def maps_results(found: MapsDiagnosed, seed: int) -> dict[str, Any]:
-    """results.json of a diagnosis of error maps."""
     d, noise = found.diagnosis, found.diagnosis.displacement
     squareness = squareness_data(found.maps)
     nothing = {"value": None, "u": None, "interval95": None}
@@ -94,7 +93,6 @@ _PICTURES = 3
 
 
 def maps_document(found: MapsDiagnosed, seed: int) -> Document:
-    """The page of a diagnosis of error maps."""
     facts, d = found.job.facts, found.diagnosis
     maps = lines(
         say("{file}, {temperature_c:g} °C", file=Verbatim(given.file), temperature_c=given.temperature_c)

@@ -37,18 +37,14 @@ _WHITE, _CORRELATIONS = 0.5, (0.4, 0.6, 0.8, 0.9)
 
 @dataclass(frozen=True, eq=False)
 class CandidateCause:
-    """An explanation of how the maps of a column differ: over the maps (k,), and over position (p, r) mm.
-
-    ``map`` is the one that differs, if one does; ``effect`` the effect's name, if it is one;
-    ``short`` its name beside the column's.
-    """
+    """An explanation of how the maps of a column differ: over the maps (k,), and over position (p, r) mm."""
 
     name: Text
-    short: Text
+    short: Text  # its name beside the column's
     over_maps: Floats
     functions: tuple[Floats, ...]
-    map: int | None = None
-    effect: str | None = None
+    map: int | None = None  # is the one that differs, if one does
+    effect: str | None = None  # the effect's name, if it is one
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +53,12 @@ class ColumnComparison:
 
     The observations are the k − 1 orthonormal contrasts between the maps at each position: the function that they share is
     gone, and white noise is white still.
-
-    ``column`` what is compared; ``rivals`` that compete for how the maps differ; ``given`` what the job knows of how
-    they differ; of any size; ``seed`` of the null distribution and the draws.
     """
 
-    column: MapColumn
-    rivals: tuple[CandidateCause, ...]
-    given: tuple[CandidateCause, ...]
-    seed: int
+    column: MapColumn  # what is compared
+    rivals: tuple[CandidateCause, ...]  # that compete for how the maps differ
+    given: tuple[CandidateCause, ...]  # what the job knows of how they differ; of any size
+    seed: int  # of the null distribution and the draws
 
     @cached_property
     def contrasts(self) -> Floats:
@@ -93,7 +86,6 @@ class ColumnComparison:
 
     @cached_property
     def comparison(self) -> CandidateComparison:
-        """All rivals."""
         m, p = len(self.observed), len(self.column.positions)
         rough = roughness(self.column)
         Q = linalg.orth(self.baseline / np.linalg.norm(self.baseline, axis=0).clip(1e-300))
@@ -116,23 +108,19 @@ class ColumnComparison:
 
     @cached_property
     def p_value(self) -> float:
-        """Of "these maps differ by noise alone"."""
         return lack_of_fit(self.comparison, self.seed)[0]
 
     @cached_property
     def combinations(self) -> Combinations:
-        """Of rivals, with their probabilities."""
         return explore(self.comparison)
 
     @cached_property
     def best(self) -> Key:
-        """The most probable combination of rivals."""
         probability = self.combinations.probability
         return max(probability, key=lambda key: probability[key])
 
     @cached_property
     def versions(self) -> tuple[Version, ...]:
-        """Of the most probable combination, the sizes at their best."""
         return self.combinations.by_key[self.best].versions
 
     @cached_property
@@ -161,7 +149,6 @@ class ColumnComparison:
 
 
 def column_comparison(column: MapColumn, named: Sequence[str], seed: int) -> ColumnComparison:
-    """The rivals for how the maps of a column differ."""
     rivals: list[CandidateCause] = []
     given: list[CandidateCause] = []
     place, temperatures = column.positions, column.temperatures

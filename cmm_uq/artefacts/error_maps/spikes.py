@@ -91,21 +91,17 @@ def _finest(values: Floats, unit: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """The readings beside each of p readings.
-
-    ``index`` (p, 2·side) says which, those before first; ``there`` whether they are; ``slopes`` (p, 2·side) which
-    of the p − 1 steps lie about the reading, ``steps`` whether they are there.
-    """
+    """The readings beside each of p readings."""
 
     positions: Floats
-    index: NDArray[np.intp]
-    there: NDArray[np.bool_]
+    index: NDArray[np.intp]  # (p, 2·side) says which, those before first
+    there: NDArray[np.bool_]  # whether they are
+    # (p, 2·side) which of the p − 1 steps lie about the reading, ``steps`` whether they are there
     slopes: NDArray[np.intp]
     steps: NDArray[np.bool_]
 
     @classmethod
     def of(cls, positions: Floats, side: int) -> _Beside:
-        """So many on either side of these positions."""
         p = len(positions)
         about = np.concatenate([np.arange(-side, 0), np.arange(1, side + 1)])
         index = np.arange(p)[:, None] + about

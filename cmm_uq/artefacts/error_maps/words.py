@@ -20,7 +20,6 @@ VERDICTS: Mapping[str, Text] = {
 
 
 def difference_words(difference: Difference) -> Text:
-    """Where maps differ, by how much, and which of them it may be."""
     rival = difference.rival
     low, high = difference.region
     size = say(
@@ -48,7 +47,6 @@ def difference_words(difference: Difference) -> Text:
 
 
 def noise_words(d: MapsDiagnosis) -> list[Text]:
-    """Scatter of a reading about smooth functions."""
     found: list[Text] = []
     for what, noise in ((say("displacement"), d.displacement), (say("rotation"), d.rotation)):
         if noise is not None:
@@ -68,7 +66,6 @@ def noise_words(d: MapsDiagnosis) -> list[Text]:
 
 
 def next_words(d: MapsDiagnosis) -> list[tuple[tuple[Text, ...], Text]]:
-    """What to measure next, once for each error: explanations that it would part, and in words."""
     found: list[tuple[tuple[Text, ...], Text]] = []
     for title in dict.fromkeys(difference.column.title for difference in d.differences):
         some = [difference for difference in d.differences if difference.column.title == title]

@@ -42,31 +42,23 @@ class Periodic:
 
 @dataclass(frozen=True, eq=False)
 class GaugeLine:
-    """One measurement of a gauge.
+    """One measurement of a gauge."""
 
-    ``measurement`` its number; ``direction`` (3,) unit vector, in the sense of growing distances; ``middle`` (3,) in
-    the recorded frame, mm; ``length`` from its first to its farthest face, by the certificate, mm; ``faces`` different
-    ones; ``scale_ppm`` slope of deviation over distance; ``scale_weights`` (n,) of all observations, mm, in
-    ``scale_ppm``; ``linearity`` largest deviation from that slope, of the mean of each face, mm; ``gap`` mean
-    difference of faces reached from both sides, outward minus inward, mm; ``None`` when there are none; ``gap_weights``
-    (n,) of all observations in ``gap``; ``periodic`` the periodic part, where there is one.
-    """
-
-    measurement: int
-    direction: Floats
-    middle: Floats
-    length: float
-    faces: int
-    scale_ppm: float
-    scale_weights: Floats
-    linearity: float
+    measurement: int  # its number
+    direction: Floats  # (3,) unit vector, in the sense of growing distances
+    middle: Floats  # (3,) in the recorded frame, mm
+    length: float  # from its first to its farthest face, by the certificate, mm
+    faces: int  # different ones
+    scale_ppm: float  # slope of deviation over distance
+    scale_weights: Floats  # (n,) of all observations, mm, in ``scale_ppm``
+    linearity: float  # largest deviation from that slope, of the mean of each face, mm
+    # mean difference of faces reached from both sides, outward minus inward, mm; ``None`` when there are none
     gap: float | None
-    gap_weights: Floats
-    periodic: Periodic | None
+    gap_weights: Floats  # (n,) of all observations in ``gap``
+    periodic: Periodic | None  # the periodic part, where there is one
 
 
 def lines_of(gauge: StepGauge) -> tuple[GaugeLine, ...]:
-    """Every line of a recording, by its measurement."""
     found, deviations, directions = [], gauge.deviations(), gauge.directions()
     reversals = gauge.reversals()
     for number in np.unique(gauge.measurement):
@@ -126,21 +118,16 @@ _DRAWS = 2000  # of the sizes of the noise, over which a line's uncertainties ar
 
 @dataclass(frozen=True, eq=False)
 class LineFigures:
-    """One line with what the noise and the certificate leave uncertain of it.
+    """One line with what the noise and the certificate leave uncertain of it."""
 
-    ``line`` as recorded; ``position`` in words; ``share`` of the travel along it; ``None`` where no travel is stated;
-    ``scale_u_ppm``, ``scale_factor`` standard uncertainty of the slope, and k for 95 %; ``gap_u_um``, ``gap_factor`` of
-    the bidirectional error; ``None`` without one; ``at_least`` raises a U that a certificate does not state.
-    """
-
-    line: GaugeLine
-    position: Text
-    share: float | None
-    scale_u_ppm: float
+    line: GaugeLine  # as recorded
+    position: Text  # in words
+    share: float | None  # of the travel along it; ``None`` where no travel is stated
+    scale_u_ppm: float  # scale_u_ppm, scale_factor: standard uncertainty of the slope, and k for 95 %
     scale_factor: float
-    gap_u_um: float | None
+    gap_u_um: float | None  # gap_u_um, gap_factor: of the bidirectional error; ``None`` without one
     gap_factor: float
-    at_least: AtLeast
+    at_least: AtLeast  # raises a U that a certificate does not state
 
     @property
     def expanded_scale_ppm(self) -> tuple[float, float]:
@@ -160,7 +147,6 @@ class LineFigures:
         return self.share is not None and self.share < ISO_10360_2.least_share
 
     def as_data(self) -> dict[str, Any]:
-        """For results.json."""
         line, periodic = self.line, self.line.periodic
         return {
             "measurement": line.measurement,
@@ -229,6 +215,5 @@ def figures(result: Result) -> GaugeFigures:
 
 
 def results(result: Result) -> dict[str, Any]:
-    """The same for results.json."""
     found = figures(result)
     return {"lines": [line.as_data() for line in found.lines], "positions_not_measured": list(found.missing)}

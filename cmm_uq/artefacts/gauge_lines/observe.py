@@ -124,16 +124,12 @@ _SAME_FACE = 1e-6  # mm; certified distances closer than this belong to one face
 
 @dataclass(frozen=True, eq=False)
 class Reversals:
-    """Faces reached from both sides.
+    """Faces reached from both sides."""
 
-    ``measurement`` (p,) of each such face; ``reference`` (p,) its certified distance, mm; ``gap`` (p,) found when
-    travelling away from the first face minus when travelling towards it, mm; ``weights`` (n,) of every observation in
-    the gap of its face; 0 of a face that was not reached from both sides.
-    """
-
-    measurement: Ints
-    reference: Floats
-    gap: Floats
+    measurement: Ints  # (p,) of each such face
+    reference: Floats  # (p,) its certified distance, mm
+    gap: Floats  # (p,) found when travelling away from the first face minus when travelling towards it, mm
+    # (n,) of every observation in the gap of its face; 0 of a face that was not reached from both sides
     weights: Floats
 
 
@@ -181,34 +177,28 @@ class StepGauge(Artefact):
             )[:, 0]
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`: every point moved along its line to its certified distance."""
         directions = self.directions(true_xyz)
         gap = self._distances(sizes[0]) - np.einsum("ni,ni->n", true_xyz, directions)
         return np.asarray(true_xyz + (gap - self._lines.means(gap))[:, None] * directions, dtype=np.float64)
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`: displacement along the line."""
         return np.asarray(np.einsum("ni,nik->nk", self.directions(xyz), displacement), dtype=np.float64)
 
     def own_faults(self) -> Iterable[Effect]:
-        """See :meth:`Artefact.own_faults`: along its line."""
         places = np.column_stack([self.reference, np.zeros((len(self.reference), 2))])
         body = Body.of(self.points, places, ("reference_mm",))
         known = by_certificate(self.certificate.u_um(self.sizes[0].sd), _LAPPED_UM)
         return faults(self._facts, self.points, body, known, axes=1, geometry=ALONG_A_LINE)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`: in proportion to the distance, or as its uncertainty grows with it."""
         if self.certificate.plain:
             return np.asarray((self.reference * self.expansion / self.sizes[0].nominal)[:, None], dtype=np.float64)
         return np.asarray((self._together * self.expansion)[:, None], dtype=np.float64)
 
     def placing(self, xyz: Floats) -> Freedoms:
-        """See :meth:`Artefact.placing`: the position along each line."""
         return self._lines.columns(np.ones((len(xyz), 1)))
 
     def calibration(self) -> Cause | None:
-        """See :meth:`Artefact.calibration`: of each face."""
         change = self.size_change()[:, 0]
         return self.certificate.beyond(self.sizes[0], *self._ends_of_longest, change, self.expansion)
 
@@ -237,7 +227,6 @@ class StepGauge(Artefact):
         return self._lines.means(self.points.xyz)[rows[:, 1]], self.directions()[rows[:, 1]]
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_] | None:
-        """See :meth:`Artefact.bidirectional`: by the senses of travel."""
         sense = self.approach()
         return None if sense is None else np.asarray(sense[rows[:, 0]] * sense[rows[:, 1]] < 0)
 
@@ -323,7 +312,6 @@ class GaugeBlocks(StepGauge):
     title = say("Gauge blocks")
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
-        """See :meth:`Artefact.bidirectional`: the faces of a block look away from each other."""
         return np.ones(len(rows), dtype=bool)
 
 

@@ -21,7 +21,6 @@ from cmm_uq.maths.uncertainty.quantity import rounded
 
 
 def sections(result: Result) -> list[Section]:
-    """Deviations by distance, each line by itself, positions by ISO 10360-2, residuals in the volume."""
     gauge = cast("StepGauge", result.artefact)
     found = figures(result)
     blocks: list[Block] = [_plot(result, gauge), _table(result, found.lines)]
@@ -137,7 +136,6 @@ def _periodic(lines: tuple[LineFigures, ...]) -> list[Block]:
 
 
 def _positions(found: GaugeFigures) -> list[Block]:
-    """Which of the seven positions of ISO 10360-2 are there, and long enough."""
     short = [
         say("line {measurement} ({share:.0f} %)", measurement=one.line.measurement, share=100 * one.share)
         for one in found.lines

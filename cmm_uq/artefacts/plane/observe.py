@@ -40,17 +40,13 @@ _ON_A_LINE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class ProbedPlane:
-    """One plane of a recording.
+    """One plane of a recording."""
 
-    ``measurement`` its number; ``count`` points of contact; ``flatness`` range of the distances from the least-squares
-    plane, mm; ``None`` of three points, which have none; ``surface`` the plane moved by the probe's offset; ``None``
-    without offset.
-    """
-
-    measurement: int
-    count: int
+    measurement: int  # its number
+    count: int  # points of contact
+    # range of the distances from the least-squares plane, mm; ``None`` of three points, which have none
     flatness: float | None
-    surface: OffsetPlane | None
+    surface: OffsetPlane | None  # the plane moved by the probe's offset; ``None`` without offset
 
 
 class PlaneSurface(Artefact):
@@ -79,7 +75,6 @@ class PlaneSurface(Artefact):
             self._refuse_no_side(self.offset, where)
 
     def fit(self, true_xyz: Floats, sizes: Floats) -> Floats:
-        """See :meth:`Artefact.fit`: points of contact dropped on their least-squares plane; direction points stay."""
         contact = self.rows[:, 0]
         touched = true_xyz[contact]
         normals = self._axes(touched)[:, :, 0]
@@ -89,24 +84,20 @@ class PlaneSurface(Artefact):
         return placed
 
     def project(self, xyz: Floats, displacement: Floats) -> Floats:
-        """See :meth:`Artefact.project`: displacement along the normal."""
         contact = self.rows[:, 0]
         normals = self._axes(xyz[contact])[:, :, 0]
         return np.asarray(np.einsum("ni,nik->nk", normals, displacement[contact]), dtype=np.float64)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`: a plane has no size."""
         return np.zeros((len(self.rows), 0))
 
     def placing(self, xyz: Floats) -> Freedoms:
-        """See :meth:`Artefact.placing`: height and two tilts of each plane."""
         touched = xyz[self.rows[:, 0]]
         about = touched - self.placings.means(touched)
         across = np.einsum("ni,nij->nj", about, self._axes(touched)[:, :, 1:])
         return self.placings.columns(np.column_stack([np.ones(len(touched)), across]))
 
     def unread(self) -> NDArray[np.bool_]:
-        """See :meth:`Artefact.unread`: along the normal."""
         touched = self.points.xyz[self.rows[:, 0]]
         return self.placings.unread(touched, self._axes(touched)[:, :, :1])[:, 0]
 
@@ -138,7 +129,6 @@ class PlaneSurface(Artefact):
         )  # fmt: skip
 
     def _ahead(self, number: int) -> Ints:
-        """Rows of the direction points of a measurement."""
         points = self.points
         return np.flatnonzero((points.measurement == number) & (points.point == DIRECTION_POINT))
 

@@ -33,11 +33,9 @@ class PlaneFigures:
 
     @property
     def surface(self) -> SurfaceFigures | None:
-        """Of the compensated surface, where there is one."""
         return None if self.probed.surface is None else SurfaceFigures(self.probed.surface, self.coverage_factor)
 
     def as_data(self) -> dict[str, Any]:
-        """For results.json."""
         surface = self.surface
         return {
             "measurement": self.probed.measurement, "points": self.probed.count, "flatness_um": self.flatness_um,
@@ -65,11 +63,9 @@ class SurfaceFigures:
 
     @property
     def angle_deg(self) -> float:
-        """Between the normal and the direction of approach, degrees."""
         return float(np.degrees(self.surface.angle))
 
     def as_data(self) -> dict[str, Any]:
-        """For results.json."""
         surface = self.surface
         return {
             "point_mm": surface.point.tolist(), "normal": surface.normal.tolist(),
@@ -88,7 +84,6 @@ def figures(result: Result) -> tuple[PlaneFigures, ...]:
 
 
 def results(result: Result) -> dict[str, Any]:
-    """The same for results.json."""
     return {"planes": [one.as_data() for one in figures(result)]}
 
 
@@ -98,7 +93,6 @@ def off_plane_um(plane: PlaneSurface) -> Floats:
 
 
 def sections(result: Result) -> list[Section]:
-    """Flatness and surface of each plane, deviations by point, residuals in the volume."""
     plane = cast("PlaneSurface", result.artefact)
     probed = figures(result)
     blocks: list[Block] = [_flatness(result, probed), _by_point(result, plane), residual_volume(result, say("points"))]

@@ -90,13 +90,11 @@ class Plate(Rigid):
         self._refuse_another_plate(where)
 
     def shape(self, sizes: Floats) -> Floats:
-        """See :meth:`Rigid.shape`: all positions in proportion."""
         if self.certificate.plain:
             return np.asarray(self.body * (sizes[0] / self.sizes[0].nominal), dtype=np.float64)
         return np.asarray(self.body + (sizes[0] - self.sizes[0].nominal) * self._together, dtype=np.float64)
 
     def own_faults(self) -> Iterable[Effect]:
-        """See :meth:`Artefact.own_faults`: by its certificate; without one as holes are drilled."""
         earlier = NOISE_RATIO in self.points.columns
         body = Body.of(self.points, self.reference, () if earlier else REFERENCES)
         known = (
@@ -107,18 +105,15 @@ class Plate(Rigid):
         return faults(self._facts, self.points, body, known)
 
     def size_change(self) -> Floats:
-        """See :meth:`Artefact.size_change`: away from the middle of each placing, in proportion."""
         return self._together.reshape(-1, 1)
 
     def unread(self) -> NDArray[np.bool_]:
-        """See :meth:`Artefact.unread`; of two dates, what stood still on the earlier one is no difference either."""
         found = super().unread()
         if NOISE_RATIO in self.points.columns:
             found |= self.placings.still(self.reference).ravel()
         return found
 
     def calibration(self) -> Cause | None:
-        """See :meth:`Artefact.calibration`: of each ball; of two dates nothing is certified that both do not have."""
         if NOISE_RATIO in self.points.columns:
             return None
         return self.certificate.beyond(self.sizes[0], *self._ends, self.size_change()[:, 0], self.expansion)
@@ -142,7 +137,6 @@ class Plate(Rigid):
         return Indications(np.concatenate(found) - lengths, lengths, u, rows)
 
     def bidirectional(self, rows: Ints) -> NDArray[np.bool_]:
-        """See :meth:`Artefact.bidirectional`: distances of centres never are."""
         return np.zeros(len(rows), dtype=bool)
 
     def _refuse_another_plate(self, where: str | None) -> None:
@@ -161,7 +155,6 @@ class Plate(Rigid):
 
 
 def shape_of(facts: ArtefactFacts, points: Points) -> ArtefactShape | None:
-    """Placings of the plate; ``None`` without references."""
     if any(name not in points.columns for name in REFERENCES):
         return None
     reference = np.column_stack([points.columns[name] for name in REFERENCES])

@@ -39,16 +39,12 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Arrows:
-    """Balls of one placing in the plane of the plate, repeats averaged.
+    """Balls of one placing in the plane of the plate, repeats averaged."""
 
-    ``measurement`` its number; ``axes`` (2,) of the plate, that the plane is spanned by; ``place`` (b, 2) reference
-    positions, mm; ``before``, ``after`` (b, 2) displacements, µm.
-    """
-
-    measurement: int
-    axes: tuple[int, int]
-    place: Floats
-    before: Floats
+    measurement: int  # its number
+    axes: tuple[int, int]  # (2,) of the plate, that the plane is spanned by
+    place: Floats  # (b, 2) reference positions, mm
+    before: Floats  # before, after: (b, 2) displacements, µm
     after: Floats
 
 
@@ -115,7 +111,6 @@ def arrows(plate: Plate, found: PlateFigures, number: int) -> Arrows:
 
 
 def results(result: Result) -> dict[str, Any]:
-    """The same for results.json."""
     found = figures(result)
     data: dict[str, Any] = {
         "placings": [
@@ -151,7 +146,6 @@ _COMPARED = (say("What changed between the two dates"), say("Now minus then"), s
 
 
 def sections(result: Result) -> list[Section]:
-    """Every placing by itself in numbers, and the first of them as arrows in the plate's own plane."""
     plate = cast("Plate", result.artefact)
     found = figures(result)
     title, *titles = _COMPARED if compared(result) else _CERTIFIED
@@ -163,7 +157,6 @@ def sections(result: Result) -> list[Section]:
 
 
 def _confounded(result: Result, found: PlateFigures) -> list[Block]:
-    """What else would look like the change that was found."""
     if not compared(result):
         return []
     facts = result.job.facts

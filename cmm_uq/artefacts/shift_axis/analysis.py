@@ -29,19 +29,15 @@ _MISREAD = 0.02  # part of a known length by which the readings may differ from 
 
 @dataclass(frozen=True, eq=False)
 class ShiftResult(ShiftFound):
-    """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.artefacts.shifting.found.ShiftFound`.
-
-    ``undetermined`` what no reading shows; ``integrated`` the paper's integrations of two complete series, by method;
-    empty otherwise.
-    """
+    """All that is known of a shift job after its analysis; see also :class:`~cmm_uq.artefacts.shifting.found.ShiftFound`."""
 
     estimate: CurveEstimate
-    undetermined: Undetermined
+    undetermined: Undetermined  # what no reading shows
+    # the paper's integrations of two complete series, by method; empty otherwise
     integrated: dict[Method, IntegratedCurve]
 
     @property
     def axis(self) -> str:
-        """That was calibrated."""
         return self.estimate.series.axis
 
     @cached_property
@@ -51,7 +47,6 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def table(self) -> ErrorMap:
-        """The correction table."""
         return correction_table(self.axis, self.fine, self.job.points.machine)
 
     @cached_property
@@ -70,7 +65,6 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def reported(self) -> Reported:
-        """See :attr:`ShiftFound.reported`: linearity error and, where it is determined, mean sensitivity error."""
         sizes = np.ptp(self.estimate.about_the_ends, axis=1) / MICROMETRE
         found = {f"linearity_{self.axis}.peak_to_valley_um": (sizes, "µm")}
         if self.estimate.scale_known:
@@ -79,7 +73,6 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def listed(self) -> Reported:
-        """See :attr:`ShiftFound.listed`: shifts that are not known exactly, the curve, the artefact where it has a scale."""
         estimate = self.estimate
         shifts = estimate.shifts.T if estimate.series.u_shift > 0 else ()
         return {
@@ -90,7 +83,6 @@ class ShiftResult(ShiftFound):
 
     @cached_property
     def shifts(self) -> tuple[Quantity, ...]:
-        """Of each series against the first, mm."""
         return tuple(Quantity.of_draws(draws, unit("mm")) for draws in self.estimate.shifts.T)
 
     @cached_property
@@ -108,7 +100,6 @@ class ShiftResult(ShiftFound):
 
 
 def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult:
-    """Analyse a shift job."""
     stated = job.facts.recording.u_coordinate_um
     series, known = checked_series(job)
     estimate = estimate_curve(
@@ -120,7 +111,6 @@ def analyse_shift(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 
 def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
-    """Series of a shift job along an axis, and the length that is known of the artefact."""
     check_facts(job)
     facts = shift_facts(job)
     series = recorded_series(facts, job.points, job.recording_path)
@@ -128,7 +118,6 @@ def checked_series(job: Job) -> tuple[ShiftedSeries, KnownSpan | None]:
 
 
 def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSeries:
-    """Readings of a shift job along an axis."""
     if facts.axis is None:
         raise CmmUqError("neither axis nor plane", where="job.toml [artefact]",
                          fix='Name the axis shifted along, axis = "x", or a plate\'s plane, plane = "xy"')  # fmt: skip
@@ -141,7 +130,6 @@ def recorded_series(facts: ShiftFacts, points: Points, where: str) -> ShiftedSer
 
 
 def check_facts(job: Job) -> None:
-    """Refuse what a shift job, along an axis or in a plane, cannot have."""
     facts, aside = job.facts, job.facts.recording.measurements_aside
     if facts.model.effects:
         raise CmmUqError("a shift job estimates errors as free functions, not by effects",

@@ -28,13 +28,10 @@ _DRIFT = 10 * MICROMETRE  # standard deviation of the drift, mm per hour
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Draws of e at positions, true = indicated + e.
+    """Draws of e at positions, true = indicated + e."""
 
-    ``position`` (m,) mm; ``draws`` (N, m) mm.
-    """
-
-    position: Floats
-    draws: Floats
+    position: Floats  # (m,) mm
+    draws: Floats  # (N, m) mm
 
     @cached_property
     def error(self) -> Floats:
@@ -74,19 +71,14 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class CurveEstimate:
-    """All that the readings say of an axis.
+    """All that the readings say of an axis."""
 
-    ``series``, ``known`` what it was made from; ``coefficients`` joint draws of everything linear; ``chains`` of the
-    hyper-parameters, and how they converged; ``seed`` of everything random; ``scale_known`` whether the mean
-    sensitivity is determined: by a known length, or by shifts known exactly.
-    """
-
-    series: ShiftedSeries
+    series: ShiftedSeries  # series, known: what it was made from
     known: KnownSpan | None
-    coefficients: Coefficients
-    chains: Chains
-    seed: int
-    scale_known: bool
+    coefficients: Coefficients  # joint draws of everything linear
+    chains: Chains  # of the hyper-parameters, and how they converged
+    seed: int  # of everything random
+    scale_known: bool  # whether the mean sensitivity is determined: by a known length, or by shifts known exactly
 
     @cached_property
     def _ends(self) -> Floats:
@@ -108,7 +100,6 @@ class CurveEstimate:
 
     @cached_property
     def curve(self) -> Curve:
-        """The curve where the axis was read."""
         return self.at(self.series.positions)
 
     @cached_property

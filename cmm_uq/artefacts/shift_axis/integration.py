@@ -112,14 +112,11 @@ class KnownSpan:
 
 @dataclass(frozen=True, eq=False)
 class IntegratedCurve:
-    """Error e of each reading of the first series, true = indicated + e.
+    """Error e of each reading of the first series, true = indicated + e."""
 
-    ``position`` (n,) readings, mm; ``error`` (n,) mm, zero at the first point; ``covariance`` (n, n) mm².
-    """
-
-    position: Floats
-    error: Floats
-    covariance: Floats
+    position: Floats  # (n,) readings, mm
+    error: Floats  # (n,) mm, zero at the first point
+    covariance: Floats  # (n, n) mm²
 
     @property
     def u(self) -> Floats:

@@ -29,7 +29,6 @@ from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 
 def shift_results(result: ShiftResult) -> dict[str, Any]:
-    """A result as plain data, in the layout of the schema ``cmm-uq/results/1``; no diagnosis, no accuracy of lengths."""
     job, estimate = result.job, result.estimate
     axis = result.axis
     estimates = {f"linearity_{axis}": {"peak_to_valley_um": quantity_data(result.linearity)}}
@@ -76,7 +75,6 @@ def shift_results(result: ShiftResult) -> dict[str, Any]:
 
 
 def sampling_data(chains: Chains, seed: int, draws: int) -> dict[str, Any]:
-    """How the sampling went."""
     return {
         "sampler": chains.sampler, "seed": seed, "draws": draws, "ess_min": chains.ess_min, "rhat_max": chains.rhat_max,
         "steps": chains.steps, "autocorrelation_time": chains.autocorrelation_time, "converged": chains.converged,
@@ -159,7 +157,6 @@ def _sparse(*columns: Floats) -> list[tuple[float, ...]]:
 
 
 def residuals_section(result: ShiftResult) -> Section:
-    """What the placings disagree by, without and with the curve."""
     series = result.estimate.series
     before, after = (r / MICROMETRE for r in result.estimate.residuals)
     size = result.disagreement_um
@@ -186,7 +183,6 @@ def residuals_section(result: ShiftResult) -> Section:
 
 
 def beside_integrations(result: ShiftResult) -> tuple[Table, ...]:
-    """The curve beside the integrations of the method's source; none where these cannot be done."""
     if (joint := result.beside_integrations) is None:
         return ()
     curves = list(result.integrated.values())
@@ -215,7 +211,6 @@ def beside_integrations(result: ShiftResult) -> tuple[Table, ...]:
 
 
 def sections(result: ShiftResult) -> list[Section]:
-    """Figures, artefact, curve, what is not determined, residuals, method."""
     return [
         _figures(result), _artefact(result), curve_section(result), _open(result), residuals_section(result),
         _method(result),
@@ -223,7 +218,6 @@ def sections(result: ShiftResult) -> list[Section]:
 
 
 def warnings(result: ShiftResult) -> tuple[Text, ...]:
-    """What the reader must know before using a figure."""
     found = not_converged(result.estimate.chains)
     if not result.estimate.scale_known:
         found.append(
@@ -253,7 +247,6 @@ def warnings(result: ShiftResult) -> tuple[Text, ...]:
 
 
 def summary(result: ShiftResult, warnings: Iterable[Text]) -> Summary:
-    """For the end of a command."""
     series = result.estimate.series
     measured = say(
         "{name}, axis {axis}, {points} points in {placings} placings",
@@ -266,7 +259,6 @@ def summary(result: ShiftResult, warnings: Iterable[Text]) -> Summary:
 
 
 def quantities(result: ShiftResult) -> list[Left]:
-    """Figures of performance, with their places in results.json."""
     named: list[Left] = [
         (
             f"linearity_{result.axis}", "peak_to_valley_um", say("Linearity error, peak to valley"), result.linearity,

@@ -47,7 +47,6 @@ def shift_series(setting: Setting) -> tuple[SetUp, ...]:
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    """None: its series are all that is measured."""
     _facts(setting)
     raise CmmUqError("a shift job has its series, and no other placings to choose from",
                      where="job.toml [plan] criterion", fix="Leave it out; shifts_mm says what is measured")  # fmt: skip

@@ -28,40 +28,30 @@ _MISPLACED = 0.1
 
 @dataclass(frozen=True)
 class RepeatedDrift:
-    """Drift as repeats of the same reading at different times show it.
+    """Drift as repeats of the same reading at different times show it."""
 
-    ``rate`` mm per hour; ``noise_scale`` its standard uncertainty over that of one ordinary reading, per hour.
-    """
-
-    rate: float
-    noise_scale: float
+    rate: float  # mm per hour
+    noise_scale: float  # its standard uncertainty over that of one ordinary reading, per hour
 
 
 @dataclass(frozen=True, eq=False)
 class ShiftedSeries:
-    """Means over repeats, one row a reading.
+    """Means over repeats, one row a reading."""
 
-    ``axis`` that was read; ``reading`` (n,) scale readings, mm; ``series``, ``point`` (n,) index of the placing, and of
-    the artefact's point; ``noise_scale`` (n,) standard uncertainty of each mean over that of one ordinary reading;
-    ``time`` (n,) s; ``None`` where it was not recorded; ``shifts``, ``u_shift`` (s,) nominal shift of each placing and
-    the standard uncertainty of each against the first, mm; ``cosine`` (s,) of the angle between artefact and axis in
-    each placing, from the other two coordinates; ``numbers`` (p,) of the artefact's points, as recorded; ``scatter`` of
-    repeats about their means and their drift; ``None`` without repeats; ``drift`` from repeats at different times;
-    ``None`` where there are none.
-    """
-
-    axis: str
-    reading: Floats
-    series: Ints
+    axis: str  # that was read
+    reading: Floats  # (n,) scale readings, mm
+    series: Ints  # series, point: (n,) index of the placing, and of the artefact's point
     point: Ints
-    noise_scale: Floats
-    time: Floats | None
+    noise_scale: Floats  # (n,) standard uncertainty of each mean over that of one ordinary reading
+    time: Floats | None  # (n,) s; ``None`` where it was not recorded
+    # shifts, u_shift: (s,) nominal shift of each placing and the standard uncertainty of each against the first,
+    # mm
     shifts: Floats
     u_shift: float
-    cosine: Floats
-    numbers: Ints
-    scatter: Scatter | None
-    drift: RepeatedDrift | None = None
+    cosine: Floats  # (s,) of the angle between artefact and axis in each placing, from the other two coordinates
+    numbers: Ints  # (p,) of the artefact's points, as recorded
+    scatter: Scatter | None  # of repeats about their means and their drift; ``None`` without repeats
+    drift: RepeatedDrift | None = None  # from repeats at different times; ``None`` where there are none
 
     @property
     def span(self) -> tuple[float, float]:
@@ -228,14 +218,11 @@ _ALIKE_of_undetermined = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Undetermined:
-    """What the readings by themselves leave free.
+    """What the readings by themselves leave free."""
 
-    ``period`` mm; functions of this period, and of a half, a third, … of it, show in no reading; ``patterns`` (m, k)
-    basis of the errors at the positions read that change no reading, beyond a constant and, unless the scale is known,
-    a slope; orthonormal.
-    """
-
-    period: float
+    period: float  # mm; functions of this period, and of a half, a third, … of it, show in no reading
+    # (m, k) basis of the errors at the positions read that change no reading, beyond a constant and, unless the
+    # scale is known, a slope; orthonormal
     patterns: Floats
 
 

@@ -34,7 +34,6 @@ class PlaneShiftResult(ShiftFound):
 
     @property
     def plane(self) -> str:
-        """That was calibrated: xy, yz or zx."""
         return self.estimate.plate.plane
 
     @cached_property
@@ -62,7 +61,6 @@ class PlaneShiftResult(ShiftFound):
 
     @cached_property
     def reported(self) -> Reported:
-        """See :attr:`ShiftFound.reported`."""
         sizes = {
             (name, PEAK_TO_VALLEY): (np.ptp(d, axis=1) / MICROMETRE, unit("µm")) for name, d in self._sized.items()
         }
@@ -70,7 +68,6 @@ class PlaneShiftResult(ShiftFound):
 
     @cached_property
     def listed(self) -> Reported:
-        """See :attr:`ShiftFound.listed`: the curves, and the places of the balls."""
         found: dict[str, tuple[Floats, str]] = {}
         for name, curve in self.curves.items():
             found |= listed_draws(f"curves.{name}.error_um", curve.draws / MICROMETRE, "µm")
@@ -118,7 +115,6 @@ class PlaneShiftResult(ShiftFound):
 
     @cached_property
     def table(self) -> ErrorMap:
-        """The correction table."""
         return plane_correction_table(self.estimate, self.job.points.machine)
 
 
@@ -136,7 +132,6 @@ def analyse_plane(job: Job, *, seed: int = 0, progress: Progress | None = None) 
 
 
 def checked_plate(job: Job) -> tuple[PlacedPlate, KnownSpan | None]:
-    """The plate of a shift job in a plane, and the length that is known of it."""
     check_facts(job)
     facts = shift_facts(job)
     plate = placed_plate(job.points, str(facts.plane), job.recording_path)

@@ -35,20 +35,16 @@ _MICRO_PRIOR = 1e-3  # noise over prior in the start's least squares, mm
 
 @dataclass(frozen=True, eq=False)
 class PlaneModel:
-    """The linear model about a start, and how its coefficients make balls.
+    """The linear model about a start, and how its coefficients make balls."""
 
-    ``smooth`` observations: all of the first axis, then all of the second, minus the start; ``balls`` (p, 2) start, mm;
-    ``to_balls`` (2p, q) change of the balls' coordinates by the last q flat coefficients; ``turning`` index of the
-    carriages that have a rotation, in the order of the functions after the fourth; ``lever`` (2, 2) of each such
-    carriage: whether its lever has the readings of the first and of the second axis; ``known_column`` (2p,) change of
-    the balls by the last of the columns; ``None`` where no length is known within a u.
-    """
-
-    smooth: SmoothModel
-    balls: Floats
-    to_balls: Floats
+    smooth: SmoothModel  # observations: all of the first axis, then all of the second, minus the start
+    balls: Floats  # (p, 2) start, mm
+    to_balls: Floats  # (2p, q) change of the balls' coordinates by the last q flat coefficients
+    # index of the carriages that have a rotation, in the order of the functions after the fourth
     turning: tuple[int, ...]
+    # (2, 2) of each such carriage: whether its lever has the readings of the first and of the second axis
     lever: tuple[tuple[bool, bool], ...]
+    # (2p,) change of the balls by the last of the columns; ``None`` where no length is known within a u
     known_column: Floats | None
 
 

@@ -39,7 +39,6 @@ from cmm_uq.maths.uncertainty.quantity import rounded
 
 
 def plane_shift_results(result: PlaneShiftResult) -> dict[str, Any]:
-    """A result as plain data, in the layout of the schema ``cmm-uq/results/1``; no diagnosis, no accuracy of lengths."""
     job, estimate = result.job, result.estimate
     plate, free = estimate.plate, estimate.free
     before, after = result.disagreement_um
@@ -91,7 +90,6 @@ EVERY = 4  # every so many of the positions stand in the table of a curve
 
 
 def curves_section(result: PlaneShiftResult) -> Section:
-    """Every curve with its band, and a table of both axes."""
     blocks: list[Block] = []
     for name, curve in result.curves.items():
         blocks.append(_picture(name, curve, MICROMETRE, unit("µm"), result))
@@ -134,7 +132,6 @@ _KINDS = {
 
 
 def _table(result: PlaneShiftResult, which: int) -> Table:
-    """All curves of one axis by position."""
     axis = AXES[result.estimate.plate.axes[which]]
     own = [(n, c, MICROMETRE, unit("µm")) for n, c in result.curves.items() if n.split("_")[1] == axis]
     own += [(n, c, ARCSECOND, unit("″")) for n, c in result.rotations.items() if n.split("_")[1] == axis]
@@ -166,7 +163,6 @@ def _table(result: PlaneShiftResult, which: int) -> Table:
 
 
 def residuals_section(result: PlaneShiftResult) -> Section:
-    """What the placings disagree by, without and with the curves."""
     plate = result.estimate.plate
     before, after = (r / MICROMETRE for r in result.estimate.residuals)
     size = result.disagreement_um
@@ -188,7 +184,6 @@ def residuals_section(result: PlaneShiftResult) -> Section:
 
 
 def sections(result: PlaneShiftResult) -> list[Section]:
-    """Figures, plate, curves, what is not determined, residuals, placings, method."""
     return [
         _figures(result), _plate(result), curves_section(result), _open(result), residuals_section(result),
         _placings(result), _method(result),
@@ -196,7 +191,6 @@ def sections(result: PlaneShiftResult) -> list[Section]:
 
 
 def warnings(result: PlaneShiftResult) -> tuple[Text, ...]:
-    """What the reader must know before using a figure."""
     found, free = not_converged(result.estimate.chains), result.estimate.free
     if free.combinations:
         found.append(
@@ -217,7 +211,6 @@ def _with_each_other(names: tuple[str, ...]) -> Text:
 
 
 def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> Summary:
-    """For the end of a command."""
     plate = result.estimate.plate
     measured = say(
         "{name}, plane {plane}, {balls} balls in {placings} placings",
@@ -230,7 +223,6 @@ def summary(result: PlaneShiftResult, warnings: Iterable[Text]) -> Summary:
 
 
 def quantities(result: PlaneShiftResult) -> list[Left]:
-    """Figures of performance, with their places in results.json."""
     named: list[Left] = []
     for name, parameters in result.scalars.items():
         for parameter, quantity in parameters.items():

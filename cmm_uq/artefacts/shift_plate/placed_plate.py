@@ -24,30 +24,22 @@ _ROUNDS = 50
 
 @dataclass(frozen=True, eq=False)
 class PlacedPlate:
-    """Means over repeats, one row a ball in a placing.
+    """Means over repeats, one row a ball in a placing."""
 
-    ``plane`` xy, yz or zx; ``reading`` (n, 3) scale readings, mm; ``placing``, ``ball`` (n,) index of the placing and
-    of the ball; ``noise_scale`` (n,) standard uncertainty of each mean over that of one ordinary reading; ``placings``,
-    ``numbers`` (s,) and (p,) numbers as recorded; ``balls`` (p, 2) roughly, mm, as they lie in the first placing;
-    ``turned`` (s,) how far each placing is turned against the first, roughly, rad; ``moved`` (s, 2) where the first
-    placing's origin lies in each, roughly, mm; ``scatter`` of repeats, both coordinates; ``None`` without repeats.
-    """
-
-    plane: str
-    reading: Floats
-    placing: Ints
+    plane: str  # xy, yz or zx
+    reading: Floats  # (n, 3) scale readings, mm
+    placing: Ints  # placing, ball: (n,) index of the placing and of the ball
     ball: Ints
-    noise_scale: Floats
-    placings: Ints
+    noise_scale: Floats  # (n,) standard uncertainty of each mean over that of one ordinary reading
+    placings: Ints  # placings, numbers: (s,) and (p,) numbers as recorded
     numbers: Ints
-    balls: Floats
-    turned: Floats
-    moved: Floats
-    scatter: Scatter | None
+    balls: Floats  # (p, 2) roughly, mm, as they lie in the first placing
+    turned: Floats  # (s,) how far each placing is turned against the first, roughly, rad
+    moved: Floats  # (s, 2) where the first placing's origin lies in each, roughly, mm
+    scatter: Scatter | None  # of repeats, both coordinates; ``None`` without repeats
 
     @property
     def axes(self) -> tuple[int, int]:
-        """Indices of the two axes."""
         return AXES.index(self.plane[0]), AXES.index(self.plane[1])
 
     @property

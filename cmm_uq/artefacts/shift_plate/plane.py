@@ -28,20 +28,15 @@ _LEAST_LEFT = 6  # coordinates beyond balls and placings that must be left to te
 
 @dataclass(frozen=True, eq=False)
 class PlaneEstimate:
-    """All that the placings say.
+    """All that the placings say."""
 
-    ``plate``, ``known`` what it was made from; ``model`` linear model about its start; ``coefficients`` joint draws of
-    everything linear; ``chains`` of the hyper-parameters, and how they converged; ``free`` what the placings leave
-    open; ``seed`` of everything random.
-    """
-
-    plate: PlacedPlate
+    plate: PlacedPlate  # plate, known: what it was made from
     known: KnownSpan | None
-    model: PlaneModel
-    coefficients: Coefficients
-    chains: Chains
-    free: FreeInPlane
-    seed: int
+    model: PlaneModel  # linear model about its start
+    coefficients: Coefficients  # joint draws of everything linear
+    chains: Chains  # of the hyper-parameters, and how they converged
+    free: FreeInPlane  # what the placings leave open
+    seed: int  # of everything random
 
     @cached_property
     def positions(self) -> tuple[Floats, Floats]:

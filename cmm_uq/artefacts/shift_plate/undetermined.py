@@ -44,14 +44,12 @@ _TITLES: dict[str, Text] = {
 
 @dataclass(frozen=True, eq=False)
 class FreeInPlane:
-    """What the readings by themselves leave free.
+    """What the readings by themselves leave free."""
 
-    ``combinations`` names of what can change together, or alone, without changing any reading; ``periods`` of each
-    axis, mm: functions of this period, and of a half, a third, … of it, show in no reading; ``None`` where the turned
-    placings see them.
-    """
-
+    # names of what can change together, or alone, without changing any reading
     combinations: tuple[tuple[str, ...], ...]
+    # of each axis, mm: functions of this period, and of a half, a third, … of it, show in no reading; ``None``
+    # where the turned placings see them
     periods: tuple[float | None, float | None]
 
     @property

@@ -24,14 +24,12 @@ from cmm_uq.maths.inference.ensembles import Progress
 
 
 def analyse(job: Job, *, seed: int = 0, progress: Progress | None = None) -> ShiftResult | PlaneShiftResult:
-    """Analyse a shift job."""
     if shift_facts(job).plane is not None:
         return analyse_plane(job, seed=seed, progress=progress)
     return analyse_shift(job, seed=seed, progress=progress)
 
 
 def outcome(found: ShiftResult | PlaneShiftResult, seed: int) -> Outcome:
-    """The certificate of a shift job, with the correction table beside it."""
     if isinstance(found, ShiftResult):
         told, results = axis_page.warnings(found), shift_results(found)
     else:

@@ -9,7 +9,6 @@ from cmm_uq.jobs.job import Job
 
 
 def refuse_unfit(job: Job) -> None:
-    """Refuse a shift job that cannot be analysed."""
     if shift_facts(job).plane is not None:
         checked_plate(job)
     else:

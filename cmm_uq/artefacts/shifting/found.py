@@ -53,7 +53,6 @@ def peak_to_valley(curve: Floats) -> Quantity:
 
 
 def _ends(curve: Floats) -> tuple[float, float]:
-    """Ends of the interval, mm."""
     mean, covariance = curve.mean(axis=0), np.atleast_2d(np.cov(curve, rowvar=False))
     spread = np.linspace(0, len(mean) - 1, min(_POSITIONS, len(mean))).astype(int)
     chosen = np.union1d(spread, [mean.argmin(), mean.argmax()])
@@ -117,13 +116,10 @@ class Along(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class ShiftFound(ABC):
-    """What was found.
+    """What was found."""
 
-    ``job`` what was analysed; ``estimate`` of the machine and the artefact, with its posterior.
-    """
-
-    job: Job
-    estimate: Estimated
+    job: Job  # what was analysed
+    estimate: Estimated  # of the machine and the artefact, with its posterior
 
     @cached_property
     def disagreement_um(self) -> tuple[float, float]:
@@ -143,7 +139,6 @@ class ShiftFound(ABC):
 
     @cached_property
     def covariance(self) -> Covariance:
-        """Of every estimate."""
         return Covariance.of_draws(self.reported)
 
     @cached_property
@@ -185,7 +180,6 @@ class ShiftFound(ABC):
 
 
 def _rms_um(values: Floats) -> float:
-    """Root mean square of mm, in µm."""
     return float((values**2).mean() ** 0.5) / MICROMETRE
 
 
@@ -200,12 +194,10 @@ Named = Sequence[Left]  # quantities that are stated, each with its place in res
 
 
 def table_file(job: Job) -> str:
-    """Name of the correction table, an error map, beside the certificate."""
     return file_name("correction_table.csv", job.origin)
 
 
 def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
-    """Figures of performance."""
     notes = (
         SIGN,
         meaning,
@@ -218,7 +210,6 @@ def figures_section(caption: Text, named: Named, meaning: Text) -> Section:
 
 
 def summary_of(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> Summary:
-    """What was measured, its figures and warnings, for the end of a command."""
     figures = tuple(figure_row(name, quantity) for _, _, name, quantity in named)
     return Summary(what, day(job.facts.job.date), figures=figures, warnings=tuple(warnings))
 
@@ -226,7 +217,6 @@ def summary_of(job: Job, what: Text, named: Named, warnings: Iterable[Text]) -> 
 def artefact_section(
     job: Job, otherwise: Text, points: Text, shifts: tuple[tuple[Text, Text], ...], *further: Block
 ) -> Section:
-    """The artefact, what of it is known, and to what that makes the results traceable."""
     facts = shift_facts(job)
     rows = artefact_rows(job, otherwise)
     if (known := facts.known) is not None:
@@ -240,7 +230,6 @@ def artefact_section(
 
 
 def method_section(text: Text, readings: int, chains: Chains, seed: int, *further: Block) -> Section:
-    """How the readings were fitted, and how the sampling went."""
     reached = say(
         "{reached}: {ess:.0f} effective samples, R-hat {rhat:.4f}, autocorrelation time {time:.1f} of {steps} steps",
         reached=say("reached") if chains.converged else say("NOT reached"),

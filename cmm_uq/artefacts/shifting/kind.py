@@ -58,12 +58,10 @@ class ShiftFacts(ArtefactFacts):
 
     @property
     def traced(self) -> bool:
-        """See :attr:`ArtefactFacts.traced`: one length may be known."""
         return self.known is not None
 
 
 def shift_facts(job: Job) -> ShiftFacts:
-    """``[artefact]`` of a shift job."""
     return cast("ShiftFacts", job.facts.artefact)
 
 

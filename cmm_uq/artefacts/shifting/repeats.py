@@ -14,23 +14,16 @@ NOISE_RATIO = "noise_ratio"  # optional column: standard uncertainty of this rea
 
 @dataclass(frozen=True, eq=False)
 class Means:
-    """One row a (measurement, point), in this order.
+    """One row a (measurement, point), in this order."""
 
-    ``measurement``, ``point`` (m,) as recorded; ``readings`` (m, 3) scale readings of x, y, z, mm, weighted by the
-    noise of each repeat; ``noise_scale`` (m,) standard uncertainty of each mean over that of one ordinary reading;
-    ``time`` (m,) s; ``None`` where it was not recorded; ``line`` (m,) of the first repeat in its file; 0 where there is
-    none; ``of`` (n,) row that each recorded point went into; ``ratio`` (n,) noise of each recorded point over an
-    ordinary one's.
-    """
-
-    measurement: Ints
+    measurement: Ints  # measurement, point: (m,) as recorded
     point: Ints
-    readings: Floats
-    noise_scale: Floats
-    time: Floats | None
-    line: Ints
-    of: Ints
-    ratio: Floats
+    readings: Floats  # (m, 3) scale readings of x, y, z, mm, weighted by the noise of each repeat
+    noise_scale: Floats  # (m,) standard uncertainty of each mean over that of one ordinary reading
+    time: Floats | None  # (m,) s; ``None`` where it was not recorded
+    line: Ints  # (m,) of the first repeat in its file; 0 where there is none
+    of: Ints  # (n,) row that each recorded point went into
+    ratio: Floats  # (n,) noise of each recorded point over an ordinary one's
 
 
 def means_over_repeats(points: Points, where: str = "") -> Means:

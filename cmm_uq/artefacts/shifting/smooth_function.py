@@ -38,25 +38,18 @@ _DENSITY = 2 * sqrt(pi) * gamma(_ORDER + 0.5) / gamma(_ORDER) * (2 * _ORDER) ** 
 
 @dataclass(frozen=True, eq=False)
 class SmoothFunction:
-    """One error as a function of one position, and where the observations look it up.
+    """One error as a function of one position, and where the observations look it up."""
 
-    ``name`` as in results.json, such as ``linearity_x``; ``low``, ``high`` range of positions, mm; ``shortest``
-    shortest correlation length, mm; the shortest sine is two of them long; ``position`` (n,) where each observation
-    looks the function up, mm; ``factor`` (n,) what the observation shows of one unit of the function; ``typical`` size
-    that such an error usually has, in the function's unit (mm, or rad).
-    """
-
-    name: str
-    low: float
+    name: str  # as in results.json, such as ``linearity_x``
+    low: float  # low, high: range of positions, mm
     high: float
-    shortest: float
-    position: Floats
-    factor: Floats
-    typical: float
+    shortest: float  # shortest correlation length, mm; the shortest sine is two of them long
+    position: Floats  # (n,) where each observation looks the function up, mm
+    factor: Floats  # (n,) what the observation shows of one unit of the function
+    typical: float  # size that such an error usually has, in the function's unit (mm, or rad)
 
     @property
     def range(self) -> float:
-        """Length of the range, mm."""
         return self.high - self.low
 
     @cached_property
@@ -92,18 +85,14 @@ BATCH = 250  # parameter vectors handled at once
 
 @dataclass(frozen=True, eq=False)
 class SmoothMarginal(ABC):
-    """Observations, whitened and freed of all of which nothing is known beforehand.
+    """Observations, whitened and freed of all of which nothing is known beforehand."""
 
-    ``observed`` (p,) mm; ``even``, ``ends`` (p, J) design of the coefficients; ``columns``, ``column_sd`` (p, c) and
-    (c,); ``squares``, ``dof`` sum of squares, mm², and degrees of freedom that tell of σ alone.
-    """
-
-    observed: Floats
-    even: Floats
+    observed: Floats  # (p,) mm
+    even: Floats  # even, ends: (p, J) design of the coefficients
     ends: Floats
-    columns: Floats
+    columns: Floats  # columns, column_sd: (p, c) and (c,)
     column_sd: Floats
-    squares: float
+    squares: float  # squares, dof: sum of squares, mm², and degrees of freedom that tell of σ alone
     dof: int
 
     def log_likelihood(self, sd: Floats, growth: Floats, sigma: Floats) -> Floats:

@@ -42,32 +42,24 @@ class Scatter:
 
     @property
     def sigma(self) -> float:
-        """Repeatability, mm."""
         return float(np.sqrt(self.squares / self.dof))
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothModel:
-    """See the module's docstring.
+    """See the module's docstring."""
 
-    ``observed`` (n,) mm; ``noise_scale`` (n,) positive; ``flat`` (n, q) columns of which nothing is known beforehand;
-    of full rank; ``columns``, ``column_sd`` (n, c) and (c,) columns with Gaussian coefficients about zero;
-    ``functions`` at least one; ``scatter`` of repeats, where σ is to be estimated from them too; ``sigma`` standard
-    uncertainty of one reading, mm; ``None`` when it is to be estimated.
-    """
-
-    observed: Floats
-    noise_scale: Floats
-    flat: Floats
-    columns: Floats
+    observed: Floats  # (n,) mm
+    noise_scale: Floats  # (n,) positive
+    flat: Floats  # (n, q) columns of which nothing is known beforehand; of full rank
+    columns: Floats  # columns, column_sd: (n, c) and (c,) columns with Gaussian coefficients about zero
     column_sd: Floats
-    functions: tuple[SmoothFunction, ...]
-    scatter: Scatter | None
-    sigma: float | None
+    functions: tuple[SmoothFunction, ...]  # at least one
+    scatter: Scatter | None  # of repeats, where σ is to be estimated from them too
+    sigma: float | None  # standard uncertainty of one reading, mm; ``None`` when it is to be estimated
 
     @property
     def dimension(self) -> int:
-        """Numbers in θ."""
         return len(self.functions) + 2 + (self.sigma is None)
 
     @cached_property
@@ -216,18 +208,14 @@ class SmoothModel:
 
 @dataclass(frozen=True, eq=False)
 class Coefficients:
-    """Joint draws of everything linear.
-
-    ``coefficients`` (N, J) of all functions' sines; ``growth`` (N,) the ends' size over the middle's; ``columns`` (N,
-    c); flat : (N, q); ``sigma`` (N,) mm.
-    """
+    """Joint draws of everything linear."""
 
     model: SmoothModel
-    coefficients: Floats
-    growth: Floats
-    columns: Floats
+    coefficients: Floats  # (N, J) of all functions' sines
+    growth: Floats  # (N,) the ends' size over the middle's
+    columns: Floats  # (N, c); flat : (N, q)
     flat: Floats
-    sigma: Floats
+    sigma: Floats  # (N,) mm
 
     def function(self, index: int, x: Floats) -> Floats:
         """One of the functions at positions (m,): (N, m)."""

@@ -45,19 +45,16 @@ LARGEST_ANGLE = np.radians(20.0)
 
 @dataclass(frozen=True, eq=False)
 class ProbedSpheres:
-    """Least-squares spheres of a recording, one for each (measurement, repeat).
+    """Least-squares spheres of a recording, one for each (measurement, repeat)."""
 
-    ``measurement``, ``repeat`` (q,); ``count`` (q,) points of each; ``form`` (q,) range of the radial distances, mm
-    (ISO 10360-5:2010, P_Form); ``size`` (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size);
-    not finite without a certificate; ``centres`` (q, 3) of the least-squares spheres, mm.
-    """
-
-    measurement: Ints
+    measurement: Ints  # measurement, repeat: (q,)
     repeat: Ints
-    count: Ints
-    form: Floats
+    count: Ints  # (q,) points of each
+    form: Floats  # (q,) range of the radial distances, mm (ISO 10360-5:2010, P_Form)
+    # (q,) diameter of the least-squares sphere minus the certified one, mm (P_Size); not finite without a
+    # certificate
     size: Floats
-    centres: Floats
+    centres: Floats  # (q, 3) of the least-squares spheres, mm
 
 
 class SphereArtefact(Radial):
@@ -82,11 +79,9 @@ class SphereArtefact(Radial):
             self._take_normals(where)
 
     def own_faults(self) -> Iterable[Effect]:
-        """See :meth:`Artefact.own_faults`: its form, by its certificate."""
         return form_faults(self._facts, self._facts.form_um, self.points)
 
     def probed(self) -> ProbedSpheres:
-        """Form and size of each least-squares sphere."""
         runs = Placings.of(self.points.group)
         size = self.sizes[0]
         first, form, diameter, centres = [], [], [], []
@@ -103,7 +98,6 @@ class SphereArtefact(Radial):
         )  # fmt: skip
 
     def forms(self) -> Forms:
-        """See :meth:`Artefact.forms`: ISO 10360-5:2010, P_Form."""
         probed = self.probed()
         directions = self.directions(self.points.xyz)
         size = probed.size if self.sizes[0].certified else None

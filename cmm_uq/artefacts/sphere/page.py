@@ -48,7 +48,6 @@ def results(result: Result) -> dict[str, Any]:
 
 
 def sections(result: Result) -> list[Section]:
-    """Form and size (ISO 10360-5), radial deviations by point, residuals over the sphere."""
     sphere = cast("SphereArtefact", result.artefact)
     return [
         Section(

@@ -35,36 +35,27 @@ PARAMETERS = tuple(effect.name for family in (SCALE, SQUARENESS, ROTATION) for e
 
 @dataclass(frozen=True, eq=False)
 class Defects:
-    """What one aligned placing lacks of the certified triangle.
+    """What one aligned placing lacks of the certified triangle."""
 
-    ``measurement`` its number; ``plane`` key of ``PLANES``; ``H``, ``K``, ``A`` mm, see the module's docstring;
-    ``base``, ``height`` of the certified triangle, mm; ``start``, ``apex`` (3,) scale readings of corner 1 and of
-    corner 3, mm; ``tip`` (3,) stylus tip offset, mm.
-    """
-
-    measurement: int
-    plane: str
-    H: float
+    measurement: int  # its number
+    plane: str  # key of ``PLANES``
+    H: float  # H, K, A: mm, see the module's docstring
     K: float
     A: float
-    base: float
+    base: float  # base, height: of the certified triangle, mm
     height: float
-    start: Floats
+    start: Floats  # start, apex: (3,) scale readings of corner 1 and of corner 3, mm
     apex: Floats
-    tip: Floats
+    tip: Floats  # (3,) stylus tip offset, mm
 
 
 @dataclass(frozen=True, eq=False)
 class TriangleSolution:
-    """Parameters by the source's equations, mended.
+    """Parameters by the source's equations, mended."""
 
-    ``values`` (15,) in the order of :data:`PARAMETERS`; ``per_coordinate`` (15, 3n) change of each for 1 mm of each
-    recorded coordinate; ``per_dimension`` (15, 6) change of each for 1 mm of each dimension of the standard.
-    """
-
-    values: Floats
-    per_coordinate: Floats
-    per_dimension: Floats
+    values: Floats  # (15,) in the order of :data:`PARAMETERS`
+    per_coordinate: Floats  # (15, 3n) change of each for 1 mm of each recorded coordinate
+    per_dimension: Floats  # (15, 6) change of each for 1 mm of each dimension of the standard
 
     def u(self, coordinate: float, dimensions: Floats) -> Floats:
         """(15,) standard uncertainties from those of a coordinate and of the six dimensions, mm."""
@@ -73,7 +64,6 @@ class TriangleSolution:
 
 
 def solve_equations(triangle: Triangle) -> TriangleSolution:
-    """Solve one equation after the other."""
     machine = triangle.points.machine
     if machine.chain != "YXZ":
         raise CmmUqError(

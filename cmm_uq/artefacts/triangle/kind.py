@@ -29,7 +29,6 @@ class TriangleFacts(ArtefactFacts):
 
     @property
     def traced(self) -> bool:
-        """See :attr:`ArtefactFacts.traced`: blocks and cylinders always are certified."""
         return True
 
 

@@ -58,16 +58,12 @@ PLANES: Mapping[str, tuple[int, int]] = MappingProxyType({"XY": (0, 1), "YZ": (1
 
 @dataclass(frozen=True)
 class Placing:
-    """One placing.
+    """One placing."""
 
-    ``title`` in words; ``plane`` key of :data:`PLANES`; ``place`` where along the room that the machine has for it, 0 …
-    1 for X, Y, Z; ``long_tip`` whether the longer of two tips is mounted.
-    """
-
-    title: Text
-    plane: str
-    place: tuple[float, float, float]
-    long_tip: bool = False
+    title: Text  # in words
+    plane: str  # key of :data:`PLANES`
+    place: tuple[float, float, float]  # where along the room that the machine has for it, 0 … 1 for X, Y, Z
+    long_tip: bool = False  # whether the longer of two tips is mounted
 
 
 SEVEN_PLACINGS = (
@@ -161,12 +157,10 @@ class Triangle(Rigid):
         self.refuse_another_shape("Check the numbering of the cylinders: blocks_mm are 1–2, 2–3, 3–1", where)
 
     def shape(self, sizes: Floats) -> Floats:
-        """See :meth:`Rigid.shape`: corners of the triangle that the dimensions close to."""
         body = corners(SIDES_OF_DIMENSIONS @ sizes)[self._corner] * self.expansion[:, None]
         return np.asarray(body - self.placings.means(body), dtype=np.float64)
 
     def own_faults(self) -> Iterable[Effect]:
-        """See :meth:`Artefact.own_faults`: by the uncertainty of its blocks and cylinders."""
         body = Body.of(self.points, corners(self.standard.sides)[self._corner])
         u_um = float(np.hypot(self._facts.u_blocks_um, self._facts.u_cylinders_um))
         return faults(self._facts, self.points, body, by_certificate(u_um, _WRONG_UM), geometry=AFFINE)
@@ -206,7 +200,6 @@ SCREENING = Screening(shape_of, balls=True)
 
 
 def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
-    """The seven placings of the triangle standard."""
     sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
     machine = replace(setting.machine, travel_mm=setting.volume.box)
     for placing in SEVEN_PLACINGS:
@@ -219,7 +212,6 @@ def triangle_placings(setting: Setting) -> tuple[SetUp, ...]:
 
 
 def candidates(setting: Setting, start: Start | None) -> tuple[SetUp, ...]:
-    """Every plane, place and tip, at most as many as the plan says."""
     return thinned(_everywhere(setting), setting.plan.candidates, setting.volume)
 
 
@@ -229,7 +221,6 @@ def _title(plane: str, *, longer: bool) -> Text:
 
 
 def _everywhere(setting: Setting) -> Iterator[SetUp]:
-    """Every plane, place and tip."""
     volume = setting.volume
     sides = TriangleStandard.of(cast("TriangleFacts", setting.artefact)).sides
     machine = replace(setting.machine, travel_mm=volume.box)

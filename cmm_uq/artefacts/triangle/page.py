@@ -40,7 +40,6 @@ class StandardFigures:
     draws: int
 
     def as_data(self) -> dict[str, Any]:
-        """For results.json."""
         return {
             "sides_mm": {name: {"value": value, "U": U} for name, (value, U) in zip(SIDES, self.sides, strict=True)},
             "angles": {
@@ -54,16 +53,12 @@ class StandardFigures:
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Sides 1–2, 2–3, 3–1 of every placing against the certified ones, µm.
+    """Sides 1–2, 2–3, 3–1 of every placing against the certified ones, µm."""
 
-    ``measurement`` (r,) of each (measurement, repeat); ``before_um``, ``after_um`` (r, 3) as recorded, and after the
-    fitted model; ``expanded_um``, ``coverage_factor`` U of a side for the noise of its ends, and its k.
-    """
-
-    measurement: Ints
-    before_um: Floats
+    measurement: Ints  # (r,) of each (measurement, repeat)
+    before_um: Floats  # before_um, after_um: (r, 3) as recorded, and after the fitted model
     after_um: Floats
-    expanded_um: float
+    expanded_um: float  # expanded_um, coverage_factor: U of a side for the noise of its ends, and its k
     coverage_factor: float
 
 
@@ -79,12 +74,10 @@ class ByEquations:
 
     @property
     def expanded(self) -> float:
-        """U."""
         return self._stated[0]
 
     @property
     def coverage_factor(self) -> float:
-        """K of it."""
         return self._stated[1]
 
     @property
@@ -97,7 +90,6 @@ class ByEquations:
 
     @property
     def parameter(self) -> str:
-        """Name of it, a key with its unit."""
         return every()[self.effect].reported[0].name
 
     @property
@@ -127,7 +119,6 @@ class TriangleFigures:
 
     @cached_property
     def sides(self) -> Sides:
-        """Of every placing."""
         triangle, points = self._triangle, self._triangle.points
         found = _lengths(triangle, points.xyz)
         predicted = self.result.model.predicted(self.result.posterior.draws.mean(axis=0))
@@ -141,7 +132,6 @@ class TriangleFigures:
 
     @cached_property
     def equations(self) -> tuple[ByEquations, ...] | Text:
-        """Parameters by the source's equations, or why there are none."""
         triangle = self._triangle
         try:
             solution = solve_equations(triangle)
@@ -176,7 +166,6 @@ class TriangleFigures:
 
 
 def results(result: Result) -> Mapping[str, Any]:
-    """The same for results.json."""
     found = TriangleFigures(result)
     equations, sides = found.equations, found.sides
     return {
@@ -215,7 +204,6 @@ def _lengths(triangle: Triangle, xyz: Floats) -> Floats:
 
 
 def sections(result: Result) -> list[Section]:
-    """The standard, its sides as found, and the parameters by the fitted model and by the source's equations."""
     found = TriangleFigures(result)
     return [
         Section(say("The triangle"), (_standard(found.standard), _sides(found.sides))),
@@ -300,7 +288,6 @@ def _two_ways(result: Result, equations: tuple[ByEquations, ...] | Text) -> list
 
 
 def _alike(result: Result, found: TriangleFigures) -> list[Block]:
-    """Pairs of effects that these placings hardly tell apart."""
     titles = {effect.name: effect.title for effect in result.model.effects}
     pairs = [
         say(

@@ -50,7 +50,6 @@ class TriangleStandard:
 
     @classmethod
     def of(cls, facts: TriangleFacts) -> TriangleStandard:
-        """From ``[artefact]`` of a triangle."""
         dimensions = np.array([*facts.blocks_mm, *facts.cylinders_mm], dtype=np.float64)
         u = MICROMETRE * np.repeat([facts.u_blocks_um, facts.u_cylinders_um], 3)
         return cls(dimensions, u)
@@ -61,7 +60,6 @@ class TriangleStandard:
         return np.asarray(SIDES_OF_DIMENSIONS @ self.dimensions, dtype=np.float64)
 
     def figures(self) -> TriangleGeometry:
-        """Sides, angles and height of the dimensions as certified."""
         return figures_of(self.sides)
 
     def draws(self, seed: int, count: int = DRAWS) -> TriangleGeometry:

@@ -134,7 +134,6 @@ def faults(
     axes: int = 3,
     geometry: Iterable[OwnFault] = tuple(GEOMETRY.values()),
 ) -> Iterable[Effect]:
-    """Faults of an artefact of several places."""
     own = FaultyArtefact(body, points, known.um, known.weight, axes, expansion_of(facts), known.mostly)
     if axes * len(body.places) <= MOST_ERRORS and deformations(own).shape[1]:
         yield PATTERN.made(own)
@@ -174,5 +173,4 @@ def form_faults(facts: ArtefactFacts, form_um: float | None, points: Points) -> 
 
 
 def expansion_of(facts: ArtefactFacts) -> float:
-    """The coefficient of expansion of an artefact, that of steel where it is not stated, 1/K."""
     return facts.cte_per_k or STEEL

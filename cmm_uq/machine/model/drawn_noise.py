@@ -45,7 +45,6 @@ class Noise:
         return np.asarray(found, dtype=np.float64)
 
     def displayed(self, xyz: Floats) -> Floats:
-        """Coordinates in the steps of the display."""
         return np.asarray(np.round(xyz / self.resolution) * self.resolution) if self.resolution else xyz
 
     def _readings(self, shape: tuple[int, ...], random: np.random.Generator) -> Floats:

@@ -25,7 +25,6 @@ def maps_of(job: Job) -> list[ErrorMap]:
 def maps_named(
     job: Job, named: Sequence[ErrorMapFile], squareness: SquarenessFacts | None, where: str
 ) -> list[ErrorMap]:
-    """Error maps among the inputs of a job."""
     maps, without = [], []
     for given in named:
         path = str(job.folder / given.file)

@@ -58,24 +58,7 @@ class Estimate:
 
 @dataclass(frozen=True, eq=False)
 class RecordingModel:
-    """Effects acting on the points of an artefact.
-
-    Parameters
-    ----------
-    artefact : with its recording.
-    effects : what acts; a fault of the artefact is taken as that of this one.
-    sigma : standard uncertainty of one recorded coordinate, mm; ``None`` when it is to be estimated.
-    used : (m,) which observations to use; all by default.
-    shapes : nonlinear parameters, held, of the effects that have some, by the effect's name.
-    within : a model of the same recording with effects more, where these turn out to be so large that they bend it: the linear
-        model is then taken about the estimate of that one.
-    least_noise : mm, what is not known of a coordinate however little the residuals scatter, as of a prediction that the
-        recording is compared with.
-
-    Raises
-    ------
-    CmmUqError : the nonlinear parameter of an effect is not given, or the artefact has no such fault.
-    """
+    """Effects acting on the points of an artefact."""
 
     artefact: Artefact  # with its recording
     effects: tuple[Effect, ...]  # what acts; a fault of the artefact is taken as that of this one
@@ -106,7 +89,6 @@ class RecordingModel:
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Coefficients of the effects, in order, then the artefact's sizes."""
         coefficients = tuple(
             Unknown((effect.name, c.name), c.unit, 0.0, c.prior_sd, c.prior_sd)
             for effect in self.effects
@@ -147,12 +129,7 @@ class RecordingModel:
         return self._acting.errors(self.artefact.points.at(xyz), coefficients)
 
     def indicated(self, true_xyz: Floats, coefficients: Floats) -> Floats:
-        """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm.
-
-        Raises
-        ------
-        CmmUqError : the errors are so large that no indication belongs to a true point.
-        """
+        """What the machine indicates at true points (n, 3): solves indicated + e(indicated) = true to below 0.01 nm."""
         indicated = true_xyz.copy()
         for _ in range(12):
             change = true_xyz - self.errors(indicated, coefficients) - indicated
@@ -172,12 +149,7 @@ class RecordingModel:
         return self.indicated(self.placed(values), self._split(values)[0])
 
     def estimate(self) -> Estimate:
-        """Iterate least squares until the estimates stand still.
-
-        Raises
-        ------
-        CmmUqError : the recording has too few observations.
-        """
+        """Iterate least squares until the estimates stand still."""
         return self._estimate
 
     @cached_property
@@ -202,7 +174,6 @@ class RecordingModel:
         return np.array([u.prior_mean for u in self.unknowns])
 
     def _iterated(self, most: int | None) -> Estimate:
-        """The estimate with so many combinations taken as determined, at the most."""
         values = self._beforehand
         for _ in range(10):
             linear = self.linearised(values)
@@ -276,7 +247,6 @@ class RecordingModel:
         return model._about(about).columns(effect, shape)
 
     def _about(self, values: Floats) -> About:
-        """Where columns are taken that are linear about parameters (k,)."""
         key = values.tobytes()
         if key not in self._abouts:
             self._abouts.clear()
@@ -285,12 +255,10 @@ class RecordingModel:
 
     @cached_property
     def _abouts(self) -> dict[bytes, About]:
-        """What :meth:`_about` found last."""
         return {}
 
     @cached_property
     def _placed(self) -> dict[bytes, Floats]:
-        """What :meth:`placed` found last: it is asked for again by every candidate of a diagnosis."""
         return {}
 
     def placed(self, values: Floats) -> Floats:

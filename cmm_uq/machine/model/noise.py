@@ -185,13 +185,11 @@ def axis_variances(along: Floats, noise_scale: Floats) -> Floats:
 
 
 def _axes_differ(axes: Floats) -> bool:
-    """Whether at least two axes show, and not in one proportion throughout."""
     parts = axes / axes.sum(axis=1, keepdims=True)
     return bool(np.sum(np.ptp(parts, axis=0) > _LEAST_SHARE) >= 2)
 
 
 def _lengths_differ(length: Floats) -> bool:
-    """Whether lengths (m,) differ by so much that noise may be seen to grow with them."""
     longer = length[length > _NO_LENGTH * length.max(initial=0.0)]
     return bool(len(longer)) and bool(longer.max() > _LEAST_SPREAD * np.median(longer))
 

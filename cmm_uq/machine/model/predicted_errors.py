@@ -46,12 +46,10 @@ class Frame:
 
     @property
     def angle(self) -> float:
-        """By which the frames are turned, rad."""
         return float(np.arccos(np.clip(0.5 * (np.trace(self.turn) - 1), -1.0, 1.0)))
 
     @property
     def is_the_same(self) -> bool:
-        """Whether both frames are one."""
         return bool(np.array_equal(self.turn, np.eye(3)) and not np.any(self.shift))
 
 
@@ -97,7 +95,6 @@ def predicted_errors(
 
 
 def _sizes(artefact: Artefact, length_mm: float | None) -> Floats:
-    """Of the artefact, as the simulation took them."""
     sizes = np.array([size.nominal for size in artefact.sizes])
     if length_mm is None:
         return sizes

@@ -35,12 +35,7 @@ def stated_sd(facts: ArtefactFacts, length_mm: float) -> float:
 
 
 def columns_needed(points: Points, names: tuple[str, ...], of: str, where: str | None) -> Floats:
-    """Recorded columns (n, j) without which this kind of artefact says nothing.
-
-    Raises
-    ------
-    CmmUqError : the recording lacks one.
-    """
+    """Recorded columns (n, j) without which this kind of artefact says nothing."""
     for name in names:
         if name not in points.columns:
             raise CmmUqError(f"no column {name!r}, which the recording of a {of} needs", where=where or "recording",
@@ -49,7 +44,6 @@ def columns_needed(points: Points, names: tuple[str, ...], of: str, where: str |
 
 
 def place(points: Points, rows: NDArray[np.bool_], where: str | None) -> str:
-    """File and line of the first of some points, for a message."""
     file = where or "recording"
     return f"{file} line {points.lines[np.flatnonzero(rows)[0]]}" if len(points.lines) else file
 
@@ -127,7 +121,6 @@ class Display:
 
     @cached_property
     def _all(self) -> sparse.csr_array:
-        """(m, 3·n)."""
         m, slots = self.rows.shape
         row = np.repeat(np.arange(m), 3 * slots)
         column = (3 * self.rows[:, :, None] + np.arange(3)).ravel()

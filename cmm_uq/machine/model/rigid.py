@@ -87,7 +87,6 @@ class Rigid(Artefact):
         return nominal, found
 
     def refuse_another_shape(self, fix: str, where: str | None) -> None:
-        """Refuse a recording none of whose placings has the artefact's shape."""
         misfit = np.sqrt(self.placings.sums(np.sum(self.deviations() ** 2, axis=1))) / self.extents()[0]
         if np.all(misfit > _ANOTHER_SHAPE):
             number = self.placings.numbers[0]

@@ -49,22 +49,12 @@ EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})  # all built-in effect
 
 
 def every() -> Mapping[str, Effect]:
-    """All effects by name, the built-in ones first, then those of other packages in the order of their names.
-
-    Raises
-    ------
-    CmmUqError : two packages offer the same name, or an effect of one is broken.
-    """
+    """All effects by name, the built-in ones first, then those of other packages in the order of their names."""
     return _every(tuple(sys.path))
 
 
 def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
-    """The named effects, in order. Of other packages only those named are imported.
-
-    Raises
-    ------
-    CmmUqError : a name is unknown, stands twice or is offered twice, or the effect is broken.
-    """
+    """The named effects, in order. Of other packages only those named are imported."""
     outside, found, wrong = _outside(tuple(sys.path)), list[Effect](), Gathered()
     for i, name in enumerate(names):
         with wrong.going_on():

@@ -32,21 +32,13 @@ BLOCK = 8192  # points computed at a time: as many as a processor's cache holds 
 
 @dataclass(frozen=True, eq=False)
 class PointConditions:
-    """What the error of a point depends on beside its coordinates.
+    """What the error of a point depends on beside its coordinates."""
 
-    Parameters
-    ----------
-    tip : (n, 3) or (3,) stylus tip offset from the end of the ram, mm.
-    temperatures : of the scales, (n, 3) or (3,), or of all, °C; see :meth:`ErrorMaps.at`.
-    lines : (n,) of the points in their file, for messages.
-    """
-
-    tip: Floats | None = None
-    temperatures: Floats | float | None = None
-    lines: Ints | None = None
+    tip: Floats | None = None  # (n, 3) or (3,) stylus tip offset from the end of the ram, mm
+    temperatures: Floats | float | None = None  # of the scales, (n, 3) or (3,), or of all, °C; see :meth:`ErrorMaps.at`
+    lines: Ints | None = None  # (n,) of the points in their file, for messages
 
     def of(self, rows: slice) -> PointConditions:
-        """The circumstances of some of the points."""
         tip = self.tip[rows] if self.tip is not None and self.tip.ndim == 2 else self.tip
         each = isinstance(self.temperatures, np.ndarray) and self.temperatures.ndim == 2
         temperatures = np.asarray(self.temperatures)[rows] if each else self.temperatures
@@ -58,19 +50,10 @@ NOMINAL = PointConditions()
 
 @dataclass(frozen=True, eq=False)
 class Compensation:
-    """How the readings of one machine become true coordinates.
-
-    Parameters
-    ----------
-    maps : its error maps.
-    chain : its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
-    origin : (3,) scale reading = coordinate + origin, mm.
-    rigid : True for exact rigid transformations; False to first order in displacements and rotations (Harris 2004
-        eq. 10–13), on axes that lean exactly.
-    beyond : what to do beyond the mapped positions and temperatures.
-    """
+    """How the readings of one machine become true coordinates."""
 
     maps: ErrorMaps  # its error maps
+    # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`
     chain: str | KinematicChain = (
         "XYZ"  # its carriages; see :meth:`cmm_uq.machine.physics.kinematics.KinematicChain.of`.
     )
@@ -87,10 +70,6 @@ class Compensation:
         ----------
         indicated : (n, 3) mm.
         when : tip, temperatures.
-
-        Raises
-        ------
-        CmmUqError : a point lies beyond the maps and ``beyond`` is "refuse".
         """
         readings = indicated + np.asarray(self.origin)
         form = exact if self.rigid else on_leaning_axes
@@ -109,12 +88,7 @@ class Compensation:
         return indicated + e, extrapolated
 
     def indicated_from_true(self, true: Floats, when: PointConditions = NOMINAL) -> tuple[Floats, NDArray[np.bool_]]:
-        """Coordinates (n, 3) in mm that the machine indicates at true coordinates; the inverse of :meth:`compensate`.
-
-        Raises
-        ------
-        CmmUqError : a point lies beyond the maps and ``beyond`` is "refuse", or the map is too steep to be turned round.
-        """
+        """Coordinates (n, 3) in mm that the machine indicates at true coordinates; the inverse of :meth:`compensate`."""
         # on the way a point of the edge may lie outside by its own error; where it ends is what counts
         onward = replace(self, beyond="extrapolate")
         indicated = np.array(true, dtype=np.float64)
@@ -156,10 +130,6 @@ def compensate_points(points: Points, compensation: Compensation) -> Points:
     """A recording at its true coordinates, with tip offsets and temperatures of the scales where it has their columns.
 
     Points beyond the maps, where they are allowed, are marked by 1 in the column ``extrapolated``.
-
-    Raises
-    ------
-    CmmUqError : see :meth:`Compensation.error`.
     """
     xyz, extrapolated = compensation.compensate(points.xyz, circumstances(points))
     return _moved(points, xyz, extrapolated)
@@ -168,19 +138,16 @@ def compensate_points(points: Points, compensation: Compensation) -> Points:
 def machine_compensation(
     points: Points, maps: ErrorMaps, *, rigid: bool = False, beyond: Beyond = "refuse"
 ) -> Compensation:
-    """Compensation of the machine that read the points, after a check that every map covers its travel."""
     for error_map in maps.maps:
         error_map.covers(points.machine)
     return Compensation(maps, points.machine.chain, points.machine.origin_mm, rigid, beyond)
 
 
 def circumstances(points: Points) -> PointConditions:
-    """Tip offsets and temperatures of the scales, where the recording has their columns."""
     return PointConditions(_three(points.columns, "tip_{}_mm"), _three(points.columns, "temp_{}_c"), points.lines)
 
 
 def _three(columns: Mapping[str, Floats], pattern: str) -> Floats | None:
-    """Columns (n, 3) of the three axes, or None where none is recorded."""
     names = [pattern.format(axis) for axis in AXES]
     given = [name for name in names if name in columns]
     if given and len(given) < 3:
@@ -241,11 +208,6 @@ def offset_plane(
     acceptance : largest angle A between the normal and D − C1 at which D is believed, rad. Every D must be within it.
     u_offset : standard uncertainty of the offset, mm.
     u_point : standard uncertainty of a contact point along the normal, mm; from the residuals when left out.
-
-    Raises
-    ------
-    CmmUqError : too few points or on one line, or an offset that is not positive.
-    DirectionPointError : a direction point is rejected, with what to measure again.
     """
     if not (np.isfinite(offset) and offset > 0):
         raise CmmUqError(f"a probe offset of {offset} mm", fix="Give the probe's effective radius in mm, above 0")
@@ -270,7 +232,6 @@ def offset_plane(
 
 
 def _cosines(normal: Floats, approach: Floats) -> Floats:
-    """Of the angles (d,) between the normal and the directions (d, 3) of approach."""
     distance = np.linalg.norm(approach, axis=1)
     if np.any(nowhere := ~(distance > 0)):
         raise DirectionPointError(
@@ -281,7 +242,6 @@ def _cosines(normal: Floats, approach: Floats) -> Floats:
 
 
 def _refuse_slanting(angles: Floats, acceptance: float) -> None:
-    """Of angles (d,) on the side of the first direction point."""
     if not np.any(slanting := angles > acceptance):
         return
     index = int(np.argmax(slanting))

@@ -29,7 +29,6 @@ class DigitizedCloud:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Columns of the result."""
         return (*COORDINATES, EXTRAPOLATED) if self.flagged else COORDINATES
 
     def __call__(self, rows: Floats) -> Floats:

@@ -158,14 +158,7 @@ def mount_axes(rotation: Floats) -> tuple[Floats, Floats, Floats]:
 
 @dataclass(frozen=True, eq=False)
 class Digitizer:
-    """A laser digitizer in one pose on a machine.
-
-    Parameters
-    ----------
-    attitude : (3, 3); see :func:`euler_313`.
-    offset : (3,) [U1 V1 W1], the mount in the digitizer's frame, mm.
-    compensation : of the machine; its origin is that of the scale readings, so usually 0.
-    """
+    """A laser digitizer in one pose on a machine."""
 
     attitude: Floats  # (3, 3); see :func:`euler_313`
     offset: Floats  # (3,) [U1 V1 W1], the mount in the digitizer's frame, mm

@@ -251,7 +251,6 @@ class Harmonic(Effect):
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
-        """Amplitude, shape, phase."""
         return (self.amplitude, *self.shape, Parameter("phase_rad", unit("rad"), np.pi, say("phase")))
 
     def to_reported(self, coefficients: Floats, shape: Floats) -> dict[str, Floats]:
@@ -298,7 +297,6 @@ class CommonSize(Effect):
 
     @property
     def reported(self) -> tuple[Parameter | Shape, ...]:
-        """The size alone."""
         return (self.size,)
 
     def errors(self, coefficients: Floats) -> Floats:
@@ -313,12 +311,7 @@ class CommonSize(Effect):
         return {self.size.name: np.sqrt(np.mean(errors**2, axis=-1))}
 
     def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
-        """Coefficients (k,) of exactly this size, drawn by the ``seed`` that may stand beside it.
-
-        Raises
-        ------
-        CmmUqError : the size is missing, a parameter is unknown, or the seed is no whole number.
-        """
+        """Coefficients (k,) of exactly this size, drawn by the ``seed`` that may stand beside it."""
         for name in parameters:
             if name not in (self.size.name, SEED):
                 raise CmmUqError(f"{self.name} has no parameter {name!r}", fix=suggestion(name, [self.size.name, SEED]))

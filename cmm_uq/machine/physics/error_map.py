@@ -44,7 +44,6 @@ class AxisErrors:
 
     @property
     def span(self) -> tuple[float, float]:
-        """First and last position, mm."""
         return float(self.positions[0]), float(self.positions[-1])
 
 
@@ -70,7 +69,6 @@ class ErrorMap:
         }
 
     def covers(self, machine: Machine) -> None:
-        """Check that the map reaches over the machine's travel."""
         for axis, carriage in zip(AXES, self.axes, strict=True):
             low, high = machine.travel_mm[AXES.index(axis)]
             first, last = carriage.span
@@ -127,7 +125,6 @@ def write_error_map(error_map: ErrorMap, path: Path) -> None:
 
 
 def check_positions(axis: str, positions: Sequence[float], places: Sequence[str], where: str) -> None:
-    """Refuse positions that are too few, unsorted or there twice."""
     if len(positions) < 2:
         raise CmmUqError(f"axis {axis} has {len(positions)} positions", where=where, fix="An axis needs two or more")
     seen = set(positions[:1])
@@ -146,7 +143,6 @@ def check_positions(axis: str, positions: Sequence[float], places: Sequence[str]
 
 
 def check_units(carriages: Sequence[AxisErrors], where: str) -> None:
-    """Refuse a map whose numbers cannot be µm and arc seconds: a thousand times too small, or far too large."""
     displacements = np.abs(np.concatenate([c.errors[:, :3].ravel() for c in carriages])) / MICROMETRE
     rotations = np.abs(np.concatenate([c.errors[:, 3:].ravel() for c in carriages])) / ARCSECOND
     fix = "Convert displacements to µm and rotations to arc seconds"
@@ -206,7 +202,6 @@ def read_error_map_text(path: Path, *, temperature: float = 20.0) -> ErrorMap:
 
 
 def parse_error_map_text(content: bytes, where: str, *, temperature: float = 20.0) -> ErrorMap:
-    """Error map and squareness from the content of a contractor's text file; see :func:`read_error_map_text`."""
     reading = _Reading()
     lines = content.decode("utf-8-sig", errors="replace").splitlines()
     if len(lines) > MAP_ROWS.most or len(max(lines, key=len, default="")) > LINE.most:
@@ -236,7 +231,6 @@ def tables_of(text: str) -> list[str]:
 
 
 def error_map_text(error_map: ErrorMap, *, name: str = "errors.txt") -> str:
-    """Contractor's text of a map, as :func:`read_error_map_text` reads it."""
     lines = [f"File Name: {name}", "", "Axis Parameters:", "Axis\tMin Position\tMax Position\tPoints"]
     for axis, carriage in zip(AXES, error_map.axes, strict=True):
         low, high = carriage.span

@@ -68,12 +68,7 @@ _SQUARE = re.compile(r"(?:s|squareness)_?([xyz])([xyz])")
 
 
 def parametric_error(name: str) -> ParametricError:
-    """The error that a name of VDI/VDE 2617 (``ytx``) or of the δ/ε notation (``δx(y)``, ``epsilon_z(x)``) means.
-
-    Raises
-    ------
-    CmmUqError : no such error.
-    """
+    """The error that a name of VDI/VDE 2617 (``ytx``) or of the δ/ε notation (``δx(y)``, ``epsilon_z(x)``) means."""
     text = name.strip().lower()
     found = None
     if match := _VDI.fullmatch(text):

@@ -102,7 +102,6 @@ class ErrorMaps:
         self._axes = tuple(self._stack(i) for i in range(3))
 
     def span(self, axis: str) -> tuple[float, float]:
-        """First and last position of an axis that every map has, mm."""
         positions = self._axes[AXES.index(axis)].positions
         return float(positions[0]), float(positions[-1])
 
@@ -124,10 +123,6 @@ class ErrorMaps:
         beyond : what to do beyond the mapped positions and temperatures.
         lines : (n,) of the points in their file, for messages.
         first : number of the first point, for messages where there are no lines.
-
-        Raises
-        ------
-        CmmUqError : a reading is no number, or a point lies beyond and ``beyond`` is "refuse".
         """
         outside = self._outside(readings)
         if beyond == "refuse" and outside.any():
@@ -142,12 +137,7 @@ class ErrorMaps:
         return LookedUp(errors.transpose(2, 0, 1), self._squareness(*weights[3]), outside.any(axis=1) | hot)
 
     def map_at(self, temperature: float, *, beyond: Beyond = "refuse") -> ErrorMap:
-        """The map that all scales at one temperature are looked up in, °C, at the positions of all maps.
-
-        Raises
-        ------
-        CmmUqError : it lies beyond the calibrated temperatures and ``beyond`` is "refuse", or is no number.
-        """
+        """The map that all scales at one temperature are looked up in, °C, at the positions of all maps."""
         low, high = self.temperatures[0], self.temperatures[-1]
         near = low - TEMPERATURE_MARGIN <= temperature <= high + TEMPERATURE_MARGIN
         if not near and (beyond == "refuse" or not np.isfinite(temperature)):

@@ -25,7 +25,6 @@ class EffectPlugin(Plugin):
 
     @cached_property
     def effect(self) -> Effect:
-        """The effect itself; its package is imported now."""
         made = self.loaded(Effect)  # type: ignore[type-abstract]
         for field in ("title", "formula", "mechanism", "points_to", "coefficients"):
             if not getattr(made, field, None):

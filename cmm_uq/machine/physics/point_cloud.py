@@ -31,7 +31,6 @@ _FIX = "Save the cloud as CSV in UTF-8: a line of names, then one line a point"
 
 
 def csv_header(path: Path) -> tuple[str, ...]:
-    """Names of the columns."""
     with _opened(path) as file:
         return _header(file, path)[0]
 
@@ -101,7 +100,6 @@ def _values(lines: list[str], at: list[int], header: Sequence[str], places: Sequ
 
 
 def _header(file: BinaryIO, path: Path) -> tuple[tuple[str, ...], int]:
-    """Names of the columns, and their line."""
     number = 0
     while line := _line(file, path, number + 1):
         number += 1
@@ -152,7 +150,6 @@ def _check_length(line: bytes, path: Path, number: int) -> None:
 
 
 def _line(file: BinaryIO, path: Path, number: int) -> str:
-    """The next line with its end; empty at the end of the file."""
     line = file.readline(LINE.most + 1)
     return f"{_texts([line.rstrip()], path, number)[0]}\n" if line else ""
 
@@ -190,11 +187,6 @@ def transform_cloud(
     Returns
     -------
     number of points written.
-
-    Raises
-    ------
-    CmmUqError : a file cannot be read or is no such cloud, or the transformation refuses a point (with its row).
-    OutputError : the target cannot be written.
     """
     unfinished = target.with_name(f".unfinished-{target.name}")
     writer = {".parquet": _written_parquet, ".csv": written_csv}.get(target.suffix, _written_npy)
@@ -234,7 +226,6 @@ def cloud_blocks(source: Path, columns: Sequence[str] = DIGITIZER_COLUMNS, *, bl
 
 
 def cloud_files(source: Path) -> list[Path]:
-    """Files of a cloud, in the order in which they are read."""
     files = sorted(source.glob("*.npy")) if source.is_dir() else [source]
     if not files:
         raise CmmUqError("no .npy files in this folder", where=str(source), fix="Name the folder that holds the cloud")

@@ -102,7 +102,6 @@ class Superposition:
 
     @property
     def _leaning(self) -> list[tuple[int, Effect]]:
-        """The effects that are a squareness, each with the place of its coefficient."""
         first = np.cumsum([0, *(len(effect.coefficients) for effect in self.effects)])
         return [(int(i), effect) for i, effect in zip(first, self.effects, strict=False) if effect.plane]
 

@@ -57,11 +57,9 @@ class Body:
         return np.asarray(known[index[len(self.keys) :]])
 
     def covers(self, points: Points) -> bool:
-        """Whether every point is one of its places."""
         return bool(np.all(self.nodes(points) >= 0))
 
     def poses(self, points: Points) -> Poses:
-        """How it lay in each set-up, by least squares."""
         return _poses(self, points)
 
     def about_middle(self) -> Floats:

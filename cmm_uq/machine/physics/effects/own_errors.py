@@ -51,22 +51,18 @@ class OwnFault(Effect):
         return PRIOR_WEIGHT[OWN] if self.owner is None else self.owner.weight
 
     def made(self, owner: FaultyArtefact) -> OwnFault:
-        """The fault of one artefact."""
         found = copy(self)
         found.owner, found.mostly = owner, owner.mostly
         found.coefficients = found.sized(owner)
         return found
 
     def sized(self, owner: FaultyArtefact) -> tuple[Parameter, ...]:
-        """The coefficients with the size that is plausible for this artefact."""
         return tuple(Parameter(c.name, c.unit, owner.size) for c in self.coefficients)
 
     def belongs_to(self, points: Points) -> bool:
-        """Whether it is a fault of the artefact that was recorded in these points."""
         return self.owner is not None and self.owner.body.covers(points)
 
     def whose(self) -> FaultyArtefact:
-        """The artefact."""
         if self.owner is None:
             raise CmmUqError(
                 f"this kind of artefact has no {self.name}", where="job.toml [model] effects", fix="Leave it out"
@@ -121,7 +117,6 @@ class OwnGeometry(OwnFault):
         return self.effect.course(self._there(points))
 
     def _lies(self, owner: FaultyArtefact) -> None:
-        """Find where it is like the machine's error: in the set-up least turned against its own axes, however numbered."""
         poses = owner.body.poses(owner.points)
         middle = owner.body.places.mean(axis=0)
         _, first = np.unique(owner.points.measurement, return_index=True)
@@ -132,7 +127,6 @@ class OwnGeometry(OwnFault):
         self._rotation, self._origin = poses.rotation[row], poses.origin[row]
 
     def _there(self, points: Points) -> Points:
-        """The same points as they would lie in the reference set-up."""
         body = self.whose().body
         places = body.places[body.poses(points).node]
         return points.at(self._origin + places @ self._rotation.T)

@@ -51,7 +51,6 @@ class OfSetUps(OwnFault, CommonSize):
         )
 
     def numbered(self, owner: FaultyArtefact) -> Ints:
-        """Numbers of the coefficients: those of the set-ups."""
         return np.unique(owner.points.measurement)
 
     def made(self, owner: FaultyArtefact) -> OwnFault:
@@ -225,7 +224,6 @@ def _normals(points: Points) -> Floats:
 
 
 def _turned(points: Points) -> Floats:
-    """How far the sphere was turned, rad: not at all where nothing says so."""
     return np.radians(points.columns.get(TURNED, np.zeros(len(points))))
 
 
