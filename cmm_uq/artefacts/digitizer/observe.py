@@ -40,7 +40,7 @@ from cmm_uq.machine.model.artefact import Artefact, Placings, Size
 from cmm_uq.machine.model.radial import Radial
 from cmm_uq.machine.model.recorded import expansion
 from cmm_uq.machine.physics.digitizer import Alignment, MountOffset, mount_offset
-from cmm_uq.machine.physics.effects.scanning import attitudes
+from cmm_uq.machine.physics.effects.probing import attitudes
 from cmm_uq.maths.inference.linear_model import Freedoms
 
 

@@ -16,7 +16,8 @@ from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE
 from cmm_uq.machine.model.artefact import Placings
 from cmm_uq.machine.model.recorded import columns_needed, place
-from cmm_uq.machine.physics.digitizer import Alignment, align_on_sphere, euler_313
+from cmm_uq.machine.physics.digitizer import Alignment, align_on_sphere
+from cmm_uq.machine.physics.kinematics import euler_313
 
 ANGLES = ("alpha_deg", "beta_deg", "gamma_deg")
 SCAN = ("u_mm", "v_mm")

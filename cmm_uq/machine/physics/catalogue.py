@@ -2,8 +2,7 @@
 
 ``CATALOGUE`` holds the effects that every job file may count on. ``FURTHER`` holds rarer ones: a job may name them, simulate
 them and have them estimated like the others; a diagnosis thinks of them less readily. ``OWN`` holds the faults of the artefact
-itself. Other packages add theirs
-(:mod:`cmm_uq.machine.physics.plugins`); :func:`every` has them all.
+itself. Other packages add theirs (:mod:`cmm_uq.machine.physics.plugins`); :func:`every` has them all.
 """
 
 from __future__ import annotations
@@ -14,38 +13,20 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from cmm_uq.base.errors import CmmUqError, Gathered, suggestion
-from cmm_uq.machine.physics.effect import Effect
-from cmm_uq.machine.physics.effects import (
-    drives,
-    own_errors,
-    own_states,
-    probing,
-    reversal,
-    rigid_body,
-    scales,
-    scanning,
-    stylus,
-    thermal,
-    warming,
-)
+from cmm_uq.machine.physics.effect import CONTRACT, FURTHER as RARER, OWN as OF_ARTEFACTS, Effect
+from cmm_uq.machine.physics.effects import drives, own_errors, own_states, probing, rigid_body, thermal
 from cmm_uq.machine.physics.plugins import EffectPlugin, outside_effects
 
-CATALOGUE = MappingProxyType(
-    {effect.name: effect for effect in (*rigid_body.EFFECTS, *drives.EFFECTS, *thermal.EFFECTS, *probing.EFFECTS)}
-)
-"""Built-in effects by name."""
+_ROOMS = (rigid_body, drives, thermal, probing, own_errors, own_states)
 
-FURTHER = MappingProxyType(
-    {
-        effect.name: effect
-        for effect in (*reversal.EFFECTS, *scales.EFFECTS, *warming.EFFECTS, *stylus.EFFECTS, *scanning.EFFECTS)
-    }
-)
-"""Further built-in effects by name."""
 
-# faults of the artefact itself by name: what they do follows from the artefact that has them
-OWN = MappingProxyType({effect.name: effect for effect in (*own_errors.EFFECTS, *own_states.EFFECTS)})
-EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})  # all built-in effects by name
+def _of_tier(tier: str) -> Mapping[str, Effect]:
+    return MappingProxyType({effect.name: effect for room in _ROOMS for effect in room.EFFECTS if effect.tier == tier})
+
+
+# built-in effects by name; of faults of the artefact itself, what they do follows from the artefact that has them
+CATALOGUE, FURTHER, OWN = _of_tier(CONTRACT), _of_tier(RARER), _of_tier(OF_ARTEFACTS)
+EVERY = MappingProxyType({**CATALOGUE, **FURTHER, **OWN})
 
 
 def every() -> Mapping[str, Effect]:
@@ -55,16 +36,16 @@ def every() -> Mapping[str, Effect]:
 
 def effects(names: Sequence[str], *, where: str | None = None) -> tuple[Effect, ...]:
     """The named effects, in order. Of other packages only those named are imported."""
-    outside, found, wrong = _outside(tuple(sys.path)), list[Effect](), Gathered()
+    outside, chosen, wrong = _outside(tuple(sys.path)), list[Effect](), Gathered()
     for i, name in enumerate(names):
         with wrong.going_on():
             if name not in EVERY and name not in outside:
                 raise CmmUqError(f"unknown effect {name!r}", where=where, fix=suggestion(name, {*EVERY, *outside}))
             if name in names[:i]:
                 raise CmmUqError(f"the effect {name!r} is named twice", where=where, fix="Name it once")
-            found.append(EVERY[name] if name in EVERY else outside[name].effect)
+            chosen.append(EVERY[name] if name in EVERY else outside[name].effect)
     wrong.refuse()
-    return tuple(found)
+    return tuple(chosen)
 
 
 def plugins(names: Iterable[str] | None = None) -> dict[str, str]:

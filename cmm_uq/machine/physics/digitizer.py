@@ -26,35 +26,11 @@ from numpy.typing import NDArray
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.points import Floats
 from cmm_uq.machine.physics.compensation import BLOCK, Compensation, PointConditions
-from cmm_uq.machine.physics.kinematics import on_leaning_axes
+from cmm_uq.machine.physics.kinematics import euler_313, on_leaning_axes
 from cmm_uq.machine.physics.map_interpolation import LookedUp
 from cmm_uq.maths.geometry import fit_plane, fit_sphere
 from cmm_uq.maths.geometry.feature import frame_about
 from cmm_uq.maths.geometry.orthogonal_distance import minimise
-
-
-def euler_313(alpha: float | Floats, beta: float | Floats, gamma: float | Floats) -> Floats:
-    """Attitude (3, 3) from angles about Z, X′ and Z″, rad (Harris 2004 eq. 7): columns are u, v, w in machine axes.
-
-    Angles (n,) give attitudes (3, 3, n).
-    """
-    ca, sa, cb, sb, cg, sg = (f(a) for a in (alpha, beta, gamma) for f in (np.cos, np.sin))
-    return np.array(
-        [
-            [ca * cg - sa * cb * sg, -ca * sg - sa * cb * cg, sa * sb],
-            [ca * cb * sg + sa * cg, ca * cb * cg - sa * sg, -ca * sb],
-            [sb * sg, sb * cg, cb],
-        ]
-    )
-
-
-def euler_angles(attitude: Floats) -> tuple[float, float, float]:
-    """Angles α, β, γ in rad of an attitude (3, 3); α = 0 where w is along ±Z and only their sum or difference shows."""
-    u, v, w = attitude.T
-    beta = float(np.arctan2(np.hypot(w[0], w[1]), w[2]))
-    if np.hypot(w[0], w[1]) < 1e-12:
-        return 0.0, beta, float(np.arctan2(-v[0], u[0]))
-    return float(np.arctan2(w[0], -w[1])), beta, float(np.arctan2(u[2], v[2]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,15 +1,8 @@
-"""What an effect is: a named piece of physics that moves points; and effects of many coefficients with one size in common.
-
-What an effect is: a named piece of physics that moves points.
+"""What an effect is: a named piece of physics that moves points; families of effects, and effects of one common size.
 
 The sign rule is *true = indicated + e*. An effect gives e, in mm, for points read on a machine. Almost every parameter
 enters e linearly; such an effect only gives its :meth:`~Effect.basis`, and Jacobian, evidence and marginal posterior are
 exact linear algebra. What is truly nonlinear (a period) is a *shape* of the basis, to be searched or sampled.
-
-Effects of many coefficients that have one size in common: errors of which only the size is known beforehand.
-
-Reported is the root mean square of what they do. Its draws are those of a posterior in which that common size is known as well
-as the coefficients tell it: without that, noise would add to it.
 """
 
 from __future__ import annotations
@@ -23,19 +16,28 @@ from typing import ClassVar
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError, suggestion
-from cmm_uq.base.messages import NOTHING, Text, say
+from cmm_uq.base.messages import NOTHING, Message, Text, Verbatim, say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import Unit, unit
 
+# tiers: effects that every job file may count on, rarer ones, and faults of the artefact itself
 CONTRACT, FURTHER, OWN = "contract", "further", "own"
-"""Tiers: effects that every job file may count on, rarer ones that only some machines and recordings show, and faults of the
-artefact itself."""
-
+# how readily an effect of a tier is thought of: a judgement of how many machines show it
 PRIOR_WEIGHT = {CONTRACT: 1.0, FURTHER: 0.1, OWN: 0.1}
-"""How readily an effect of a tier is thought of, beside others: a judgement of how many machines show it. A fault of the
-artefact has a weight by what is known of that artefact."""
+TRIALS = 7  # values of a nonlinear parameter
+# blanks in words: the axes, and of the reported amount its size, side and sense, and the size of a second parameter
+_BLANKS = ("axis", "other", "size", "side", "sense", "second")
+AXIS, OTHER, SIZE, SIDE, SENSE, SECOND = (Verbatim(f"‹{blank}›") for blank in _BLANKS)
 
-TRIALS = 7
+
+def filled(text: Text, blanks: Mapping[Text, Text]) -> Text:
+    """A message with its blanks filled in."""
+    if not isinstance(text, Message):
+        return text
+    values = {
+        name: blanks.get(value, value) if isinstance(value, Text) else value for name, value in text.arguments.items()
+    }
+    return Message(text.pattern, values)
 
 
 @dataclass(frozen=True)
@@ -133,6 +135,8 @@ class Effect(ABC):
     plane : pair of axes whose squareness it is (``xy``, ``yz``, ``zx``), if it is one; it then gives its :meth:`lean`.
     of_artefact : whether it is a fault of the artefact itself, which only that artefact can say in full.
     mostly : part of its prior standard deviation that it mostly keeps to, where a certificate says so and may be wrong.
+    means : what a reported amount means at the machine, in words with blanks; see :meth:`meaning`.
+    sense : one word for a positive amount and one for a negative one, where these words differ in one.
     """
 
     name: str
@@ -152,6 +156,8 @@ class Effect(ABC):
     plane: str | None = None
     of_artefact: bool = False
     mostly: float = 1.0
+    means: Text = NOTHING
+    sense: tuple[Text, Text] = (NOTHING, NOTHING)
 
     @property
     def prior_weight(self) -> float:
@@ -187,7 +193,18 @@ class Effect(ABC):
         ----------
         amounts : of each reported parameter, by name.
         """
-        return NOTHING
+        if not self.means:
+            return NOTHING
+        first, *further = (amounts.get(parameter.name) for parameter in self.reported)
+        amount = first or Amount(NOTHING)
+        second = further[0].size if further and further[0] else NOTHING
+        sizes: dict[Text, Text] = {
+            SIZE: amount.size,
+            SIDE: amount.side,
+            SENSE: amount.more(*self.sense),
+            SECOND: second,
+        }
+        return filled(self.means, sizes)
 
     def belongs_to(self, points: Points) -> bool:
         """Whether a fault of an artefact is that of the artefact in these points."""
@@ -244,6 +261,42 @@ class Effect(ABC):
         return np.asarray(self.basis(points, shape) @ coefficients, dtype=np.float64)
 
 
+class Family(Effect):
+    """One of several effects that differ by axes, whose letters fill the blanks of its words.
+
+    In names of columns ``{a}`` is its axis.
+    """
+
+    family: ClassVar[str]  # first part of the name
+
+    def __init__(self, axis: str, *others: str) -> None:
+        self.axis = axis
+        self.name = "_".join((self.family, axis, *others))
+        self.columns = tuple(column.format(a=axis) for column in self.columns)
+        self.fill({AXIS: axis, OTHER: others[0] if others else axis})
+
+    def fill(self, letters: Mapping[Text, str]) -> None:
+        blanks: dict[Text, Text] = {blank: Verbatim(letter.upper()) for blank, letter in letters.items()}
+        self.title, self.points_to, self.means = (
+            filled(text, blanks) for text in (self.title, self.points_to, self.means)
+        )
+
+
+class OfAxis(Family):
+    """An effect along the motion of one carriage."""
+
+    def __init__(self, axis: str) -> None:
+        super().__init__(axis)
+        self.along_motion = axis
+
+    @abstractmethod
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        """Displacement of every point along the axis for one unit of the coefficient, (n,) mm."""
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return along(self.axis, self.component(points, shape))
+
+
 class Harmonic(Effect):
     """An effect A·sin(… + φ) or A·cos(… + φ): linear in A·cos φ and A·sin φ, reported as amplitude and phase."""
 
@@ -268,29 +321,24 @@ class Harmonic(Effect):
 
 
 def along(axis: str, component: Floats) -> Floats:
-    """A one-column basis (n, 3, 1) that moves points along one axis by ``component`` (n,), mm."""
-    basis = np.zeros((len(component), 3, 1))
-    basis[:, "xyz".index(axis), 0] = component
+    """A basis (n, 3, k) that moves points along one axis by ``component`` (n,) or (n, k), mm."""
+    columns = component.reshape(len(component), -1)
+    basis = np.zeros((len(columns), 3, columns.shape[1]))
+    basis[:, "xyz".index(axis)] = columns
     return basis
 
 
-SEED = "seed"
-"""Beside the size, in a truth: which of all errors of this size."""
-
-
-_GRID, _HELD = 2000, 1e-9
-"""Of sizes; part of the largest variance below which a combination is held."""
-
+SEED = "seed"  # beside the size, in a truth: which of all errors of this size
+_GRID, _HELD = 2000, 1e-9  # of sizes; part of the largest variance below which a combination is held
+# multiples of it spread evenly over the unit interval, and neighbours lie apart: draws of a chain share nothing with them
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-"""Multiples of it spread evenly over the unit interval, and neighbours lie apart: draws of a chain share nothing with them."""
 
 
 class CommonSize(Effect):
-    """See the module's docstring.
+    """Errors of many coefficients of which only the common size is known beforehand, in the unit of the coefficients.
 
-    Attributes
-    ----------
-    size : reported, in the unit of the coefficients.
+    Reported is the root mean square of what they do. Its draws are those of a posterior in which that size is known as well
+    as the coefficients tell it: without that, noise would add to it.
     """
 
     size: Parameter

@@ -353,3 +353,18 @@ def rotate(rotation: Floats, vectors: Floats) -> Floats:
     second = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
     turned = np.cross(rotation, vectors)
     return np.asarray(vectors + first * turned + second * np.cross(rotation, turned))
+
+
+def euler_313(alpha: float | Floats, beta: float | Floats, gamma: float | Floats) -> Floats:
+    """Attitude (3, 3) from angles about Z, X′ and Z″, rad (Harris 2004 eq. 7): columns are u, v, w in machine axes.
+
+    Angles (n,) give attitudes (3, 3, n).
+    """
+    ca, sa, cb, sb, cg, sg = (f(a) for a in (alpha, beta, gamma) for f in (np.cos, np.sin))
+    return np.array(
+        [
+            [ca * cg - sa * cb * sg, -ca * sg - sa * cb * cg, sa * sb],
+            [ca * cb * sg + sa * cg, ca * cb * cg - sa * sg, -ca * sb],
+            [sb * sg, sb * cg, cb],
+        ]
+    )

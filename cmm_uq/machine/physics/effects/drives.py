@@ -1,4 +1,9 @@
-"""Errors of drives and scales: periodic error, backlash and friction, drift with time."""
+"""Errors of drives, scales and guideways: periodic error, what changes when an axis turns round, drift, air on a laser.
+
+What changes at reversal shares a sign: half of it each way. A scale that is not parallel to its axis, or a gauge not parallel
+to a line (cosine error), is a constant factor −½θ² at any place and cannot be told from the scale error of that axis; so it is
+no effect of its own.
+"""
 
 from __future__ import annotations
 
@@ -8,106 +13,291 @@ import numpy as np
 
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.physics.effect import Amount, Effect, Harmonic, Nonparametric, Parameter, Shape, along
+from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, REFERENCE_TEMPERATURE, unit
+from cmm_uq.machine.physics.effect import (
+    AXIS,
+    FURTHER,
+    OTHER,
+    SECOND,
+    SIDE,
+    SIZE,
+    Amount,
+    Effect,
+    Family,
+    Harmonic,
+    Nonparametric,
+    OfAxis,
+    Parameter,
+    Shape,
+    along,
+    filled,
+)
+from cmm_uq.machine.physics.effects.rigid_body import bow, turned
+from cmm_uq.maths.uncertainty.air.refractivity import harris_2004
+
+_MILLISECOND = 1e-3  # 1 ms in s
+_PASCAL_PER_HPA = 100.0
+_CO2_PPM, _HENE_NM = 450.0, 632.991
+AIR = ("temp_air_c", "pressure_hpa", "humidity_pct")
+_STANDARD = tuple(np.array(value) for value in (REFERENCE_TEMPERATURE, 101325.0, 50.0, _CO2_PPM, _HENE_NM))
 
 
-class PeriodicScale(Harmonic):
+class PeriodicScale(OfAxis, Harmonic):
     """Periodic error of a scale, leadscrew or rack."""
 
+    family, title = "periodic_scale", say("Periodic scale error of {axis}", axis=AXIS)
     formula = "e_a = A·sin(2π a/λ + φ)"
     mechanism = "scale"
     points_to = say("an error that repeats with the period: scale interpolation, leadscrew or rack")
-
+    means = say(
+        "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
+        axis=AXIS, amplitude=SIZE, period=SECOND,
+    )  # fmt: skip
+    several = say(
+        "the error of {axis} swings to either side by {amplitude} and repeats with one of several periods",
+        axis=AXIS, amplitude=SIZE,
+    )  # fmt: skip
     amplitude = Parameter("amplitude_um", unit("µm"), 10.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 10.0), Parameter("sine_um", unit("µm"), 10.0))
 
     def __init__(self, axis: str) -> None:
-        self.axis = self.along_motion = axis
-        self.name = f"periodic_scale_{axis}"
-        self.title = say("Periodic scale error of {axis}", axis=Verbatim(axis.upper()))
+        super().__init__(axis)
         self.shape = (Shape("period_mm", unit("mm"), 0.5, 1000.0, period_along=axis, what=say("period")),)
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis),)
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amplitude = amounts[self.amplitude.name].size
-        if self.shape[0].name not in amounts:
-            return say(
-                "the error of {axis} swings to either side by {amplitude} and repeats with one of several periods",
-                axis=Verbatim(self.axis.upper()), amplitude=amplitude,
-            )  # fmt: skip
-        period = amounts[self.shape[0].name].size
-        return say(
-            "the error of {axis} swings to either side by {amplitude} and repeats every {period}",
-            axis=Verbatim(self.axis.upper()), amplitude=amplitude, period=period,
-        )  # fmt: skip
+        if self.shape[0].name in amounts:
+            return super().meaning(amounts)
+        blanks: dict[Text, Text] = {AXIS: Verbatim(self.axis.upper()), SIZE: amounts[self.amplitude.name].size}
+        return filled(self.several, blanks)
 
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
         (period,) = shape
         angle = 2 * np.pi * points.readings[self.axis] / period
-        return np.concatenate(
-            [along(self.axis, MICROMETRE * np.sin(angle)), along(self.axis, MICROMETRE * np.cos(angle))], axis=2
-        )
+        return MICROMETRE * np.column_stack([np.sin(angle), np.cos(angle)])
 
 
-class Hysteresis(Effect):
+class Hysteresis(OfAxis):
     """Different readings from either side."""
 
+    family, title = "hysteresis", say("Hysteresis of {axis}", axis=AXIS)
     formula = "e_a = ½·gap·approach_a"
     mechanism = "drive"
     points_to = say("backlash or friction in this drive: the reading depends on the side it is reached from")
-
+    means = say(
+        "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when it comes from "
+        "plus", axis=AXIS, size=SIZE, side=SIDE,
+    )  # fmt: skip
     coefficients = (Parameter("gap_um", unit("µm"), 30.0),)
+    columns = ("approach_{a}",)
 
     def __init__(self, axis: str) -> None:
-        self.axis = self.along_motion = axis
-        self.name = f"hysteresis_{axis}"
-        self.title = say("Hysteresis of {axis}", axis=Verbatim(axis.upper()))
-        self.columns = (f"approach_{axis}",)
+        super().__init__(axis)
         self.idealised_over = axis
         self.imitated_by = (Nonparametric(f"approach_{axis}"),)
 
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "at the same reading {axis} stands {size} further towards {side} when it comes from minus than when "
-            "it comes from plus",
-            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side,
-        )  # fmt: skip
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.axis, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return 0.5 * MICROMETRE * points.column(f"approach_{self.axis}")
 
 
-class Drift(Effect):
+class Drift(OfAxis):
     """Drift of an axis with time."""
 
+    family, title = "drift", say("Drift of {axis} with time", axis=AXIS)
     formula = "e_a = v · time"
     mechanism = "temperature"
     points_to = say("the axis drifts with time: warm-up, or the room's temperature")
-
+    means = say("at the same reading {axis} moves towards {side} by {size}", axis=AXIS, side=SIDE, size=SIZE)
     coefficients = (Parameter("um_per_h", unit("µm/h"), 10.0),)
     columns = ("time_s",)
     idealised_over = "time_s"
 
-    def __init__(self, axis: str) -> None:
-        self.axis = self.along_motion = axis
-        self.name = f"drift_{axis}"
-        self.title = say("Drift of {axis} with time", axis=Verbatim(axis.upper()))
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return MICROMETRE * points.hours
 
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "at the same reading {axis} moves towards {side} by {size}",
-            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side,
-        )  # fmt: skip
+
+class Play(Family):
+    """Lateral play: carriage a steps sideways along b when it turns round.
+
+    Worn or badly set bearings of the guideway. Along its own direction the same is hysteresis.
+    """
+
+    family, title = "play", say("Lateral play of {axis} along {direction}", axis=AXIS, direction=OTHER)
+    formula = "e_b = ½·gap·approach_a"
+    mechanism = "guideway"
+    points_to = say(
+        "play across the guideway of {axis}: check wear, preload and air gap of the bearings that hold the carriage along "
+        "{direction}", axis=AXIS, direction=OTHER,
+    )  # fmt: skip
+    means = say(
+        "at the same reading the probe stands {size} further towards {side} {direction} when {axis} comes from minus than "
+        "when it comes from plus", axis=AXIS, direction=OTHER, size=SIZE, side=SIDE,
+    )  # fmt: skip
+    coefficients = (Parameter("gap_um", unit("µm"), 10.0),)
+    columns = ("approach_{a}",)
+    tier = FURTHER
+
+    def __init__(self, axis: str, direction: str) -> None:
+        super().__init__(axis, direction)
+        self.direction = direction
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.axis, MICROMETRE * points.hours)
+        return along(self.direction, 0.5 * MICROMETRE * points.column(f"approach_{self.axis}"))
 
 
+class YawPlay(Family):
+    """Carriage a yaws when it turns round, and moves the ram by what it carries.
+
+    A bridge that is driven at one leg, or a drive that is not in line with friction and mass.
+    """
+
+    family, title = "yaw_play", say("Yaw of carriage {axis} at reversal", axis=AXIS)
+    formula = "e = ε × what carriage a carries, ε_z = ½·angle·approach_a"
+    mechanism = "guideway"
+    points_to = say(
+        "carriage {axis} yaws when it turns round: check the side bearings of its guideway, and where its drive takes hold "
+        "beside its middle", axis=AXIS,
+    )  # fmt: skip
+    coefficients = (Parameter("angle_arcsec", unit("″"), 2.0),)
+    columns = ("approach_{a}",)
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return turned(points, self.axis, "z", 0.5 * ARCSECOND * points.column(f"approach_{self.axis}"))
+
+
+class WindUp(OfAxis):
+    """Hysteresis that grows along the travel.
+
+    A leadscrew or belt that winds up between motor and carriage, or is worn at one end ("unequal backlash").
+    """
+
+    family, title = "windup", say("Wind-up of the drive of {axis}", axis=AXIS)
+    formula = "e_a = ½·w·approach_a·(a − middle of the travel)"
+    mechanism = "drive"
+    points_to = say(
+        "the drive of {axis} winds up, or is worn more at one end of the travel: check leadscrew, belt or rack, its tension "
+        "and its end bearings", axis=AXIS,
+    )  # fmt: skip
+    coefficients = (Parameter("um_per_m", unit("µm/m"), 20.0),)
+    columns = ("approach_{a}",)
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        low, high = points.machine.travel(self.axis)
+        place = (points.readings[self.axis] - 0.5 * (low + high)) / METRE
+        return 0.5 * MICROMETRE * points.column(f"approach_{self.axis}") * place
+
+
+class SpeedLag(OfAxis):
+    """Scale and trigger read at different moments.
+
+    A positive lag: the scale was read before the probe was where it triggered. Speed along a is the recorded speed times
+    the direction of travel.
+    """
+
+    family, title = "speed_lag", say("Lag of {axis} in proportion to speed", axis=AXIS)
+    formula = "e_a = lag·speed along a, in the sense of travel"
+    mechanism = "controller"
+    points_to = say(
+        "the scale of {axis} and the trigger are read at different moments: check how the controller latches this scale, and "
+        "probe more slowly until then", axis=AXIS,
+    )  # fmt: skip
+    coefficients = (Parameter("lag_ms", unit("ms"), 1.0),)
+    columns = ("speed_mm_s", *(f"approach_{a}" for a in AXES))
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return _MILLISECOND * points.column("speed_mm_s") * travel(points)[:, AXES.index(self.axis)]
+
+
+def travel(points: Points) -> Floats:
+    """Unit vectors (n, 3) of travel into each point; zero where none was recorded."""
+    signs = np.column_stack([points.column(f"approach_{a}") for a in AXES])
+    length = np.linalg.norm(signs, axis=1, keepdims=True)
+    return np.asarray(signs / np.where(length > 0, length, 1.0), dtype=np.float64)
+
+
+class ScaleCurvature(OfAxis):
+    """Position error of second order, over the travel T from a0.
+
+    A scale clamped at both ends, a tape that is stretched unevenly, a rack of two pieces.
+    """
+
+    family, title = "scale_curvature", say("Curvature of the scale of {axis}", axis=AXIS)
+    formula = "e_a = bow·(1 − (2(a − a0)/T − 1)²)"
+    mechanism = "scale"
+    points_to = say(
+        "the scale of {axis} is stretched unevenly: check how its ends are clamped and its joints, and compensate position by "
+        "a table, which one factor cannot replace", axis=AXIS,
+    )  # fmt: skip
+    means = say(
+        "in the middle of its travel {axis} stands {size} further towards {side} than it reads",
+        axis=AXIS, size=SIZE, side=SIDE,
+    )  # fmt: skip
+    coefficients = (Parameter("bow_um", unit("µm"), 10.0),)
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return MICROMETRE * bow(points, self.axis)
+
+
+class AirScale(OfAxis):
+    """A laser scale whose wavelength is not corrected for air; n₀ at 20 °C, 1013.25 hPa, 50 %.
+
+    Part 1 is no correction at all. About −1 ppm/K, +0.27 ppm/hPa, −0.01 ppm/% in n (Harris 2004 section 3.3).
+    """
+
+    family, title = "air_scale", say("Refractive index of air on the laser scale of {axis}", axis=AXIS)
+    formula = "e_a = −part·(n − n₀)·a"
+    mechanism = "scale"
+    points_to = say(
+        "the laser of {axis} is not, or wrongly, corrected for air: check its sensors of air temperature, pressure and "
+        "humidity, and that the compensation uses them", axis=AXIS,
+    )  # fmt: skip
+    coefficients = (Parameter("part", unit("1"), 1.0),)
+    columns = AIR
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return -index_change(points) * points.readings[self.axis]
+
+
+class DeadPath(OfAxis):
+    """Dead path of a laser scale: the path d that the zero of the scale leaves out.
+
+    The air between interferometer and zero changes its optical length while nothing moves.
+    """
+
+    family, title = "dead_path", say("Dead path of the laser scale of {axis}", axis=AXIS)
+    formula = "e_a = −d·(n − n at the first point)"
+    mechanism = "scale"
+    points_to = say(
+        "the dead path of the laser of {axis} is not compensated: enter it in the compensation, or zero the axis close to the "
+        "interferometer", axis=AXIS,
+    )  # fmt: skip
+    coefficients = (Parameter("path_mm", unit("mm"), 300.0),)
+    columns = AIR
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        change = index_change(points)
+        return np.asarray(change[0] - change)
+
+
+def index_change(points: Points) -> Floats:
+    """Refractive index of the recorded air less that of standard air, (n,)."""
+    temperature, hectopascal, humidity = (points.column(name) for name in AIR)
+    recorded = harris_2004(temperature, _PASCAL_PER_HPA * hectopascal, humidity, _CO2_PPM, _HENE_NM)
+    return np.asarray(recorded - harris_2004(*_STANDARD), dtype=np.float64)
+
+
+CURVATURE = tuple(ScaleCurvature(a) for a in AXES)
 EFFECTS: tuple[Effect, ...] = (
-    *(PeriodicScale(a) for a in AXES),
-    *(Hysteresis(a) for a in AXES),
-    *(Drift(a) for a in AXES),
+    *(family(a) for family in (PeriodicScale, Hysteresis, Drift) for a in AXES),
+    *(Play(a, b) for a in AXES for b in AXES if a != b),
+    *(YawPlay(a) for a in "xy"),
+    *(family(a) for family in (WindUp, SpeedLag) for a in AXES),
+    *CURVATURE,
+    *(family(a) for family in (AirScale, DeadPath) for a in AXES),
 )

@@ -18,9 +18,9 @@ from cmm_uq.base.messages import say
 from cmm_uq.base.points import Floats, Points
 from cmm_uq.base.units import MICROMETRE, unit
 from cmm_uq.machine.physics.effect import OWN, PRIOR_WEIGHT, CommonSize, Effect, Nonparametric, Parameter
+from cmm_uq.machine.physics.effects.drives import CURVATURE
 from cmm_uq.machine.physics.effects.own_body import Body
 from cmm_uq.machine.physics.effects.rigid_body import ROTATION, SCALE, SQUARENESS, STRAIGHTNESS
-from cmm_uq.machine.physics.effects.scales import EFFECTS as FURTHER_OF_SCALES, ScaleCurvature
 
 _FEWEST = 3  # places that were met in two set-ups, for a pattern
 
@@ -191,21 +191,16 @@ def deformations(owner: FaultyArtefact) -> Floats:
     return np.asarray(U[:, int(np.sum(s > 1e-9 * s[0])) :], dtype=np.float64)
 
 
-_CURVATURE = [effect for effect in FURTHER_OF_SCALES if isinstance(effect, ScaleCurvature)]
-
+# by the name of the machine's error that it looks like
 GEOMETRY = MappingProxyType(
     {
         effect.name: OwnGeometry(effect)
-        for effect in (
-            *SCALE.values(), *SQUARENESS.values(), *STRAIGHTNESS.values(), *ROTATION.values(), *_CURVATURE,
-        )
+        for family in (SCALE.values(), SQUARENESS.values(), STRAIGHTNESS.values(), ROTATION.values(), CURVATURE)
+        for effect in family
     }
-)  # fmt: skip
-"""By the name of the machine's error that it looks like."""
-
-# what faces along one line can look like, and that is no scale
-ALONG_A_LINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[effect.name] for effect in _CURVATURE)
-# what three corners can look like
+)
+# what faces along one line can look like, and that is no scale; and what three corners can look like
+ALONG_A_LINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[effect.name] for effect in CURVATURE)
 AFFINE: tuple[OwnGeometry, ...] = tuple(GEOMETRY[e.name] for e in (*SCALE.values(), *SQUARENESS.values()))
 PATTERN = OwnPattern()
 EFFECTS: tuple[OwnFault, ...] = (PATTERN, *GEOMETRY.values())

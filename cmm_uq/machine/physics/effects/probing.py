@@ -1,22 +1,34 @@
-"""Errors of probing and of the artefact's support: effective radius, lobing, sag of a bar."""
+"""Errors of probing, of a stylus on contact, of a laser digitizer in its own frame, and of a bar's support.
+
+The surface pushes a tip along the outward normal n, so the machine travels too far and true = indicated + amount·n. The frame
+of a digitizer turns with ``gamma_deg``, and with ``alpha_deg`` and ``beta_deg`` where they are recorded; without these w lies
+along the machine's X axis (α = β = 90°, Harris 2004 section 6.2). Depth is measured along v.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.base.messages import Text, say
+from cmm_uq.base.messages import say
 from cmm_uq.base.points import AXES, Floats, Ints, Points
 from cmm_uq.base.units import MICROMETRE, unit
-from cmm_uq.machine.physics.effect import Amount, Effect, Harmonic, Parameter
+from cmm_uq.machine.physics.effect import FURTHER, SENSE, SIZE, Effect, Harmonic, Parameter
+from cmm_uq.machine.physics.effects.drives import travel
 from cmm_uq.machine.physics.effects.rigid_body import tip_offsets
+from cmm_uq.machine.physics.kinematics import euler_313
+
+NORMAL = ("nx", "ny", "nz")
+TIP = tuple(f"tip_{a}_mm" for a in AXES)
+REFERENCE_LENGTH = 100.0  # mm; the length of stylus that bending is stated for
+_MILLISECOND = 1e-3
 
 
 def normals_of(points: Points) -> Floats:
     """Outward unit normals (n, 3), as recorded."""
-    return np.column_stack([points.column(f"n{a}") for a in AXES])
+    return np.column_stack([points.column(name) for name in NORMAL])
 
 
 class ProbeRadius(Effect):
@@ -27,15 +39,10 @@ class ProbeRadius(Effect):
     formula = "true surface point = indicated + r·n"
     mechanism = "probe"
     points_to = say("the effective stylus radius is wrong: qualify the probe again")
+    means = say("probed surfaces are indicated {size} too {wrong}", size=SIZE, wrong=SENSE)
+    sense = (say("deep, inside the material"), say("early, outside the material"))
     coefficients = (Parameter("um", unit("µm"), 10.0),)
-    columns = ("nx", "ny", "nz")
-
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "probed surfaces are indicated {size} too {wrong}",
-            size=amount.size, wrong=amount.more(say("deep, inside the material"), say("early, outside the material")),
-        )  # fmt: skip
+    columns = NORMAL
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return MICROMETRE * normals_of(points)[:, :, None]
@@ -49,13 +56,10 @@ class ProbeLobing(Harmonic):
     formula = "true surface point = indicated + A·cos(3θ + φ)·n, θ = atan2(ny, nx)"
     mechanism = "probe"
     points_to = say("the probe's pre-travel has three lobes: qualify it in more directions")
+    means = say("the probing error swings to either side by {size}, three times in a turn about Z", size=SIZE)
     amplitude = Parameter("amplitude_um", unit("µm"), 5.0, say("amplitude"))
     coefficients = (Parameter("cosine_um", unit("µm"), 5.0), Parameter("sine_um", unit("µm"), 5.0))
-    columns = ("nx", "ny", "nz")
-
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        size = amounts[self.amplitude.name].size
-        return say("the probing error swings to either side by {size}, three times in a turn about Z", size=size)
+    columns = NORMAL
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         normals = normals_of(points)
@@ -64,14 +68,13 @@ class ProbeLobing(Harmonic):
         return np.asarray(MICROMETRE * normals[:, :, None] * lobes[:, None, :], dtype=np.float64)
 
 
-# of its length, by which the points of a bar or a gauge may lie beside the line from its first to its farthest
-_OFF_LINE = 0.05
+_OFF_LINE = (
+    0.05  # of its length, by which points of a bar or a gauge may lie beside the line from its first to its farthest
+)
 
 
 class ArtefactSag(Effect):
-    """Bar shortened by its own weight.
-
-    It is of points on one line: a plate, a triangle or a sphere is not shortened along a chord.
+    """Bar shortened by its own weight: of points on one line; a plate or a sphere is not shortened along a chord.
 
     As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
     without sag.
@@ -82,14 +85,9 @@ class ArtefactSag(Effect):
     formula = "true length = length − s·cos²(elevation above the table)"
     mechanism = "artefact"
     points_to = say("the artefact sags or its supports are not at the right points")
+    means = say("lying level the artefact is {size} {wrong} than upright", size=SIZE, wrong=SENSE)
+    sense = (say("shorter"), say("longer"))
     coefficients = (Parameter("um", unit("µm"), 10.0),)
-
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "lying level the artefact is {size} {wrong} than upright",
-            size=amount.size, wrong=amount.more(say("shorter"), say("longer")),
-        )  # fmt: skip
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         basis = np.zeros((len(points), 3, 1))
@@ -131,4 +129,180 @@ def _on_line(bar: Floats, about: Floats) -> bool:
     return bool(np.linalg.norm(about - along, axis=1).max() <= _OFF_LINE * np.linalg.norm(bar))
 
 
-EFFECTS: tuple[Effect, ...] = (ProbeRadius(), ProbeLobing(), ArtefactSag())
+class PreTravel(Effect):
+    """Pre-travel, or a wrong stylus radius, where only the direction of travel is known.
+
+    The same gap on every axis, unlike hysteresis, whose axes differ. Travel is a unit vector against the normal.
+    """
+
+    name = "pre_travel"
+    title = say("Pre-travel of the probe")
+    formula = "e = −amount·travel"
+    mechanism = "probe"
+    points_to = say(
+        "the probe's pre-travel or the stylus radius is wrong by as much in every direction: qualify the probe again, with "
+        "the speed and the force of the measurement"
+    )
+    coefficients = (Parameter("um", unit("µm"), 10.0),)
+    columns = tuple(f"approach_{a}" for a in AXES)
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return -MICROMETRE * travel(points)[:, :, None]
+
+
+class ProbeAxial(Effect):
+    """Deflection along the stylus unlike that across it; t is along the stylus (the ram without tip columns).
+
+    A kinematic probe head triggers at once along its axis and late across it.
+    """
+
+    name = "probe_axial"
+    title = say("Deflection of the probe along its axis")
+    formula = "e = amount·(n·t)·t"
+    mechanism = "probe"
+    points_to = say(
+        "the probe gives way differently along the stylus and across it: qualify it with points along the stylus too, and "
+        "check its trigger force"
+    )
+    coefficients = (Parameter("um", unit("µm"), 5.0),)
+    columns = NORMAL
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        axis = _stylus(points)
+        part = np.einsum("ni,ni->n", normals_of(points), axis)
+        return np.asarray(MICROMETRE * (part[:, None] * axis)[:, :, None], dtype=np.float64)
+
+
+class StylusBending(Effect):
+    """Bending of the stylus t, whose length L follows from the tip columns: under the probing force by F·L³/(3·E·I)."""
+
+    name = "stylus_bending"
+    title = say("Bending of the stylus")
+    formula = "e = amount·(L/100 mm)³·(n − (n·t)t)"
+    mechanism = "probe"
+    points_to = say(
+        "the stylus bends under the probing force: take a shorter or stiffer one, or a lower force, and qualify each stylus "
+        "by itself"
+    )
+    coefficients = (Parameter("um", unit("µm"), 5.0),)
+    columns = (*NORMAL, *TIP)
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        length = np.linalg.norm([points.column(name) for name in TIP], axis=0)
+        axis, normals = _stylus(points), normals_of(points)
+        across = normals - np.einsum("ni,ni->n", normals, axis)[:, None] * axis
+        ratio = (length / REFERENCE_LENGTH) ** 3
+        return np.asarray(MICROMETRE * ratio[:, None, None] * across[:, :, None], dtype=np.float64)
+
+
+class TriggerDelay(Effect):
+    """Delay between contact and reading."""
+
+    name = "trigger_delay"
+    title = say("Delay of the probe's trigger")
+    formula = "e = delay·speed·n"
+    mechanism = "controller"
+    points_to = say(
+        "the trigger reaches the controller late: check the probe's interface and cable, and qualify the probe at the speed "
+        "of the measurement"
+    )
+    coefficients = (Parameter("delay_ms", unit("ms"), 1.0),)
+    columns = (*NORMAL, "speed_mm_s")
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return _MILLISECOND * (points.column("speed_mm_s")[:, None] * normals_of(points))[:, :, None]
+
+
+def _stylus(points: Points) -> Floats:
+    """Unit vectors (n, 3) along each stylus; along the ram where no tip is recorded."""
+    tip = tip_offsets(points)
+    length = np.linalg.norm(tip, axis=1, keepdims=True)
+    along_tip = tip / np.where(length > 0, length, 1.0)
+    return np.where(length > 0, along_tip, np.array([0.0, 0.0, -1.0]))
+
+
+class DigitizerOffset(Effect):
+    """Digitizer misaligned in its scan plane, which turns with the pose.
+
+    An alignment on the reference sphere that was off by [du dv], or a mount that has moved since (Harris 2004 eq. 14–25).
+    """
+
+    name = "digitizer_offset"
+    title = say("Alignment of the digitizer")
+    formula = "e = du·u + dv·v"
+    mechanism = "optical probe"
+    points_to = say(
+        "the digitizer is out of alignment, or has moved in its mount: tighten the mount and align it on the reference "
+        "sphere again, in every pose"
+    )
+    coefficients = (
+        Parameter("u_um", unit("µm"), 20.0, say("along u")), Parameter("v_um", unit("µm"), 20.0, say("along v")),
+    )  # fmt: skip
+    columns = ("gamma_deg",)
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return MICROMETRE * attitudes(points)[:, :, :2]
+
+
+class DigitizerDepth(Effect):
+    """Error in proportion to scan depth, from the column ``depth_mm`` (Feng 2001, Xi 2001)."""
+
+    name = "digitizer_depth"
+    title = say("Depth bias of the digitizer")
+    formula = "e = k·depth·v"
+    mechanism = "optical probe"
+    points_to = say(
+        "the digitizer's depth scale is wrong: calibrate it over its range, and scan in its middle until then"
+    )
+    coefficients = (Parameter("um_per_mm", unit("µm/mm"), 1.0),)
+    columns = ("gamma_deg", "depth_mm")
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        return MICROMETRE * points.column("depth_mm")[:, None, None] * attitudes(points)[:, :, 1:2]
+
+
+class DigitizerIncidence(Effect):
+    """Error in proportion to the angles between beam and normal (Feng 2001, Xi 2001).
+
+    The incident angle lies in the scan plane, the projected one across it.
+    """
+
+    name = "digitizer_incidence"
+    title = say("Incidence of the digitizer's light")
+    formula = "e = (kᵢ·incident + kₚ·projected)·v"
+    mechanism = "optical probe"
+    points_to = say(
+        "the digitizer errs where its light meets the surface askew: turn it square to the surface, or correct its readings "
+        "for the angle"
+    )
+    coefficients = (
+        Parameter("incident_um_per_deg", unit("µm/°"), 1.0, say("by incidence")),
+        Parameter("projected_um_per_deg", unit("µm/°"), 1.0, say("by projected angle")),
+    )
+    columns = ("gamma_deg", *NORMAL)
+    tier = FURTHER
+
+    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
+        frame = attitudes(points)
+        own = np.einsum("ni,nij->nj", normals_of(points), frame)
+        angles = np.degrees(np.arctan2(own[:, [0, 2]], np.abs(own[:, 1:2])))
+        return np.asarray(MICROMETRE * frame[:, :, 1:2] * angles[:, None, :], dtype=np.float64)
+
+
+def attitudes(points: Points) -> Floats:
+    """Axes u, v, w of the digitizer as columns (n, 3, 3) in machine axes: Euler angles 3-1-3 (Harris 2004 eq. 7)."""
+    right = np.full(len(points), 90.0)
+    alpha, beta = (np.radians(points.columns.get(name, right)) for name in ("alpha_deg", "beta_deg"))
+    return np.moveaxis(euler_313(alpha, beta, np.radians(points.column("gamma_deg"))), 2, 0)
+
+
+EFFECTS: tuple[Effect, ...] = (
+    ProbeRadius(), ProbeLobing(), ArtefactSag(), PreTravel(), ProbeAxial(), StylusBending(), TriggerDelay(),
+    DigitizerOffset(), DigitizerDepth(), DigitizerIncidence(),
+)  # fmt: skip

@@ -5,56 +5,68 @@ A rotation of a carriage acts on all that it carries, so its lever arm comes fro
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from types import MappingProxyType
 
 import numpy as np
 
-from cmm_uq.base.messages import Text, Verbatim, say
+from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.points import AXES, Floats, Points
 from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, unit
-from cmm_uq.machine.physics.effect import Amount, Effect, Nonparametric, Parameter, along
+from cmm_uq.machine.physics.effect import (
+    AXIS,
+    OTHER,
+    SENSE,
+    SIDE,
+    SIZE,
+    Effect,
+    Family,
+    Nonparametric,
+    OfAxis,
+    Parameter,
+    along,
+)
 from cmm_uq.machine.physics.kinematics import KinematicChain, carried_offset
 
 # of each plane the axis along which a point moves, and the one that leans, by whose reading it moves
 LEANING = MappingProxyType({"xy": ("x", "y"), "yz": ("y", "z"), "zx": ("x", "z")})
+PLANE, MOVED, LEVER = Verbatim("‹plane›"), Verbatim("‹moved›"), Verbatim("‹lever›")  # blanks in words
 
 
-class Scale(Effect):
+class Scale(OfAxis):
     """Linear scale error."""
 
+    family, title = "scale", say("Scale error of {axis}", axis=AXIS)
     formula = "e_a = s · a"
     mechanism = "scale"
     points_to = say("the scale or its compensation: check the linear compensation of this axis")
+    means = say("lengths along {axis} are indicated {size} too {wrong}", axis=AXIS, size=SIZE, wrong=SENSE)
+    sense = (say("short"), say("long"))
     everywhere = True
-
     coefficients = (Parameter("ppm", unit("ppm"), 300.0),)
 
     def __init__(self, axis: str) -> None:
-        self.axis = self.along_motion = axis
-        self.name = f"scale_{axis}"
-        self.title = say("Scale error of {axis}", axis=Verbatim(axis.upper()))
+        super().__init__(axis)
         self.imitated_by = (Nonparametric(f"{axis}_mm", axis), Nonparametric("time_s", axis, scale=True))
 
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "lengths along {axis} are indicated {size} too {wrong}",
-            axis=Verbatim(self.axis.upper()), size=amount.size, wrong=amount.more(say("short"), say("long")),
-        )  # fmt: skip
-
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        return along(self.axis, PPM * points.readings[self.axis])
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return PPM * points.readings[self.axis]
 
 
-class Lean(Effect):
+class Lean(Family):
     """The angle between two axes less 90°, or what changes it: to first order, one axis leans by it across its reading."""
 
     mechanism = "frame"
 
     def __init__(self, plane: str) -> None:
+        super().__init__(plane)
         self.plane = plane
         self.moved, self.lever = LEANING[plane]
+
+    def fill(self, letters: object) -> None:
+        plane = self.axis
+        moved, lever = LEANING[plane]
+        super().fill({AXIS: plane[0], OTHER: plane[1], PLANE: "–".join(plane), MOVED: moved, LEVER: lever})
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         return along(self.moved, -self.lean(points) * points.readings[self.lever])
@@ -63,106 +75,84 @@ class Lean(Effect):
 class Squareness(Lean):
     """Squareness of two axes: their angle less 90°."""
 
+    family, title = "squareness", say("Squareness {plane}", plane=PLANE)
     formula = "xy: e_x = −S·y; yz: e_y = −S·z; zx: e_x = −S·z"
     points_to = say("the axes are not square: adjust the guideways or the squareness in the compensation")
+    means = say(
+        "the angle between {one} and {other} is 90° {side} {size}", one=MOVED, other=LEVER, side=SIDE, size=SIZE
+    )
     everywhere = True
-
     coefficients = (Parameter("angle_arcsec", unit("″"), 500.0),)
 
     def __init__(self, plane: str) -> None:
         super().__init__(plane)
-        self.name = f"squareness_{plane}"
-        self.title = say("Squareness {plane}", plane=Verbatim("–".join(plane.upper())))
         self.imitated_by = (Nonparametric(f"{self.lever}_mm", self.moved),)
-
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "the angle between {one} and {other} is 90° {side} {size}",
-            one=Verbatim(self.moved.upper()), other=Verbatim(self.lever.upper()), side=amount.side, size=amount.size,
-        )  # fmt: skip
 
     def lean(self, points: Points) -> Floats:
         return np.array(ARCSECOND)
 
 
-class Straightness(Effect):
+class Straightness(Family):
     """Straightness of carriage a along b as one bow over the travel T from a0."""
 
+    family, title = "straightness", say("Straightness of {axis} along {direction}", axis=AXIS, direction=OTHER)
     formula = "e_b = bow · (1 − (2(a − a0)/T − 1)²)"
     mechanism = "guideway"
     points_to = say("a bowed guideway: check straightness and its compensation")
-
+    means = say(
+        "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} {direction}",
+        axis=AXIS, size=SIZE, side=SIDE, direction=OTHER,
+    )  # fmt: skip
     coefficients = (Parameter("bow_um", unit("µm"), 50.0),)
 
     def __init__(self, axis: str, direction: str) -> None:
-        self.axis, self.direction = axis, direction
-        self.name = f"straightness_{axis}_{direction}"
-        self.title = say(
-            "Straightness of {axis} along {direction}",
-            axis=Verbatim(axis.upper()),
-            direction=Verbatim(direction.upper()),
-        )
-        self.idealised_over = axis
+        super().__init__(axis, direction)
+        self.direction, self.idealised_over = direction, axis
         self.imitated_by = (Nonparametric(f"{axis}_mm", direction),)
 
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "as {axis} moves, the probe runs in a bow: in the middle of the travel {size} towards {side} "
-            "{direction}",
-            axis=Verbatim(self.axis.upper()), size=amount.size, side=amount.side, direction=Verbatim(self.direction.upper()),
-        )  # fmt: skip
-
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        low, high = points.machine.travel(self.axis)
-        place = 2 * (points.readings[self.axis] - low) / (high - low) - 1
-        return along(self.direction, MICROMETRE * (1 - place**2))
+        return along(self.direction, MICROMETRE * bow(points, self.axis))
 
 
-class Rotation(Effect):
+class Rotation(Family):
     """Carriage a turns about b in proportion to its travel from a0: roll, pitch or yaw."""
 
+    family, title = "rotation", say("Rotation of carriage {axis} about {about}", axis=AXIS, about=OTHER)
     formula = "e = ε × what carriage a carries, ε_b = r·(a − a0)"
     mechanism = "guideway"
     points_to = say(
         "the carriage turns as it moves (roll, pitch or yaw): check bearings, guideway and angular compensation"
     )
-
+    means = say(
+        "as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}",
+        axis=AXIS, size=SIZE, sense=SENSE, about=OTHER,
+    )  # fmt: skip
+    sense = (say("clockwise"), say("anticlockwise"))
     coefficients = (Parameter("arcsec_per_m", unit("″/m"), 60.0),)
 
     def __init__(self, axis: str, about: str) -> None:
-        self.axis, self.about = axis, about
-        self.name = f"rotation_{axis}_{about}"
-        self.title = say(
-            "Rotation of carriage {axis} about {about}", axis=Verbatim(axis.upper()), about=Verbatim(about.upper())
-        )
-        self.idealised_over = axis
-
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "as {axis} moves towards plus, the probe turns {sense} by {size}, seen along plus {about}",
-            axis=Verbatim(self.axis.upper()), size=amount.size,
-            sense=amount.more(say("clockwise"), say("anticlockwise")), about=Verbatim(self.about.upper()),
-        )  # fmt: skip
+        super().__init__(axis, about)
+        self.about, self.idealised_over = about, axis
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
         low, _ = points.machine.travel(self.axis)
-        angle = ARCSECOND * (points.readings[self.axis] - low) / METRE
-        return turned(points, self.axis, self.about, angle)
+        return turned(points, self.axis, self.about, ARCSECOND * (points.readings[self.axis] - low) / METRE)
+
+
+def bow(points: Points, axis: str) -> Floats:
+    """(n,) a parabola over the travel of an axis, one in the middle and zero at the ends."""
+    low, high = points.machine.travel(axis)
+    return np.asarray(1 - (2 * (points.readings[axis] - low) / (high - low) - 1) ** 2, dtype=np.float64)
 
 
 def turned(points: Points, axis: str, about: str, angle: Floats) -> Floats:
     """Basis (n, 3, 1) of carriage ``axis`` turning about ``about`` by ``angle`` (n,) rad: ε × what it carries."""
     chain = KinematicChain.of(points.machine.chain)
     acts_on_tip = points.machine.tip_on_every_carriage or axis == AXES[chain.order[-1]]
-    carried = carried_offset(
-        axis, points.carriages, tip_offsets(points) if acts_on_tip else None, chain, points.directions
-    )
+    tip = tip_offsets(points) if acts_on_tip else None
     rotation = np.zeros((len(points), 3))
     rotation[:, AXES.index(about)] = angle
-    return np.cross(rotation, carried)[:, :, None]
+    return np.cross(rotation, carried_offset(axis, points.carriages, tip, chain, points.directions))[:, :, None]
 
 
 def tip_offsets(points: Points) -> Floats:
@@ -172,14 +162,9 @@ def tip_offsets(points: Points) -> Floats:
 
 SCALE = MappingProxyType({a: Scale(a) for a in AXES})  # by axis
 SQUARENESS = MappingProxyType({plane: Squareness(plane) for plane in LEANING})  # by plane
-# by carriage and direction
+# by carriage and direction, and by carriage and the axis about which it turns
 STRAIGHTNESS = MappingProxyType({(a, b): Straightness(a, b) for a in AXES for b in AXES if a != b})
-# by carriage and the axis about which it turns
 ROTATION = MappingProxyType({(a, b): Rotation(a, b) for a in AXES for b in AXES})
-
 EFFECTS: tuple[Effect, ...] = (
-    *SCALE.values(),
-    *SQUARENESS.values(),
-    *STRAIGHTNESS.values(),
-    *ROTATION.values(),
-)
+    *SCALE.values(), *SQUARENESS.values(), *STRAIGHTNESS.values(), *ROTATION.values(),
+)  # fmt: skip

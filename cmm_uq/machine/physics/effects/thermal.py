@@ -1,94 +1,264 @@
-"""Temperature: expansion of the scales and of the artefact, bending of the table by a gradient.
+"""Temperature: expansion of scales and artefact, bending by gradients, drift that settles, and what lags behind.
 
 The coefficients are what the compensation left out: a machine whose software corrects its scales has the coefficient of
-thermal expansion zero here.
+thermal expansion zero here. A temperature sensor that reads wrong by a constant makes a constant scale error of α·ΔT and
+cannot be told from one; so it is no effect of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from types import MappingProxyType
 
-from cmm_uq.base.messages import Text, Verbatim, say
+import numpy as np
+
+from cmm_uq.base.messages import Text, say
 from cmm_uq.base.points import AXES, Floats, Points
-from cmm_uq.base.units import ARCSECOND, METRE, REFERENCE_TEMPERATURE, unit
-from cmm_uq.machine.physics.effect import Amount, Effect, Parameter, along
-from cmm_uq.machine.physics.effects.rigid_body import turned
+from cmm_uq.base.units import ARCSECOND, METRE, MICROMETRE, PPM, REFERENCE_TEMPERATURE, unit
+from cmm_uq.machine.physics.effect import (
+    AXIS,
+    CONTRACT,
+    FURTHER,
+    OTHER,
+    SECOND,
+    SENSE,
+    SIDE,
+    SIZE,
+    Effect,
+    OfAxis,
+    Parameter,
+    Shape,
+)
+from cmm_uq.machine.physics.effects.rigid_body import LEANING, Lean, turned
 
 # coefficient of thermal expansion; glass 8, steel 11.5, aluminium 23 ppm/K bound what is possible.
 EXPANSION = Parameter("cte_per_k", unit("1/K"), 12e-6, say("expansion"))
+# time constant of warming: an electric cabinet takes minutes, a granite table a day
+SETTLING = Shape("settling_h", unit("h"), 0.2, 20.0, what=say("time to settle"))
+# time constant of an artefact behind its thermometer: a thin bar minutes, a solid one an hour or more
+LAG = Shape("lag_h", unit("h"), 0.05, 5.0, what=say("lag"))
 
 
-class ThermalScale(Effect):
+class ThermalScale(OfAxis):
     """Expansion of a scale."""
 
+    family, title = "thermal_scale", say("Thermal expansion of scale {axis}", axis=AXIS)
     formula = "e_a = α·(temp_a − 20 °C)·a"
     mechanism = "temperature"
     points_to = say("the scale expands and its temperature is not, or wrongly, compensated")
+    means = say("the scale of {axis} expands by {size} {more} than is compensated", axis=AXIS, size=SIZE, more=SENSE)
+    sense = (say("more"), say("less"))
+    coefficients = (EXPANSION,)
+    columns = ("temp_{a}_c",)
 
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return (points.column(f"temp_{self.axis}_c") - REFERENCE_TEMPERATURE) * points.readings[self.axis]
+
+
+class Expanding(Effect):
+    """As a displacement it draws the points together about their middle."""
+
+    mechanism = "artefact"
     coefficients = (EXPANSION,)
 
-    def __init__(self, axis: str) -> None:
-        self.axis = self.along_motion = axis
-        self.name = f"thermal_scale_{axis}"
-        self.title = say("Thermal expansion of scale {axis}", axis=Verbatim(axis.upper()))
-        self.columns = (f"temp_{axis}_c",)
-
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "the scale of {axis} expands by {size} {more} than is compensated",
-            axis=Verbatim(self.axis.upper()), size=amount.size, more=amount.more(say("more"), say("less")),
-        )  # fmt: skip
+    @abstractmethod
+    def excess(self, points: Points, shape: Sequence[float]) -> Floats:
+        """(n,) temperature above that to which lengths are brought, K."""
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        excess = points.column(f"temp_{self.axis}_c") - REFERENCE_TEMPERATURE
-        return along(self.axis, excess * points.readings[self.axis])
+        return (-self.excess(points, shape)[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
 
 
-class ThermalArtefact(Effect):
-    """Expansion of the artefact.
-
-    As a displacement it draws the points together about their middle to where they would lie at 20 °C.
-    """
+class ThermalArtefact(Expanding):
+    """Expansion of the artefact."""
 
     name = "thermal_artefact"
     title = say("Thermal expansion of the artefact")
     formula = "length = length at 20 °C · (1 + α·(temp_artefact − 20 °C))"
-    mechanism = "artefact"
     points_to = say("the artefact expands and its temperature is not, or wrongly, compensated")
-    coefficients = (EXPANSION,)
+    means = say("the artefact expands by {size} {more} than is reckoned with", size=SIZE, more=SENSE)
+    sense = (say("more"), say("less"))
     columns = ("temp_artefact_c",)
 
-    def meaning(self, amounts: Mapping[str, Amount]) -> Text:
-        amount = amounts[self.coefficients[0].name]
-        return say(
-            "the artefact expands by {size} {more} than is reckoned with",
-            size=amount.size, more=amount.more(say("more"), say("less")),
-        )  # fmt: skip
+    def excess(self, points: Points, shape: Sequence[float]) -> Floats:
+        return points.column("temp_artefact_c") - REFERENCE_TEMPERATURE
+
+
+class ArtefactLag(Expanding):
+    """Artefact behind its thermometer.
+
+    It stands beside the artefact's expansion (stated, or ``thermal_artefact``), which follows the thermometer. T′ begins at
+    the first recorded temperature, and temperatures between two records lie on a line.
+    """
+
+    name = "artefact_lag"
+    title = say("Artefact lagging behind its thermometer")
+    formula = "longer by α·(T′ − temp_artefact)·length, τ·dT′/dt = temp_artefact − T′"
+    points_to = say(
+        "the artefact takes on the temperature later than its thermometer: let it soak longer, and fix the thermometer to its "
+        "body"
+    )
+    shape = (LAG,)
+    columns = ("temp_artefact_c", "time_s")
+    tier = FURTHER
+
+    def excess(self, points: Points, shape: Sequence[float]) -> Floats:
+        (lag,) = shape
+        temperature = points.column("temp_artefact_c")
+        return lagging(points.hours, temperature, lag) - temperature
+
+
+def lagging(hours: Floats, temperature: Floats, lag: float) -> Floats:
+    """Temperature (n,) of a body that follows another with a time constant, exact for lines between the records, °C."""
+    moments, index = np.unique(hours, return_inverse=True)
+    index = index.ravel()
+    driving = np.bincount(index, temperature) / np.bincount(index)
+    body = np.empty_like(driving)
+    body[0] = driving[0]
+    for k, step in enumerate(np.diff(moments)):
+        behind = lag * (driving[k + 1] - driving[k]) / step
+        body[k + 1] = driving[k + 1] - behind + (body[k] - driving[k] + behind) * np.exp(-step / lag)
+    return np.asarray(body[index], dtype=np.float64)
+
+
+class CarriageGradient(Effect):
+    """A carriage bent by a gradient across it: bridge: y turns about x; ram: z turns about y.
+
+    As the table under ``thermal_gradient``: the bridge between its upper and lower side, the ram between front and back.
+    """
+
+    formula = "e = ε × what carriage a carries, ε_b = k·(difference)·(a − a0)"
+    mechanism = "temperature"
+    coefficients = (Parameter("arcsec_per_m_k", unit("″/(m·K)"), 20.0),)
+    tier = FURTHER
+
+    def __init__(self, part: str, words: Text, axes: str, sides: tuple[str, str], points_to: Text) -> None:
+        self.axis, self.about = axes[0], axes[1]
+        self.name = f"thermal_gradient_{part}"
+        self.title = say("Bending by the temperature gradient in the {what}", what=words)
+        self.points_to = points_to
+        self.columns = tuple(f"temp_{part}_{side}_c" for side in sides)
 
     def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        excess = points.column("temp_artefact_c") - REFERENCE_TEMPERATURE
-        return (-excess[:, None] * (points.xyz - points.group_means(points.xyz)))[:, :, None]
+        low, _ = points.machine.travel(self.axis)
+        gradient = points.column(self.columns[0]) - points.column(self.columns[1])
+        return turned(points, self.axis, self.about, ARCSECOND * gradient * (points.readings[self.axis] - low) / METRE)
 
 
-class ThermalGradient(Effect):
+class ThermalGradient(CarriageGradient):
     """Table bent by a gradient: carriage x turns about y."""
 
-    name = "thermal_gradient"
-    title = say("Bending by the temperature gradient in the {what}", what=say("table"))
     formula = "e = ε × what carriage x carries, ε_y = k·(temp_table_top − temp_table_bottom)·(x − x0)"
-    mechanism = "temperature"
-    points_to = say("the table bends: top and bottom differ in temperature")
-    coefficients = (Parameter("arcsec_per_m_k", unit("″/(m·K)"), 20.0),)
-    columns = ("temp_table_top_c", "temp_table_bottom_c")
+    tier = CONTRACT
 
-    def basis(self, points: Points, shape: Sequence[float] = ()) -> Floats:
-        low, _ = points.machine.travel("x")
-        gradient = points.column("temp_table_top_c") - points.column("temp_table_bottom_c")
-        angle = ARCSECOND * gradient * (points.readings["x"] - low) / METRE
-        return turned(points, "x", "y", angle)
+    def __init__(self) -> None:
+        bent = say("the table bends: top and bottom differ in temperature")
+        super().__init__("table", say("table"), "xy", ("top", "bottom"), bent)
+        self.name = "thermal_gradient"
+
+
+class ThermalSquareness(Lean):
+    """Squareness that changes with temperature.
+
+    A frame of two materials. Harris 2004 table 7 looked for it, and found XY free of it and YZ, ZX by up to 4″/K.
+    """
+
+    family, title = "thermal_squareness", say("Squareness {one}–{other} with temperature", one=AXIS, other=OTHER)
+    formula = "as of squareness, with S = k·(mean of temp_x, temp_y, temp_z − 20 °C)"
+    mechanism = "temperature"
+    points_to = say(
+        "the angle between {one} and {other} follows the temperature of the frame: keep the machine at the temperature of its "
+        "calibration, or compensate squareness by temperature", one=AXIS, other=OTHER,
+    )  # fmt: skip
+    coefficients = (Parameter("arcsec_per_k", unit("″/K"), 4.0),)
+    columns = tuple(f"temp_{a}_c" for a in AXES)
+    tier = FURTHER
+
+    def lean(self, points: Points) -> Floats:
+        excess = np.mean([points.column(name) for name in self.columns], axis=0) - REFERENCE_TEMPERATURE
+        return np.asarray(ARCSECOND * excess)
+
+
+class ScaleDrift(OfAxis):
+    """A scale that grows with time. A room or a machine that warms steadily."""
+
+    family, title = "scale_drift", say("Scale of {axis} growing with time", axis=AXIS)
+    formula = "e_a = r·time·a"
+    mechanism = "temperature"
+    points_to = say(
+        "the scale of {axis} changes steadily while the machine or the room warms or cools: measure in thermal equilibrium, "
+        "and check the temperature compensation of this scale", axis=AXIS,
+    )  # fmt: skip
+    means = say("lengths along {axis} are indicated ever {wrong}, by {size}", axis=AXIS, wrong=SENSE, size=SIZE)
+    sense = (say("shorter"), say("longer"))
+    coefficients = (Parameter("ppm_per_h", unit("ppm/h"), 5.0),)
+    columns = ("time_s",)
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        return PPM * points.hours * points.readings[self.axis]
+
+
+class Settling(OfAxis):
+    """Drift that settles. What follows switching on, or a door left open."""
+
+    family, title = "settling", say("Settling of {axis}", axis=AXIS)
+    formula = "e_a = A·(1 − exp(−time/τ))"
+    mechanism = "temperature"
+    points_to = say(
+        "the zero of {axis} moves and comes to rest: let machine, probe and artefact settle longer after switching on, "
+        "setting up or an open door", axis=AXIS,
+    )  # fmt: skip
+    means = say(
+        "at the same reading {axis} moves towards {side} by {size} in all, and settles with {settling}",
+        axis=AXIS, size=SIZE, side=SIDE, settling=SECOND,
+    )  # fmt: skip
+    coefficients = (Parameter("um", unit("µm"), 20.0, say("way")),)
+    shape = (SETTLING,)
+    columns = ("time_s",)
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        (settling,) = shape
+        return MICROMETRE * -np.expm1(-points.hours / settling)
+
+
+class ScaleSettling(OfAxis):
+    """A scale that settles. An axis warmed by its motor, an air supply that was switched on."""
+
+    family, title = "scale_settling", say("Scale of {axis} settling", axis=AXIS)
+    formula = "e_a = s·(1 − exp(−time/τ))·a"
+    mechanism = "temperature"
+    points_to = say(
+        "the scale of {axis} takes on another temperature and comes to rest: move the axis to warm it up before measuring, "
+        "and look at what heats or cools it, its motor or the air supply", axis=AXIS,
+    )  # fmt: skip
+    means = say(
+        "lengths along {axis} come to be indicated {size} too {wrong}, settling with {settling}",
+        axis=AXIS, size=SIZE, wrong=SENSE, settling=SECOND,
+    )  # fmt: skip
+    sense = (say("short"), say("long"))
+    coefficients = (Parameter("ppm", unit("ppm"), 20.0, say("change")),)
+    shape = (SETTLING,)
+    columns = ("time_s",)
+    tier = FURTHER
+
+    def component(self, points: Points, shape: Sequence[float]) -> Floats:
+        (settling,) = shape
+        return PPM * -np.expm1(-points.hours / settling) * points.readings[self.axis]
 
 
 SCALE_EXPANSION = MappingProxyType({a: ThermalScale(a) for a in AXES})  # by axis
-EFFECTS: tuple[Effect, ...] = (*SCALE_EXPANSION.values(), ThermalArtefact(), ThermalGradient())
+EFFECTS: tuple[Effect, ...] = (
+    *SCALE_EXPANSION.values(), ThermalArtefact(), ThermalGradient(),
+    *(family(a) for family in (ScaleDrift, Settling, ScaleSettling) for a in AXES),
+    *(ThermalSquareness(plane) for plane in LEANING),
+    CarriageGradient("bridge", say("bridge"), "yx", ("top", "bottom"), say(
+        "the bridge bends: its upper and lower side differ in temperature, look for warm air, lamps or a draught above it"
+    )),
+    CarriageGradient("ram", say("ram"), "zy", ("front", "back"), say(
+        "the ram bends: its front and back differ in temperature, look for a motor, a lamp, sun or a draught at one side"
+    )),
+    ArtefactLag(),
+)  # fmt: skip
