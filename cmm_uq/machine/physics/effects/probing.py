@@ -74,9 +74,9 @@ _OFF_LINE = (
 
 
 class ArtefactSag(Effect):
-    """Bar shortened by its own weight: of points on one line; a plate or a sphere is not shortened along a chord.
+    """Bar shortened by its own weight.
 
-    As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
+    It is of points on one line: a plate, a triangle or a sphere is not shortened along a chord. As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
     without sag.
     """
 
@@ -176,7 +176,10 @@ class ProbeAxial(Effect):
 
 
 class StylusBending(Effect):
-    """Bending of the stylus t, whose length L follows from the tip columns: under the probing force by F·L³/(3·E·I)."""
+    """Bending of the stylus t, whose length L follows from the tip columns.
+
+    A cantilever under the probing force gives way by F·L³/(3·E·I).
+    """
 
     name = "stylus_bending"
     title = say("Bending of the stylus")
