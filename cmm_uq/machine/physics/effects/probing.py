@@ -76,8 +76,8 @@ _OFF_LINE = (
 class ArtefactSag(Effect):
     """Bar shortened by its own weight.
 
-    It is of points on one line: a plate, a triangle or a sphere is not shortened along a chord. As a displacement it draws the points apart along the bar, in proportion to their place on it, to where they would lie
-    without sag.
+    It is of points on one line: a plate, a triangle or a sphere is not shortened along a chord. As a displacement it draws
+    the points apart along the bar, in proportion to their place on it, to where they would lie without sag.
     """
 
     name = "artefact_sag"
