@@ -178,12 +178,7 @@ class Effect(ABC):
         return None
 
     def lean(self, points: Points) -> Floats:
-        """Angle between the axes of ``plane`` less 90°, rad, for one unit of the coefficient: () or (n,).
-
-        Raises
-        ------
-        CmmUqError : a column is missing, or it is no squareness.
-        """
+        """Angle between the axes of ``plane`` less 90°, rad, for one unit of the coefficient: () or (n,)."""
         raise CmmUqError(f"{self.name} is no squareness")
 
     def meaning(self, amounts: Mapping[str, Amount]) -> Text:
@@ -237,12 +232,7 @@ class Effect(ABC):
         return {parameter.name: values[..., i] for i, parameter in enumerate(self.reported)}
 
     def from_reported(self, parameters: Mapping[str, float]) -> tuple[Floats, tuple[float, ...]]:
-        """Coefficients (k,) and shape of reported parameters.
-
-        Raises
-        ------
-        CmmUqError : a parameter is missing or unknown.
-        """
+        """Coefficients (k,) and shape of reported parameters; a ``CmmUqError`` where one is missing or unknown."""
         names = [parameter.name for parameter in self.reported]
         for name in parameters:
             if name not in names:
