@@ -18,8 +18,8 @@ from pathlib import Path
 
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.folder import begin
-from cmm_uq.laboratory.live.instruments.source import Reading
-from cmm_uq.laboratory.live.journal import Moment, lines_in
+from cmm_uq.laboratory.live.instruments.source import Moment, Reading
+from cmm_uq.laboratory.live.journal import lines_in
 from cmm_uq.laboratory.live.recorder import Recorder, readings_of
 
 RATE, TICK_S, S = 100, 0.1, 1_000_000_000

@@ -16,8 +16,7 @@ from typing import Any
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, commas, names, say, signed
 from cmm_uq.jobs.tables.plan import AcquireFacts
-from cmm_uq.laboratory.live.instruments.source import Event, Reading
-from cmm_uq.laboratory.live.journal import Moment
+from cmm_uq.laboratory.live.instruments.source import Event, Moment, Reading
 from cmm_uq.laboratory.live.judging import Judge, PointJudgement
 from cmm_uq.laboratory.live.lead import Lead, PlannedPoint, Run
 from cmm_uq.laboratory.live.recorder import COORDINATES, Recorder

@@ -12,7 +12,8 @@ from typing import Any
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.base.output.staging import locked
-from cmm_uq.laboratory.live.journal import Moment, Record, RecordingJournal, opened, refuse_damaged
+from cmm_uq.laboratory.live.instruments.source import Moment
+from cmm_uq.laboratory.live.journal import Record, RecordingJournal, opened, refuse_damaged
 from cmm_uq.laboratory.live.story import Story
 
 FOLDER = "acquisition"  # inside the job's

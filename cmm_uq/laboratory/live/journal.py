@@ -17,18 +17,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cmm_uq.base.errors import CmmUqError, OutputError
+from cmm_uq.laboratory.live.instruments.source import Moment
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _CHECKSUM = 8  # hexadecimal digits of it
 MOST_WAITING = 64 * 2**20  # bytes that wait in memory for room on the disk: twenty minutes of six instruments at 100 Hz
-
-
-@dataclass(frozen=True)
-class Moment:
-    """A moment by both clocks, ns: the wall clock since 1970, which is set at times, and the monotonic one, which never is."""
-
-    utc_ns: int
-    monotonic_ns: int
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.base.points import AXES
 from cmm_uq.jobs.tables.plan import DeclaredSource
 from cmm_uq.laboratory.live.folder import STREAMS, Journals
-from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity, Reading, Returned
+from cmm_uq.laboratory.live.instruments.source import Clock, Event, Identity, Moment, Reading, Returned
 from cmm_uq.laboratory.live.joining import NS, Joined, Stream
-from cmm_uq.laboratory.live.journal import Moment, NoRoomError, RecordingJournal, lines_in
+from cmm_uq.laboratory.live.journal import NoRoomError, RecordingJournal, lines_in
 from cmm_uq.laboratory.live.story import Place, Story
 
 READINGS = "readings"  # kind of such a record
@@ -104,7 +104,7 @@ class Recorder:
 
     @property
     def now(self) -> Moment:
-        return Moment(self._clock.utc_ns(), self._clock.monotonic_ns())
+        return Moment.now(self._clock)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from cmm_uq.laboratory.live.instruments.source import Moment
 from cmm_uq.laboratory.live.joining import NS, Joined
-from cmm_uq.laboratory.live.journal import Moment, Record
+from cmm_uq.laboratory.live.journal import Record
 
 Place = tuple[int, int, int]  # measurement, point, repeat
 

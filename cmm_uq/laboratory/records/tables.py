@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 from sqlalchemy import (
     BigInteger,
     Boolean,
@@ -41,135 +44,70 @@ def _of(column: str) -> ForeignKey:
     return ForeignKey(column, deferrable=True, initially="DEFERRED")
 
 
+def _id() -> Column[int]:
+    return Column("id", Integer, primary_key=True, autoincrement=False)
+
+
+def _entry(name: str = "entry", of: str = "entries.number", *, key: bool = False) -> Column[int]:
+    """The number of an entry, which may be the key of the row."""
+    return Column(name, NUMBER, _of(of), primary_key=key, autoincrement=False if key else "auto", nullable=False)
+
+
+def _stated(kind: Any, *names: str, **options: Any) -> Iterator[Column[Any]]:
+    return (Column(name, kind, nullable=False, **options) for name in names)
+
+
 entries = Table(
-    "entries", META,
-    Column("number", NUMBER, primary_key=True, autoincrement=False),
-    Column("at", String(27), nullable=False),
-    Column("kind", String(20), nullable=False),
-    Column("content", Text, nullable=False),
-    Column("previous", String(64), nullable=False),
-    Column("hash", String(64), nullable=False),
-    CheckConstraint("number >= 1", name="counts"),
-    Index(None, "kind", "number"),
+    "entries", META, Column("number", NUMBER, primary_key=True, autoincrement=False), *_stated(String(27), "at"),
+    *_stated(String(20), "kind"), *_stated(Text, "content"), *_stated(String(64), "previous", "hash"),
+    CheckConstraint("number >= 1", name="counts"), Index(None, "kind", "number"),
 )  # fmt: skip
-
 machines = Table(
-    "machines", META,
-    Column("id", Integer, primary_key=True, autoincrement=False),
-    Column("recognised", Text, nullable=False, unique=True),
-    Column("called", Text, nullable=False, unique=True),
-    Column("spelled", Text, nullable=False, index=True),
-    Column("named", Text, nullable=False, index=True),
-    Column("name", Text, nullable=False),
-    Column("manufacturer", Text, nullable=False),
-    Column("model", Text, nullable=False),
-    Column("place", Text, nullable=False),
-    Column("calibrate", Text),
-    Column("day", DAY, nullable=False),
-    Column("entry", NUMBER, _of("entries.number"), nullable=False),
+    "machines", META, _id(), *_stated(Text, "recognised", "called", unique=True),
+    *_stated(Text, "spelled", "named", index=True), *_stated(Text, "name", "manufacturer", "model", "place"),
+    Column("calibrate", Text), *_stated(DAY, "day"), _entry(),
 )  # fmt: skip
-
 adjustments = Table(
-    "adjustments", META,
-    Column("machine", Integer, _of("machines.id"), primary_key=True),
-    Column("day", DAY, primary_key=True),
-    Column("entry", NUMBER, _of("entries.number"), nullable=False),
+    "adjustments", META, Column("machine", Integer, _of("machines.id"), primary_key=True),
+    Column("day", DAY, primary_key=True), _entry(),
 )  # fmt: skip
-
 artefacts = Table(
-    "artefacts", META,
-    Column("id", Integer, primary_key=True, autoincrement=False),
-    Column("recognised", Text, nullable=False, unique=True),
-    Column("called", Text, nullable=False, index=True),
-    Column("kind", Text, nullable=False),
-    Column("certificate", Text, nullable=False),
-    Column("laboratory", Text, nullable=False),
-    Column("calibrated", DAY),
-    Column("due", DAY),
-    Column("day", DAY, nullable=False),
-    Column("entry", NUMBER, _of("entries.number"), nullable=False),
+    "artefacts", META, _id(), *_stated(Text, "recognised", unique=True), *_stated(Text, "called", index=True),
+    *_stated(Text, "kind", "certificate", "laboratory"), Column("calibrated", DAY), Column("due", DAY),
+    *_stated(DAY, "day"), _entry(),
 )  # fmt: skip
-
 certificates = Table(
-    "certificates", META,
-    Column("entry", NUMBER, _of("entries.number"), primary_key=True, autoincrement=False),
-    Column("machine", Integer, _of("machines.id"), nullable=False),
-    Column("artefact", Integer, _of("artefacts.id")),
-    Column("command", Text, nullable=False),
-    Column("job", Text, nullable=False),
-    Column("number", Text, nullable=False),
-    Column("kind", Text, nullable=False),
-    Column("origin", Text, nullable=False),
-    Column("day", DAY, nullable=False),
-    Column("at", String(27), nullable=False),
-    Column("adjusted_since", DAY),
-    Column("state", Text, nullable=False),
-    Column("decision", Text, nullable=False),
-    Column("diagnosis", Text, nullable=False),
-    Column("interim", Boolean(create_constraint=False), nullable=False),
-    Column("folder", Text, nullable=False),
-    Column("version", Text, nullable=False),
-    Column("results_sha256", String(64), nullable=False),
-    Column("artefact_due", DAY),
-    Index(None, "machine", "command", "origin", "day", "entry"),
-    Index(None, "command", "origin", "day", "entry"),
-    Index(None, "artefact", "day"),
-    Index(None, "results_sha256"),
-    Index(None, "job"),
-    Index(None, "number"),
+    "certificates", META, _entry(key=True), Column("machine", Integer, _of("machines.id"), nullable=False),
+    Column("artefact", Integer, _of("artefacts.id")), *_stated(Text, "command", "job", "number", "kind", "origin"),
+    *_stated(DAY, "day"), *_stated(String(27), "at"), Column("adjusted_since", DAY),
+    *_stated(Text, "state", "decision", "diagnosis"), *_stated(Boolean(create_constraint=False), "interim"),
+    *_stated(Text, "folder", "version"), *_stated(String(64), "results_sha256"), Column("artefact_due", DAY),
+    Index(None, "machine", "command", "origin", "day", "entry"), Index(None, "command", "origin", "day", "entry"),
+    Index(None, "artefact", "day"), Index(None, "results_sha256"), Index(None, "job"), Index(None, "number"),
     Index(None, "folder", "entry"),
 )  # fmt: skip
-
 quantities = Table(
-    "quantities", META,
-    Column("id", Integer, primary_key=True, autoincrement=False),
-    Column("name", Text, nullable=False),
-    Column("quantity", Text, nullable=False),
-    Column("unit", Text, nullable=False),
-    UniqueConstraint("name", "quantity", "unit"),
-)  # fmt: skip
-
+    "quantities", META, _id(), *_stated(Text, "name", "quantity", "unit"), UniqueConstraint("name", "quantity", "unit")
+)
 figures = Table(
-    "figures", META,
-    Column("certificate", NUMBER, _of("certificates.entry"), primary_key=True, autoincrement=False),
+    "figures", META, _entry("certificate", "certificates.entry", key=True),
     Column("place", Integer, primary_key=True, autoincrement=False),
     Column("quantity", Integer, _of("quantities.id"), nullable=False),
-    Column("value", DOUBLE, nullable=False),
-    Column("u", DOUBLE, nullable=False),
-    Column("lower", DOUBLE, nullable=False),
-    Column("upper", DOUBLE, nullable=False),
-    Column("u_artefact", DOUBLE, nullable=False),
-    Column("at_most", DOUBLE),
-    sqlite_with_rowid=False,
+    *_stated(DOUBLE, "value", "u", "lower", "upper", "u_artefact"), Column("at_most", DOUBLE), sqlite_with_rowid=False,
 )  # fmt: skip
-
 covariances = Table(
-    "covariances", META,
-    Column("certificate", NUMBER, _of("certificates.entry"), primary_key=True, autoincrement=False),
-    Column("names", Text, nullable=False),
-    Column("lower", Text, nullable=False),
-)  # fmt: skip
-
+    "covariances", META, _entry("certificate", "certificates.entry", key=True), *_stated(Text, "names", "lower")
+)
 signatures = Table(
-    "signatures", META,
-    Column("entry", NUMBER, _of("entries.number"), primary_key=True, autoincrement=False),
+    "signatures", META, _entry(key=True),
     Column("certificate", NUMBER, _of("certificates.entry"), nullable=False, index=True),
-    Column("what", Text, nullable=False),
-    Column("by", Text, nullable=False),
-    Column("reason", Text, nullable=False),
-    Column("at", String(27), nullable=False),
+    *_stated(Text, "what", "by", "reason"), *_stated(String(27), "at"),
     Column("replaced_by", NUMBER, _of("certificates.entry")),
 )  # fmt: skip
-
 pending = Table(
-    "pending", META,
-    Column("token", String(12), primary_key=True),
-    Column("host", Text, nullable=False),
-    Column("folder", Text, nullable=False),
-    Column("manifest", String(64), nullable=False),
-    Column("at", String(27), nullable=False),
-    Column("kind", String(20), nullable=False),
-    Column("content", Text, nullable=False),
+    "pending", META, Column("token", String(12), primary_key=True), *_stated(Text, "host", "folder"),
+    *_stated(String(64), "manifest"), *_stated(String(27), "at"), *_stated(String(20), "kind"),
+    *_stated(Text, "content"),
 )  # fmt: skip
 
 INDEX = (machines, adjustments, artefacts, certificates, quantities, figures, covariances, signatures)

@@ -15,8 +15,7 @@ from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Verbatim
 from cmm_uq.laboratory.live.folder import read_story
 from cmm_uq.laboratory.live.instruments.ipp.server import SimulatedIppServer
-from cmm_uq.laboratory.live.instruments.source import Gap, Returned
-from cmm_uq.laboratory.live.journal import Moment
+from cmm_uq.laboratory.live.instruments.source import Gap, Moment, Returned
 from tests.laboratory.live.session import FakeClock, job_folder, probed, said, session, temperature, type_in
 
 BAR = ("100 100 -300", "600.003 100 -300")

@@ -11,8 +11,8 @@ from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.errors import CmmUqError, OutputError
 from cmm_uq.laboratory.live.folder import begin, read_story, sessions_in
+from cmm_uq.laboratory.live.instruments.source import Moment
 from cmm_uq.laboratory.live.journal import (
-    Moment,
     NoRoomError,
     Record,
     RecordingJournal,

@@ -7,8 +7,8 @@ from pathlib import Path
 from hypothesis import given, settings, strategies as st
 
 from cmm_uq.base.messages import Verbatim
-from cmm_uq.laboratory.live.instruments.source import Reading
-from cmm_uq.laboratory.live.journal import Moment, RecordingJournal, opened
+from cmm_uq.laboratory.live.instruments.source import Moment, Reading
+from cmm_uq.laboratory.live.journal import RecordingJournal, opened
 from cmm_uq.laboratory.live.recorder import Blocks, readings_of
 
 NOW = Moment(1, 2)

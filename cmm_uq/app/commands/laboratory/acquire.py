@@ -36,8 +36,8 @@ from cmm_uq.laboratory.live.conducting import Conductor
 from cmm_uq.laboratory.live.folder import FOLDER, Journals, begin, read_story, sessions_in
 from cmm_uq.laboratory.live.instruments.instrument import open_source
 from cmm_uq.laboratory.live.instruments.ipp.machine import IppMachine
-from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource
-from cmm_uq.laboratory.live.journal import Moment, made_folder, written_whole
+from cmm_uq.laboratory.live.instruments.source import SYSTEM, Clock, LiveSource, Moment
+from cmm_uq.laboratory.live.journal import made_folder, written_whole
 from cmm_uq.laboratory.live.judging import Judge
 from cmm_uq.laboratory.live.lead import Lead, titles_of
 from cmm_uq.laboratory.live.recorder import Recorder, settle_earlier

@@ -75,9 +75,6 @@ class Conversation:
         return False
 
 
-_TOLD = ("maker", "model", "serial", "firmware")
-
-
 class Introduction:
     """The lines that follow the question who it is."""
 
@@ -85,16 +82,17 @@ class Introduction:
         self._pattern = re.compile(wanted.pattern)
         self._lines: list[str] = []
         self._span = (0, 0)
-        self.found: Identity | None = None
-        """What it said; ``None`` until it did."""
+        self.found: Identity | None = None  # what it said; ``None`` until it did
 
     def hear(self, message: FramedMessage) -> None:
         self._lines.append(message.body.decode("latin-1").strip("\r\n"))
-        found = self._pattern.search("\n".join(self._lines))
+        whole = "\n".join(self._lines)
+        found = self._pattern.search(whole)
         if found is not None and self.found is None:
-            given = {key: text.strip() for key, text in found.groupdict().items() if key in _TOLD and text}
-            self.found = Identity("", **given)
-            whole = "\n".join(self._lines)
+            known = ("maker", "model", "serial", "firmware")
+            self.found = Identity(
+                "", **{key: text.strip() for key, text in found.groupdict().items() if key in known and text}
+            )
             self._span = whole.count("\n", 0, found.start()), whole.count("\n", 0, max(found.start(), found.end() - 1))
 
     def tells(self, place: int) -> bool:
@@ -106,8 +104,6 @@ def another(known: Identity, found: Identity, declared: Identity) -> CmmUqError 
     """What is wrong where the serial number is another than that of the job, or of the instrument that was there before."""
     for expected, whose in ((declared.serial, "the job names"), (known.serial, "before it was")):
         if expected and found.serial and expected.casefold() != found.serial.casefold():
-            return CmmUqError(
-                f"another instrument answers: it says serial number {found.serial!r}, {whose} {expected!r}",
-                where=declared.name, fix="Connect the right one, or correct its serial number",
-            )  # fmt: skip
+            problem = f"another instrument answers: it says serial number {found.serial!r}, {whose} {expected!r}"
+            return CmmUqError(problem, where=declared.name, fix="Connect the right one, or correct its serial number")
     return None

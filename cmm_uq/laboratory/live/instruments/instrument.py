@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from cmm_uq.laboratory.live.instruments.source import (
     Gap,
     Identity,
     LiveSource,
+    Moment,
     Port,
     PortLostError,
     Reading,
@@ -41,14 +42,6 @@ from cmm_uq.laboratory.live.instruments.source import (
 
 RETRY_S = 0.25  # between two attempts to open a port that is gone; a return is to be noticed within 2 s
 INTRODUCED_WITHIN_S = 0.7  # time for an instrument that came back to say which one it is
-
-
-@dataclass(frozen=True)
-class Stamp:
-    """When the last byte of something came, by both clocks, ns."""
-
-    utc_ns: int
-    monotonic_ns: int
 
 
 class LiveInstrument:
@@ -82,12 +75,11 @@ class LiveInstrument:
 
     def close(self) -> None:
         self._closed = True
-        port, self._port = self._port, None
-        if port is not None:
+        if (port := self._port) is not None:
             with contextlib.suppress(PortLostError):
                 for text in self._profile.send.stop:
                     port.write(bytes_of(text))
-            port.close()
+            self._close_port()
 
     def events(self, stop: threading.Event) -> Iterator[Event]:
         held, self._held = self._held, []
@@ -116,7 +108,7 @@ class LiveInstrument:
                 yield from self._rest()
             port.write(question)
         received = port.read()
-        stamp = self._stamp()
+        stamp = Moment.now(self._clock)
         if received:
             self._byte_at = stamp.monotonic_ns
             for framed in self._framer.feed(received):
@@ -126,7 +118,7 @@ class LiveInstrument:
         if self._conversation.overdue(self._clock.monotonic_ns()):
             yield from self._overdue(port)
 
-    def _message(self, framed: FramedMessage, stamp: Stamp, port: Port | None = None) -> Iterator[Event]:
+    def _message(self, framed: FramedMessage, stamp: Moment, port: Port | None = None) -> Iterator[Event]:
         """What came, with the return of an instrument that was silent; with a port, that is asked first who it is."""
         understood = self._parser.read(framed, max(self._conversation.asked, 0))
         if self._conversation.several and not self._conversation.waiting and understood.answers:
@@ -138,7 +130,7 @@ class LiveInstrument:
             yield self._reading(framed, understood, stamp)
 
     def _returned(
-        self, framed: FramedMessage, understood: Understood, stamp: Stamp, port: Port | None
+        self, framed: FramedMessage, understood: Understood, stamp: Moment, port: Port | None
     ) -> Iterator[Event]:
         """The first that an instrument says after a gap."""
         gap, self._gap_at = self._gap_at, -1
@@ -156,15 +148,13 @@ class LiveInstrument:
 
     def _refused(self, error: CmmUqError | PortLostError) -> Iterator[Event]:
         """Another instrument is there, or the port is lost again: the gap goes on, and a new reason for it is said."""
-        port, self._port = self._port, None
-        if port is not None:
-            port.close()
+        self._close_port()
         why = error.problem if isinstance(error, CmmUqError) else str(error)
         if self._told != why:
-            self._told, stamp = why, self._stamp()
+            self._told, stamp = why, Moment.now(self._clock)
             yield Gap(self.name, stamp.utc_ns, stamp.monotonic_ns, Verbatim(why))
 
-    def _reading(self, framed: FramedMessage, understood: Understood, stamp: Stamp) -> Reading:
+    def _reading(self, framed: FramedMessage, understood: Understood, stamp: Moment) -> Reading:
         self._number += 1
         return Reading(
             self.name, self._number, stamp.utc_ns, stamp.monotonic_ns, framed.raw, dict(understood.values), understood.status
@@ -174,7 +164,7 @@ class LiveInstrument:
         """A message whose end did not come."""
         rest = self._framer.rest()
         if rest is not None:
-            yield self._reading(rest, self._parser.read(rest), self._stamp())
+            yield self._reading(rest, self._parser.read(rest), Moment.now(self._clock))
 
     def _overdue(self, port: Port) -> Iterator[Event]:
         yield from self._rest()
@@ -190,7 +180,7 @@ class LiveInstrument:
     def _silent(self, why: Text) -> Iterator[Event]:
         """Say that nothing comes, once for each reason."""
         self._conversation.gap = True
-        stamp = self._stamp()
+        stamp = Moment.now(self._clock)
         if self._gap_at < 0:
             self._gap_at, self._known = stamp.monotonic_ns, False
         if not self._told:
@@ -200,10 +190,13 @@ class LiveInstrument:
     def _lost(self, why: Text) -> Iterator[Event]:
         """Give up the port; what waited for its end is said first."""
         yield from self._rest()
+        self._close_port()
+        yield from self._silent(why)
+
+    def _close_port(self) -> None:
         port, self._port = self._port, None
         if port is not None:
             port.close()
-        yield from self._silent(why)
 
     def _reconnected(self) -> Iterator[Event]:
         try:
@@ -216,8 +209,7 @@ class LiveInstrument:
         try:
             yield from self._introduced(port, INTRODUCED_WITHIN_S)
         except PortLostError:
-            self._port = None
-            port.close()
+            self._close_port()
             self._clock.sleep(RETRY_S)
         except CmmUqError as error:
             yield from self._refused(error)
@@ -230,8 +222,7 @@ class LiveInstrument:
         if wanted is not None and not isinstance(port, ReplayedFile):
             introduction = Introduction(wanted)
             port.write(bytes_of(wanted.send))
-            until = self._clock.monotonic_ns() + round(within_s * SECOND)
-            came, lost = self._answers(port, introduction, until)
+            came, lost = self._answers(port, introduction, within_s)
             found = introduction.found
             wrong = None if found is None else another(self._identity, found, self._declared)
             status = None if wrong is None else Verbatim(str(wrong))
@@ -243,21 +234,24 @@ class LiveInstrument:
             if (failed := wrong or lost) is not None:
                 raise failed
             if found is not None:
-                self._identity, self._known = _completed(found, self._declared), True
+                said = {key: value for key, value in vars(found).items() if value is not None}
+                said |= {"name": self.name, "certificate": self._declared.certificate}
+                self._identity, self._known = replace(self._declared, **said), True
         for text in self._profile.send.start:
             port.write(bytes_of(text))
 
     def _answers(
-        self, port: Port, introduction: Introduction, until: int
-    ) -> tuple[list[tuple[FramedMessage, Stamp]], PortLostError | None]:
+        self, port: Port, introduction: Introduction, within_s: float
+    ) -> tuple[list[tuple[FramedMessage, Moment]], PortLostError | None]:
         """What comes until the instrument has said who it is, or the time is over, or the port is lost."""
-        came: list[tuple[FramedMessage, Stamp]] = []
+        came: list[tuple[FramedMessage, Moment]] = []
+        until = self._clock.monotonic_ns() + round(within_s * SECOND)
         while introduction.found is None and self._clock.monotonic_ns() < until:
             try:
                 received = port.read()
             except PortLostError as lost:
                 return came, lost
-            stamp = self._stamp()
+            stamp = Moment.now(self._clock)
             for framed in self._framer.feed(received):
                 came.append((framed, stamp))
                 introduction.hear(framed)
@@ -266,14 +260,6 @@ class LiveInstrument:
     def _begun(self) -> Conversation:
         replayed = isinstance(self._port, ReplayedFile)
         return Conversation(self._profile.send, self._clock.monotonic_ns(), replayed=replayed)
-
-    def _stamp(self) -> Stamp:
-        return Stamp(self._clock.utc_ns(), self._clock.monotonic_ns())
-
-
-def _completed(found: Identity, declared: Identity) -> Identity:
-    said = {key: value for key, value in vars(found).items() if value is not None}
-    return replace(declared, **(said | {"name": declared.name, "certificate": declared.certificate}))
 
 
 def open_source(declared: DeclaredSource, *, clock: Clock = SYSTEM, folder: Path = Path()) -> LiveSource:

@@ -26,24 +26,21 @@ def ready() -> tuple[str, ...]:
 
 
 def profile_named(name: str, folder: Path = Path()) -> ProfileFile:
-    if name.endswith(ENDING):
-        return read_profile(folder / name)
+    return read_profile(folder / name) if name.endswith(ENDING) else _ready(name)
+
+
+@cache
+def _ready(name: str) -> ProfileFile:
     if name not in ready():
         fix = f"{suggestion(name, ready())} A profile of your own ends in .toml"
         raise CmmUqError(f"there is no profile {name!r}", fix=fix)
-    return _ready(name)
+    return profile_of((_folder() / f"{name}{ENDING}").read_bytes(), Path(f"{name}{ENDING}"))
 
 
 def read_profile(path: Path) -> ProfileFile:
     """A profile of a user's own."""
     content = content_of(path, JOB_BYTES, "Name a profile: cmm-uq instruments list shows those that are ready")
     return profile_of(content, path)
-
-
-@cache
-def _ready(name: str) -> ProfileFile:
-    file = _folder() / f"{name}{ENDING}"
-    return profile_of(file.read_bytes(), Path(file.name))
 
 
 def profile_of(content: bytes, path: Path) -> ProfileFile:
@@ -131,10 +128,10 @@ def drafted(wanted: ProfileDraft) -> bytes:
 
 
 def _lines(wanted: ProfileDraft, pattern: str, values: Mapping[str, float]) -> list[str]:
-    end = terminator_of(wanted.line)
-    settings = wanted.settings or {}
+    end, settings = terminator_of(wanted.line), wanted.settings or {}
+    plain_name = re.sub(r"[^a-z0-9.-]+", "-", wanted.name.lower()).strip("-.") or "instrument"
     lines = [
-        f"name = {_toml_text(_plain_name(wanted.name))}", f"title = {_toml_text(wanted.title)}", "", "[connection]",
+        f"name = {_toml_text(plain_name)}", f"title = {_toml_text(wanted.title)}", "", "[connection]",
         *(f"{key} = {_toml_text(given) if isinstance(given, str) else given}" for key, given in settings.items()),
         "", "[frame]", f"terminator = {_toml_text(end)}", "", "[send]",
     ]  # fmt: skip
@@ -148,26 +145,19 @@ def _lines(wanted: ProfileDraft, pattern: str, values: Mapping[str, float]) -> l
         if name in wanted.ranges:
             low, high = wanted.ranges[name]
             lines += ["", f"[quantities.{name}]", f"range = [{low:g}, {high:g}]"]
-    told = ", ".join(f"{name} = {value!r}" for name, value in values.items())
-    body = without_end(wanted.line)
-    lines += [
-        "", "[[example]]", f"received = {_toml_text(body + end)}", f"values = {{ {told} }}", "", "[facts]",
-        'not_found = ["what the instrument says when something is wrong: add [[ill]] for it"]', "",
+    said = ", ".join(f"{name} = {value!r}" for name, value in values.items())
+    return [
+        *lines, "", "[[example]]", f"received = {_toml_text(without_end(wanted.line) + end)}", f"values = {{ {said} }}", "",
+        "[facts]", 'not_found = ["what the instrument says when something is wrong: add [[ill]] for it"]', "",
     ]  # fmt: skip
-    return lines
-
-
-def _plain_name(name: str) -> str:
-    return re.sub(r"[^a-z0-9.-]+", "-", name.lower()).strip("-.") or "instrument"
 
 
 def _literal(text: str) -> str:
     """Text that must be there, with as many blanks as there may be."""
-    return r"\s*".join("".join(map(_escaped, bytes_of(part))) for part in re.split(r"\s+", text))
-
-
-def _escaped(byte: int) -> str:
-    return re.escape(chr(byte)) if 32 <= byte < 127 else f"\\x{byte:02x}"
+    return r"\s*".join(
+        "".join(re.escape(chr(byte)) if 32 <= byte < 127 else f"\\x{byte:02x}" for byte in bytes_of(part))
+        for part in re.split(r"\s+", text)
+    )
 
 
 def _toml_text(text: str) -> str:

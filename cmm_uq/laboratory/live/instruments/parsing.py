@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from math import isclose, isfinite
@@ -46,15 +46,11 @@ class Framer:
     def feed(self, received: bytes) -> list[FramedMessage]:
         """Messages that are complete with these bytes."""
         self._waiting += received
-        found = []
-        while (one := self._next()) is not None:
-            found.append(one)
-        return found
+        return list(iter(self._next, None))
 
     def rest(self) -> FramedMessage | None:
         """What waits for its end and will not get it; afterwards nothing waits."""
-        raw, self._waiting, self._looked = bytes(self._waiting), bytearray(), 0
-        return FramedMessage(raw, raw, whole=False) if raw else None
+        return self._no_message(len(self._waiting)) if self._waiting else None
 
     @property
     def waiting(self) -> bool:
@@ -62,19 +58,15 @@ class Framer:
         return bool(self._waiting)
 
     def _next(self) -> FramedMessage | None:
-        if self._start:
-            place = self._waiting.find(self._start)
-            if place:
-                before = len(self._waiting) if place < 0 else place
-                return self._taken(min(before, self._longest)) if place > 0 or before >= self._longest else None
+        if self._start and (place := self._waiting.find(self._start)):
+            before = len(self._waiting) if place < 0 else place
+            return self._no_message(min(before, self._longest)) if place > 0 or before >= self._longest else None
         size = self._size()
-        if size is None:
-            return self._taken(self._longest) if len(self._waiting) >= self._longest else None
-        if size > self._longest:
-            return self._taken(self._longest)
-        raw = bytes(self._waiting[:size])
-        del self._waiting[:size]
-        self._looked = 0
+        if size is None and len(self._waiting) < self._longest:
+            return None
+        if size is None or size > self._longest:
+            return self._no_message(self._longest)
+        raw = self._taken(size)
         return FramedMessage(raw, raw[len(self._start) : len(raw) - len(self._terminator or self._stop)])
 
     def _size(self) -> int | None:
@@ -89,10 +81,14 @@ class Framer:
             return None
         return place + len(end)
 
-    def _taken(self, size: int) -> FramedMessage:
+    def _taken(self, size: int) -> bytes:
         raw = bytes(self._waiting[:size])
         del self._waiting[:size]
         self._looked = 0
+        return raw
+
+    def _no_message(self, size: int) -> FramedMessage:
+        raw = self._taken(size)
         return FramedMessage(raw, raw, whole=False)
 
 
@@ -190,62 +186,48 @@ class Parser:
             return Understood(status=say("part of a message, or noise: {seen}", seen=_seen(message.raw)))
         for pattern, says in self._ill:
             if pattern.search(text):
-                told = say("the instrument says {seen}: {meaning}", seen=_seen(message.raw), meaning=Verbatim(says))
-                return Understood(status=told, answers=True)
-        try:
-            return self._valued(list(self._numbers(message.body, text, answers)))
-        except NoValueError as error:
-            return Understood(status=error.why)
-
-    def _valued(self, found: list[tuple[str, str | float, str]]) -> Understood:
-        """Values of what a message has, each by itself: one open thermocouple does not spoil the others."""
+                why = say("the instrument says {seen}: {meaning}", seen=_seen(message.raw), meaning=Verbatim(says))
+                return Understood(status=why, answers=True)
         values: dict[str, float] = {}
         wrong: list[Text] = []
-        for name, given, said in found:
-            try:
-                raw = number_of(given, self._parse.decimal) if isinstance(given, str) else given
-                values[name] = value_of(name, raw, self._profile.quantities.get(name, _PLAIN), said)
-            except NoValueError as error:
-                wrong.append(error.why)
+        try:
+            for name, sent, said in self._numbers(message.body, text, answers):
+                try:  # each by itself: one open thermocouple does not spoil the others
+                    raw = number_of(sent, self._parse.decimal) if isinstance(sent, str) else sent
+                    values[name] = value_of(name, raw, self._profile.quantities.get(name, _PLAIN), said)
+                except NoValueError as error:
+                    wrong.append(error.why)
+        except NoValueError as error:
+            return Understood(status=error.why)
         return Understood(values, semicolons(wrong) if wrong else None, answers=bool(values))
 
-    def _numbers(self, body: bytes, text: str, answers: int) -> Iterator[tuple[str, str | float, str]]:
+    def _numbers(self, body: bytes, text: str, answers: int) -> Sequence[tuple[str, str | float, str]]:
         """Name, number as sent and unit as said of each quantity of a message."""
-        if self._parse.struct is not None:
-            yield from self._binary(body, self._parse.struct)
-        elif self._parse.separator is not None:
-            yield from self._separated(text, self._parse.separator)
-        else:
-            yield from self._matched(text, answers)
-
-    def _matched(self, text: str, answers: int) -> Iterator[tuple[str, str | float, str]]:
+        names, layout, separator = self._parse.fields, self._parse.struct, self._parse.separator
+        if layout is not None:
+            if len(body) != struct.calcsize(layout):
+                raise NoValueError(_not_understood(text))
+            numbers = zip(names, struct.unpack(layout, body), strict=True)
+            return [(name, float(value), "") for name, value in numbers if name and isinstance(value, (int, float))]
+        if separator is not None:
+            parts = re.split(separator, text.strip())
+            if len(parts) > len(names) or (len(parts) < len(names) and not self._parse.fewer):
+                raise NoValueError(
+                    say("{seen} has {count} fields, not {wanted}", seen=_seen(text.encode("latin-1")), count=len(parts),
+                        wanted=len(names))
+                )  # fmt: skip
+            return [(name, part, "") for name, part in zip(names, parts, strict=False) if name]
         pattern = self._patterns[answers % len(self._patterns)]
         found = pattern.search(text) if pattern else None
         if found is None:
             raise NoValueError(_not_understood(text))
-        groups = found.groupdict()
-        units = {one.unit_group for one in self._profile.quantities.values()}
-        for name, given in groups.items():
-            if given is not None and name not in units:
-                group = self._profile.quantities.get(name, _PLAIN).unit_group
-                yield name, given, (groups.get(group) or "").strip()
-
-    def _separated(self, text: str, separator: str) -> Iterator[tuple[str, str | float, str]]:
-        parts = re.split(separator, text.strip())
-        names = self._parse.fields
-        if len(parts) > len(names) or (len(parts) < len(names) and not self._parse.fewer):
-            raise NoValueError(
-                say("{seen} has {count} fields, not {wanted}", seen=_seen(text.encode("latin-1")), count=len(parts),
-                    wanted=len(names))
-            )  # fmt: skip
-        yield from ((name, part, "") for name, part in zip(names, parts, strict=False) if name)
-
-    def _binary(self, body: bytes, layout: str) -> Iterator[tuple[str, str | float, str]]:
-        if len(body) != struct.calcsize(layout):
-            raise NoValueError(_not_understood(body.decode("latin-1")))
-        for name, value in zip(self._parse.fields, struct.unpack(layout, body), strict=True):
-            if name and isinstance(value, (int, float)):
-                yield name, float(value), ""
+        groups, quantities = found.groupdict(), self._profile.quantities
+        units = {quantity.unit_group for quantity in quantities.values()}
+        return [
+            (name, sent, (groups.get(quantities.get(name, _PLAIN).unit_group) or "").strip())
+            for name, sent in groups.items()
+            if sent is not None and name not in units
+        ]
 
 
 def _not_understood(text: str) -> Text:
@@ -266,13 +248,6 @@ def check_profile(profile: ProfileFile, where: str) -> None:
     if profile.frame.length and not profile.frame.start and not profile.send.poll:
         raise CmmUqError("is for instruments that are asked: nothing else ends a message that is cut",
                          where=f"{where}: [frame] length", fix="Give start, or [send] poll")  # fmt: skip
-    _check_quantities(profile, where)
-    parser = Parser(profile)
-    for place, example in enumerate(profile.example, 1):
-        _check_example(profile, parser, example, f"{where}: [[example]] {place}")
-
-
-def _check_quantities(profile: ProfileFile, where: str) -> None:
     named = profile.named()
     for name, quantity in profile.quantities.items():
         at = f"{where}: [quantities.{name}]"
@@ -283,22 +258,24 @@ def _check_quantities(profile: ProfileFile, where: str) -> None:
                 conversion(unit, unit_of(name))
             except CmmUqError as error:
                 raise CmmUqError(error.problem, where=at, fix=error.fix) from None
+    parser = Parser(profile)
+    for place, example in enumerate(profile.example, 1):
+        _check_example(profile, parser, example, f"{where}: [[example]] {place}")
 
 
 def _check_example(profile: ProfileFile, parser: Parser, example: Example, at: str) -> None:
-    framer = Framer(profile.frame)
-    raw = bytes_of(example.received)
+    framer, raw = Framer(profile.frame), bytes_of(example.received)
     messages = framer.feed(raw)
     if len(messages) != 1 or framer.waiting:
         raise CmmUqError(f"{shown(raw)} is {len(messages)} messages and {'a part' if framer.waiting else 'no rest'}",
                          where=at, fix="Mend [frame], or write the message with its framing")  # fmt: skip
     found = parser.read(messages[0], example.answers)
-    if bool(found.status) != example.ill or not _same(found.values, example.values):
-        seen = ", ".join(f"{name} = {value!r}" for name, value in found.values.items()) or found.status or "nothing"
-        wanted = ", ".join(f"{name} = {value!r}" for name, value in example.values.items())
-        raise CmmUqError(f"{shown(raw)} is read as {seen}, not as {wanted or 'what is wrong with the instrument'}",
-                         where=at, fix="Mend [parse] and [quantities], or the example")  # fmt: skip
-
-
-def _same(found: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
-    return found.keys() == wanted.keys() and all(isclose(found[name], wanted[name], rel_tol=1e-9) for name in wanted)
+    same = found.values.keys() == example.values.keys() and all(
+        isclose(found.values[name], value, rel_tol=1e-9) for name, value in example.values.items()
+    )
+    if bool(found.status) != example.ill or not same:
+        seen, wanted = (", ".join(f"{name} = {value!r}" for name, value in each.items())
+                        for each in (found.values, example.values))  # fmt: skip
+        wanted = wanted or "what is wrong with the instrument"
+        raise CmmUqError(f"{shown(raw)} is read as {seen or found.status or 'nothing'}, not as {wanted}", where=at,
+                         fix="Mend [parse] and [quantities], or the example")  # fmt: skip

@@ -13,7 +13,7 @@ import re
 import socket
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 from urllib.parse import parse_qs
@@ -29,6 +29,14 @@ if TYPE_CHECKING:
 SCHEME = "visa://"  # begins the name of a port that VISA knows: ``visa://GPIB0::17::INSTR``
 
 
+@contextlib.contextmanager
+def _lost_on(failures: tuple[type[Exception], ...]) -> Iterator[None]:
+    try:
+        yield
+    except failures as error:
+        raise PortLostError(str(error)) from None
+
+
 class VisaPort:
     """An instrument by VISA."""
 
@@ -42,9 +50,8 @@ class VisaPort:
         self._timed_out = pyvisa.constants.StatusCode.error_timeout
         self._asked = False
         try:
-            self._visa: Any = pyvisa.ResourceManager(library).open_resource(
-                port.removeprefix(SCHEME), timeout=TICK_S * 1e3
-            )
+            name = port.removeprefix(SCHEME)
+            self._visa: Any = pyvisa.ResourceManager(library).open_resource(name, timeout=TICK_S * 1e3)
         except self._failures as error:
             fix = "Check address and cable; pyvisa-info says which VISA is there"
             raise CmmUqError(f"cannot be opened: {error}", where=port, fix=fix) from None
@@ -63,10 +70,8 @@ class VisaPort:
         return received
 
     def write(self, data: bytes) -> None:
-        try:
+        with _lost_on(self._failures):
             self._visa.write_raw(data)
-        except self._failures as error:
-            raise PortLostError(str(error)) from None
         self._asked = self._asked or b"?" in data
 
     def close(self) -> None:
@@ -82,7 +87,7 @@ CONNECT_WITHIN_S = 1.0  # time for a connection over the network: twice of it is
 KEPT_ALIVE = {"TCP_KEEPIDLE": 5, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
 """So that a connection whose other side was switched off is lost after 8 s, where nothing is sent that would show it."""
 
-_CHUNK = 65536
+_CHUNK, _REPLAYED = 65536, 4096
 _ADDRESS = re.compile(r"(?P<scheme>\w+)://(?P<host>\[[0-9A-Fa-f:.]+\]|[^\s:/]+):(?P<port>\d{1,5})/?")
 
 
@@ -126,9 +131,8 @@ class SerialPort:
         own: dict[str, Any] = {} if far else {"exclusive": True, "write_timeout": 1.0}
         url = f"{port}?timeout={CONNECT_WITHIN_S}" if far else port
         try:
-            with warnings.catch_warnings(
-                action="ignore", category=DeprecationWarning
-            ):  # of pyserial's way to make a thread
+            # of pyserial's way to make a thread
+            with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
                 made = serial.serial_for_url(url, do_not_open=True, timeout=TICK_S, **settings, **own)
                 self._serial = cast("serial.Serial", made)
                 self._serial.dtr, self._serial.rts = connection.dtr, connection.rts
@@ -137,17 +141,13 @@ class SerialPort:
             raise _refused(port, error) from None
 
     def read(self) -> bytes:
-        try:
+        with _lost_on(self._failures):
             first: bytes = self._serial.read(1)
             return first + (self._serial.read(waiting) if first and (waiting := self._serial.in_waiting) else b"")
-        except self._failures as error:
-            raise PortLostError(str(error)) from None
 
     def write(self, data: bytes) -> None:
-        try:
+        with _lost_on(self._failures):
             self._serial.write(data)
-        except self._failures as error:
-            raise PortLostError(str(error)) from None
 
     def close(self) -> None:
         with contextlib.suppress(*self._failures):
@@ -191,33 +191,33 @@ class TcpPort:
         self._socket.close()
 
 
+_NO_PERMISSION = "" if os.name == "nt" else ": on Linux, join the group that owns it (ls -l), often dialout"
+_REFUSALS: tuple[tuple[tuple[int, ...], tuple[type[Exception], ...], tuple[str, ...], str, str], ...] = (
+    ((errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK), (), ("exclusively lock",),
+     "the port is busy: another program has it", "Close that program; one port is for one program"),
+    ((errno.EACCES, errno.EPERM), (), ("Access is denied", "PermissionError"),
+     "the port may not be opened by this user", f"Ask for the permission{_NO_PERMISSION}"),
+    ((errno.ENOENT, errno.ENODEV, errno.ENXIO), (), ("FileNotFoundError",),
+     "there is no such port", "Check cable and power. {present}"),
+    ((errno.ENOTTY,), (), ("Inappropriate ioctl",), "is no serial port", "{present}"),
+    ((), (ConnectionRefusedError,), ("refused",),
+     "nobody listens at this address", "Check host, port number and power"),
+    ((), (TimeoutError,), ("timed out",),
+     f"no connection within {CONNECT_WITHIN_S:g} s", "Check address, cable and firewall"),
+    ((), (socket.gaierror,), (), "no computer of this name is known", "Check the address"),
+)  # fmt: skip
+"""By codes, kinds and words of an error: what is wrong, and what to check."""
+
+
 def _refused(port: str, error: Exception) -> CmmUqError:
-    """Why a port cannot be opened: what was seen, and what to check."""
-    code = getattr(error, "errno", None)
-    text = str(error)
-    if "exclusively lock" in text or code in (errno.EAGAIN, errno.EBUSY, errno.EWOULDBLOCK):
-        fix = "Close that program; one port is for one program"
-        return CmmUqError("the port is busy: another program has it", where=port, fix=fix)
-    if code in (errno.EACCES, errno.EPERM) or "Access is denied" in text or "PermissionError" in text:
-        group = "" if os.name == "nt" else ": on Linux, join the group that owns it (ls -l), often dialout"
-        return CmmUqError("the port may not be opened by this user", where=port, fix=f"Ask for the permission{group}")
-    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or "FileNotFoundError" in text:
-        return CmmUqError("there is no such port", where=port, fix=f"Check cable and power. {_present()}")
-    if code == errno.ENOTTY or "Inappropriate ioctl" in text:
-        return CmmUqError("is no serial port", where=port, fix=_present())
-    if isinstance(error, ConnectionRefusedError) or "refused" in text:
-        return CmmUqError("nobody listens at this address", where=port, fix="Check host, port number and power")
-    if isinstance(error, TimeoutError) or "timed out" in text:
-        fix = "Check address, cable and firewall"
-        return CmmUqError(f"no connection within {CONNECT_WITHIN_S:g} s", where=port, fix=fix)
-    if isinstance(error, socket.gaierror):
-        return CmmUqError("no computer of this name is known", where=port, fix="Check the address")
+    """Why a port cannot be opened."""
+    code, text = getattr(error, "errno", None), str(error)
+    for codes, kinds, words, problem, fix in _REFUSALS:
+        if code in codes or isinstance(error, kinds) or any(word in text for word in words):
+            names = ", ".join(name for name, _ in serial_ports()) if "{present}" in fix else ""
+            present = f"Ports here: {names}" if names else "No serial port is here"
+            return CmmUqError(problem, where=port, fix=fix.format(present=present))
     return CmmUqError(f"cannot be opened: {text}", where=port, fix="Check port, cable and settings")
-
-
-def _present() -> str:
-    names = [name for name, _ in serial_ports()]
-    return f"Ports here: {', '.join(names)}" if names else "No serial port is here"
 
 
 def serial_ports() -> list[tuple[str, str]]:
@@ -234,9 +234,6 @@ def file_named(port: str, folder: Path) -> Path:
     return folder / port.removeprefix(FILE).partition("?")[0]
 
 
-_CHUNK_of_replay = 4096
-
-
 class EndOfFileError(PortLostError):
     """The file has been replayed."""
 
@@ -245,13 +242,19 @@ class ReplayedFile:
     """A file as a port, ``file:NAME?every_s=S`` a line in that time; what is written to it goes nowhere."""
 
     def __init__(self, port: str, folder: Path, clock: Clock) -> None:
-        path = file_named(port, folder)
+        path, options = file_named(port, folder), parse_qs(port.removeprefix(FILE).partition("?")[2])
         check_file(path, "Name a file of received bytes: file:NAME")
-        self._every_s, self._clock = _pace(port), clock
+        try:
+            (text,) = options.pop("every_s", ["0"])
+            self._every_s, self._clock = float(text), clock
+            if options or not 0 <= self._every_s < 1e6:
+                raise ValueError
+        except ValueError:
+            raise CmmUqError("says no pace", where=port, fix="Write it as file:NAME?every_s=0.1") from None
         self._file = path.open("rb")
 
     def read(self) -> bytes:
-        received = self._file.readline(_CHUNK_of_replay) if self._every_s else self._file.read(_CHUNK_of_replay)
+        received = self._file.readline(_REPLAYED) if self._every_s else self._file.read(_REPLAYED)
         if not received:
             raise EndOfFileError("the file is at its end")
         if self._every_s:
@@ -262,15 +265,3 @@ class ReplayedFile:
 
     def close(self) -> None:
         self._file.close()
-
-
-def _pace(port: str) -> float:
-    given = parse_qs(port.removeprefix(FILE).partition("?")[2])
-    try:
-        (text,) = given.pop("every_s", ["0"])
-        found = float(text)
-        if given or not 0 <= found < 1e6:
-            raise ValueError
-    except ValueError:
-        raise CmmUqError("says no pace", where=port, fix="Write it as file:NAME?every_s=0.1") from None
-    return found

@@ -18,6 +18,7 @@ NAMES = (
 """Of the characters 0 to 31 (ISO/IEC 646)."""
 
 _CODES = {name: bytes([code]) for code, name in enumerate(NAMES)} | {"DEL": b"\x7f"}
+_SHOWN = {code[0]: f"<{name}>" for name, code in _CODES.items()}
 _WRITTEN = re.compile(r"<(?:([A-Z]{2,3}\d?)|0x([0-9A-Fa-f]{2}))>")
 
 
@@ -33,15 +34,7 @@ def bytes_of(text: str) -> bytes:
 
 def shown(data: bytes) -> str:
     """Bytes as :func:`bytes_of` reads them again, on one line that a terminal shows."""
-    return "".join(_shown(byte) for byte in data)
-
-
-def _shown(byte: int) -> str:
-    if byte < len(NAMES):
-        return f"<{NAMES[byte]}>"
-    if byte == 0x7F:
-        return "<DEL>"
-    return printable(chr(byte)) if byte < 0x80 else f"<0x{byte:02X}>"
+    return "".join(_SHOWN.get(byte) or (printable(chr(byte)) if byte < 0x80 else f"<0x{byte:02X}>") for byte in data)
 
 
 def _plain(text: str) -> bytes:
@@ -172,16 +165,13 @@ class Parse(JobTable):
         if (self.pattern is None) != bool(self.fields):
             raise ValueError("fields go with separator or struct, and both need them")
         if self.struct is not None:
-            self._check_struct(self.struct)
+            try:
+                count = len(struct.unpack(self.struct, bytes(struct.calcsize(self.struct))))
+            except struct.error as error:
+                raise ValueError(f"struct: {error}") from None
+            if count != len(self.fields):
+                raise ValueError(f"struct has {count} fields, and fields names {len(self.fields)}")
         return self
-
-    def _check_struct(self, layout: str) -> None:
-        try:
-            count = len(struct.unpack(layout, bytes(struct.calcsize(layout))))
-        except struct.error as error:
-            raise ValueError(f"struct: {error}") from None
-        if count != len(self.fields):
-            raise ValueError(f"struct has {count} fields, and fields names {len(self.fields)}")
 
 
 class ProfileQuantity(JobTable):

@@ -8,7 +8,6 @@ import select
 import socket
 import threading
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -63,17 +62,13 @@ class SimulatedLine:
         self._wire: _Wire | None = None
         self._listening: socket.socket | None = None
         self._tcp_port = tcp_port
-        self._thread = threading.Thread(target=self._run)
-        self.sent = 0
-        """Messages that the instrument sent whole."""
+        self.sent = 0  # messages that the instrument sent whole
         self.plug_in()
 
     @property
     def port(self) -> str:
         """As a job names it."""
-        if self._way == "pty":
-            return str(self._name)
-        return f"{self._way}://127.0.0.1:{self._tcp_port}"
+        return str(self._name) if self._way == "pty" else f"{self._way}://127.0.0.1:{self._tcp_port}"
 
     def plug_in(self) -> None:
         self._stop = threading.Event()
@@ -212,13 +207,8 @@ class _DeviceServer:
         self.line.close()
 
 
-@contextlib.contextmanager
 def simulated(
     speaker: Speaker, way: Way = "pty", folder: Path | None = None, tcp_port: int = 0
-) -> Iterator[SimulatedLine]:
+) -> contextlib.AbstractContextManager[SimulatedLine]:
     """A simulated instrument that is gone afterwards; see :class:`SimulatedLine`."""
-    line = SimulatedLine(speaker, way, folder, tcp_port)
-    try:
-        yield line
-    finally:
-        line.close()
+    return contextlib.closing(SimulatedLine(speaker, way, folder, tcp_port))

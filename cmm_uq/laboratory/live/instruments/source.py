@@ -12,6 +12,18 @@ from cmm_uq.base.messages import Text
 
 
 @dataclass(frozen=True)
+class Moment:
+    """A moment by both clocks, ns: the wall clock since 1970, which is set at times, and the monotonic one, which never is."""
+
+    utc_ns: int
+    monotonic_ns: int
+
+    @classmethod
+    def now(cls, clock: Clock) -> Moment:
+        return cls(clock.utc_ns(), clock.monotonic_ns())
+
+
+@dataclass(frozen=True)
 class Reading:
     """One message of an instrument, as received and as understood; values by the quantity's name with its unit."""
 
@@ -79,13 +91,9 @@ class LiveSource(Protocol):
 class Clock(Protocol):
     """Time, as the system tells it or as a test does."""
 
-    def utc_ns(self) -> int:
-        """Wall clock, ns since 1970."""
-        ...
+    def utc_ns(self) -> int: ...
 
-    def monotonic_ns(self) -> int:
-        """A clock that nobody sets, ns."""
-        ...
+    def monotonic_ns(self) -> int: ...
 
     def sleep(self, s: float) -> None: ...
 
@@ -120,8 +128,6 @@ class Port(Protocol):
         """What came, as soon as anything comes; empty where nothing did within :data:`TICK_S`."""
         ...
 
-    def write(self, data: bytes) -> None:
-        """Send."""
-        ...
+    def write(self, data: bytes) -> None: ...
 
     def close(self) -> None: ...

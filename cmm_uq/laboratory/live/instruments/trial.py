@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from cmm_uq.base.errors import CmmUqError
@@ -34,10 +33,8 @@ class Trial:
     wrong: int = 0
     answers: int = 0
     quantities: dict[str, float] = field(default_factory=dict)
-    received: bytes = b""
-    """The last bytes that were not understood, or else that came."""
-    told: str = ""
-    """The last that was wrong."""
+    received: bytes = b""  # the last bytes that were not understood, or else that came
+    told: str = ""  # the last that was wrong
 
     def take(self, event: Event) -> None:
         if not isinstance(event, Reading):
@@ -59,7 +56,10 @@ class Trial:
         expected = next((one.received for one in self.profile.example if one.values), "")
         like = f"; expected like {expected[:60]}" if expected else ""
         if not self.messages:
-            raise CmmUqError(f"nothing came{like}", where=self.port, fix=f"Check {', '.join(self._silent())}")
+            settings = "" if "://" in self.port else f"the settings (the profile has {self.settings}), "
+            speaks = "be asked" if self.profile.send.poll else "send by itself"
+            fix = f"Check power and cable (crossed or straight), {settings}that it is set to {speaks}"
+            raise CmmUqError(f"nothing came{like}", where=self.port, fix=fix)
         seen = shown(self.received[:60])
         if self.answers:
             fix = "See its display and manual"
@@ -75,9 +75,3 @@ class Trial:
         """Of the line: ``9600 7E1``."""
         line = self.profile.connection
         return f"{line.baud} {line.data_bits}{_LETTERS[line.parity]}{line.stop_bits}"
-
-    def _silent(self) -> Iterator[str]:
-        yield "power and cable (crossed or straight)"
-        if "://" not in self.port:
-            yield f"the settings (the profile has {self.settings})"
-        yield "that it is set to be asked" if self.profile.send.poll else "that it is set to send by itself"

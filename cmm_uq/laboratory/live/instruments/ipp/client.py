@@ -1,50 +1,128 @@
 """A client of I++ DME: session, positions, tools, temperatures, errors, and measuring.
 
-No command moves the machine unless its caller allowed it and confirms each (:class:`Client`, ``confirm``).
+Transactions follow one after the other, each to the end of its answer. No command moves the machine unless its caller allowed
+it and confirms each (:class:`Client`, ``confirm``).
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from cmm_uq.base.errors import CmmUqError
+from cmm_uq.laboratory.live.instruments.conversation import SECOND
 from cmm_uq.laboratory.live.instruments.ipp.protocol import (
-    ANSWER_WITHIN_S,
+    ACK,
+    DATA,
+    DONE,
+    LONGEST,
+    Argument,
     BadLineError,
     FaultError,
     HeardLine,
     NoAnswerError,
-    Term,
-    Transactions,
     arguments_of,
+    fault_of,
     number_text,
+    response_of,
     terms_of,
 )
+from cmm_uq.laboratory.live.instruments.parsing import Framer
+from cmm_uq.laboratory.live.instruments.profile import MessageFrame
 from cmm_uq.laboratory.live.instruments.source import Clock, Port
 
+ANSWER_WITHIN_S = 2.0  # time for the acknowledgement, and for data of what does not move the machine
 MOVED_WITHIN_S = 300.0  # time for what moves it
-
 NOT_THERE = frozenset({501, 502, 505, 506, 507, 509, 510})
 """Errors by which a server says that it does not know a command, an argument or a property (section 8.2)."""
 
+_KEPT = 1000  # lines sent that are remembered
 Position = tuple[float, float, float]
 
 
-class Client(Transactions):
-    """A client of one server; ``confirm`` is asked before each command that moves the machine, else nothing moves."""
+class Client:
+    """A client of one server.
+
+    ``confirm``: asked before each command that moves the machine, with the command; ``None``: nothing ever moves;
+    ``unasked``: lines that answer no command: events, reports of daemons, errors by themselves, and what is no response.
+    """
 
     def __init__(
         self, port: Port, clock: Clock, *, confirm: Callable[[str], bool] | None = None, within_s: float = ANSWER_WITHIN_S
     ) -> None:  # fmt: skip
-        super().__init__(port, clock, within_s)
-        self._confirm = confirm
+        self._port, self._clock, self._confirm, self.within_s = port, clock, confirm, within_s
+        self._framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
+        self._commands = self._events = 0
+        self._came: deque[HeardLine] = deque()
+        self.unasked: deque[HeardLine] = deque()
+        self.sent: deque[str] = deque(maxlen=_KEPT)
+
+    # --- transactions ------------------------------------------------------------
+
+    def call(self, command: str, *, event: bool = False, within_s: float | None = None) -> list[HeardLine]:
+        """Send a command and wait for the end of its transaction, each line in time; its lines of data."""
+        if event:
+            self._events = self._events % 9999 + 1
+            tag = f"E{self._events:04d}"
+        else:
+            self._commands = self._commands % 99999 + 1
+            tag = f"{self._commands:05d}"
+        self._port.write(f"{tag} {command}\r\n".encode("ascii"))
+        self.sent.append(f"{tag} {command}")
+        within_s = self.within_s if within_s is None else within_s
+        first = self._answer(tag, command, within_s)
+        if first.response is None or first.response.sign != ACK:
+            raise NoAnswerError(f"{command} was answered {first.raw!r} before it was acknowledged with {ACK}")
+        data, faults = [], []
+        while (response := (heard := self._answer(tag, command, within_s)).response) and response.sign != DONE:
+            if response.sign == ACK:
+                raise NoAnswerError(f"{command} was acknowledged twice")
+            if response.sign == DATA:
+                data.append(heard)
+                continue
+            try:
+                faults.append(fault_of(response.rest))
+            except BadLineError as error:
+                raise NoAnswerError(f"an error that is none of the protocol: {error}") from None
+        if stopping := next((fault for fault in faults if fault.stops), None):
+            raise FaultError(stopping)
+        return data
+
+    def listen(self) -> bool:
+        """Take what comes within a moment; whether anything is in :attr:`unasked`."""
+        self._read()
+        self.unasked += self._came
+        self._came.clear()
+        return bool(self.unasked)
+
+    def _answer(self, tag: str, command: str, within_s: float) -> HeardLine:
+        until = self._clock.monotonic_ns() + round(within_s * SECOND)
+        while True:
+            while self._came:
+                heard = self._came.popleft()
+                if heard.response is not None and heard.response.tag == tag:
+                    return heard
+                self.unasked.append(heard)
+            if self._clock.monotonic_ns() >= until:
+                raise NoAnswerError(f"{command} was not answered within {within_s:g} s")
+            self._read()
+
+    def _read(self) -> None:
+        received = self._port.read()
+        utc, monotonic = self._clock.utc_ns(), self._clock.monotonic_ns()
+        for framed in self._framer.feed(received):
+            try:
+                response = response_of(framed.body) if framed.whole else None
+            except BadLineError:
+                response = None
+            self._came.append(HeardLine(framed.raw, response, utc, monotonic))
 
     # --- session and errors ------------------------------------------------------------
 
     def start_session(self, *, take_over: bool = False) -> None:
         """Begin; with ``take_over`` after ending one that is active, such as one's own that was cut off."""
         if take_over:
-            self.call("EndSession()")
+            self.end_session()
         self.call("StartSession()")
 
     def end_session(self) -> None:
@@ -53,18 +131,18 @@ class Client(Transactions):
 
     def version(self) -> str | None:
         """Version of the specification that the server implements; ``None`` before 1.4, which does not know the question."""
-        (answer,) = self._known("GetDMEVersion()") or (None,)
-        return None if answer is None else str(_arguments(answer, "DMEVersion")[0])
+        found = self._known("GetDMEVersion()", "DMEVersion")
+        return None if found is None else str(found)
 
     def machine_class(self) -> str | None:
         """``CartCMM`` or another."""
-        (answer,) = self._known("GetMachineClass()") or (None,)
-        return None if answer is None else str(_arguments(answer, "GetMachineClass")[0])
+        found = self._known("GetMachineClass()", "GetMachineClass")
+        return None if found is None else str(found)
 
     def in_error(self) -> bool:
         """Whether the server waits for its errors to be cleared."""
         (answer,) = self.call("GetErrStatusE()", event=True)
-        return _arguments(answer, "ErrStatus")[0] == 1.0
+        return _first(answer, "ErrStatus") == 1.0
 
     def clear_all_errors(self) -> None:
         """Let the server go on after an error."""
@@ -109,7 +187,7 @@ class Client(Transactions):
     def tool(self) -> str:
         """Name of the active tool."""
         (answer,) = self.call("GetProp(Tool.Name())")
-        return str(_arguments(answer, "Tool.Name")[0])
+        return str(_first(answer, "Tool.Name"))
 
     def find_tool(self, name: str) -> None:
         """Look for a tool; error 1502 where there is none of this name."""
@@ -117,16 +195,14 @@ class Client(Transactions):
 
     def part_temperature(self) -> float | None:
         """Temperature of the part, °C, as section 9.6 of 1.4.3 announces it; ``None`` where the server has none."""
-        (answer,) = self._known("GetProp(Part.Temperature())") or (None,)
-        return None if answer is None else float(str(_arguments(answer, "Part.Temperature")[0]))
+        found = self._known("GetProp(Part.Temperature())", "Part.Temperature")
+        return None if found is None else float(str(found))
 
     def scale_temperatures(self) -> dict[str, float]:
         """Temperatures of the scales by axis, °C, as servers of VDMA 8722 (2.5) give them; empty where the server has none."""
-        (answer,) = self._known("GetScaleTemperatures(X(), Y(), Z())") or (None,)
-        if answer is None:
-            return {}
+        answer = self._unless_unknown("GetScaleTemperatures(X(), Y(), Z())")
         try:
-            found = terms_of(_rest(answer))
+            found = terms_of(_rest(answer)) if answer is not None else {}
         except BadLineError as error:
             raise NoAnswerError(str(error)) from None
         return {axis: value[0] for axis, value in found.items() if value and isinstance(value[0], float)}
@@ -135,15 +211,13 @@ class Client(Transactions):
 
     def pt_meas(self, position: Position, normal: Position | None = None) -> HeardLine:
         """Measure a point, mm: the machine moves; without an outward normal in the direction from the last position."""
-        where = ", ".join(f"{axis}({number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
         towards = f", IJK({', '.join(map(number_text, normal))})" if normal else ""
-        (answer,) = self._moving(f"PtMeas({where}{towards})")
+        (answer,) = self._moving(f"PtMeas({_place(position)}{towards})")
         return answer
 
     def go_to(self, position: Position) -> None:
         """Move there; see :meth:`pt_meas`."""
-        where = ", ".join(f"{axis}({number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
-        self._moving(f"GoTo({where})")
+        self._moving(f"GoTo({_place(position)})")
 
     def change_tool(self, name: str) -> None:
         """Change the tool: the machine may move; see :meth:`pt_meas`."""
@@ -157,19 +231,28 @@ class Client(Transactions):
             raise CmmUqError(f"{command} was not confirmed: the machine was not moved")
         return self.call(command, within_s=MOVED_WITHIN_S)
 
-    def _known(self, command: str) -> list[HeardLine] | None:
+    def _unless_unknown(self, command: str) -> HeardLine | None:
         """Answer to what older servers may not know; ``None`` where this one does not, and goes on."""
         try:
-            return self.call(command)
+            (answer,) = self.call(command)
         except FaultError as error:
             if error.fault.number not in NOT_THERE:
                 raise
             self.clear_all_errors()
             return None
+        return answer
+
+    def _known(self, command: str, name: str) -> Argument | None:
+        answer = self._unless_unknown(command)
+        return None if answer is None else _first(answer, name)
 
 
 def _empty(names: Sequence[str]) -> str:
     return ", ".join(f"{name}()" for name in names)
+
+
+def _place(position: Position) -> str:
+    return ", ".join(f"{axis}({number_text(value)})" for axis, value in zip("XYZ", position, strict=True))
 
 
 def _quoted(name: str) -> str:
@@ -182,12 +265,9 @@ def _rest(heard: HeardLine) -> str:
     return heard.response.rest if heard.response else ""
 
 
-def _arguments(heard: HeardLine, name: str) -> tuple[float | str | Term, ...]:
-    """What a term of an answer holds, at least one thing."""
+def _first(heard: HeardLine, name: str) -> Argument:
+    """The first that a term of an answer holds."""
     try:
-        found = terms_of(_rest(heard)).get(name, ())
-    except BadLineError:
-        found = ()
-    if not found:
-        raise NoAnswerError(f"{_rest(heard)!r} where {name}(…) belongs")
-    return found
+        return terms_of(_rest(heard))[name][0]
+    except (BadLineError, LookupError):
+        raise NoAnswerError(f"{_rest(heard)!r} where {name}(…) belongs") from None

@@ -10,9 +10,8 @@ from dataclasses import replace
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, say
 from cmm_uq.laboratory.live.instruments.conversation import SECOND
-from cmm_uq.laboratory.live.instruments.ipp.client import Client
+from cmm_uq.laboratory.live.instruments.ipp.client import ANSWER_WITHIN_S, Client
 from cmm_uq.laboratory.live.instruments.ipp.protocol import (
-    ANSWER_WITHIN_S,
     DATA,
     ERROR,
     BadLineError,
@@ -21,8 +20,8 @@ from cmm_uq.laboratory.live.instruments.ipp.protocol import (
     NoAnswerError,
     Term,
     arguments_of,
-    by_name,
     fault_of,
+    terms_of,
 )
 from cmm_uq.laboratory.live.instruments.ports import NETWORK, PortOpener, opener
 from cmm_uq.laboratory.live.instruments.profile import Connection, Positions, ProfileFile, shown
@@ -66,9 +65,14 @@ class IppMachine:
         self.client, began = Client(self._port, clock), clock.monotonic_ns()
         try:
             self._begin(take_over=False)
-        except (NoAnswerError, FaultError, PortLostError) as error:
+        except FaultError as error:
             self._port.close()
-            raise _no_server(identity.name, error) from None
+            fix = "End the session of the other program, and clear the machine's errors"
+            raise CmmUqError(f"the server refuses: {error}", where=self.name, fix=fix) from None
+        except (NoAnswerError, PortLostError) as error:
+            self._port.close()
+            fix = "Check that the port is that of the I++ DME server, usually 1294"
+            raise CmmUqError(f"no I++ DME server answers: {error}", where=self.name, fix=fix) from None
         took_s = (clock.monotonic_ns() - began) / SECOND
         self._again_within_s = min(max(AGAIN_WITHIN_S, took_s), ANSWER_WITHIN_S)
 
@@ -132,8 +136,8 @@ class IppMachine:
         except FaultError as error:
             if error.fault.severity < USER_NEEDED and not self._user_needed:
                 self.client.clear_all_errors()
-            stamp = self._clock.utc_ns(), self._clock.monotonic_ns()
-            yield self._reading(HeardLine(b"", None, *stamp), status=_ill(error))
+            nothing = HeardLine(b"", None, self._clock.utc_ns(), self._clock.monotonic_ns())
+            yield self._reading(nothing, status=say("the machine says {what}", what=Verbatim(str(error.fault))))
             return
         yield from self._unasked()
         yield from self._told_by(heard)
@@ -150,7 +154,13 @@ class IppMachine:
         elif response.sign == DATA:
             yield self._data(heard, response.rest)
         elif response.sign == ERROR:
-            yield self._error(heard, response.rest)
+            try:
+                fault = fault_of(response.rest)
+                self._user_needed = self._user_needed or fault.severity >= USER_NEEDED
+                status = say("the machine says {what}", what=Verbatim(str(fault)))
+            except BadLineError as error:
+                status = say("an error that is none of the protocol: {why}", why=Verbatim(str(error)))
+            yield self._reading(heard, status=status)
 
     def _data(self, heard: HeardLine, rest: str) -> Reading:
         """Data of a point, a position, or something else that is no place."""
@@ -159,7 +169,7 @@ class IppMachine:
             found = arguments_of(rest)
             if len(found) == 1 and isinstance(found[0], Term) and found[0].name == POINT:
                 point, found = POINT, found[0].arguments
-            terms = by_name(found)
+            terms = terms_of(found)
         except BadLineError as error:
             return self._reading(heard, status=say("not understood: {why}", why=Verbatim(str(error))))
         values = {
@@ -167,29 +177,18 @@ class IppMachine:
             for axis in _REPORTED
             if len(place := terms.get(axis, ())) == 1 and isinstance(place[0], float)
         }
-        if len(values) < len(_REPORTED):
-            if point is None and not set(_REPORTED) & set(terms):
-                return self._reading(heard)  # a key, a tool: nothing that is measured
-            return self._reading(heard, status=say("a place without X, Y and Z: {seen}", seen=Verbatim(rest)))
-        return self._reading(heard, values, point=point)
-
-    def _error(self, heard: HeardLine, rest: str) -> Reading:
-        try:
-            fault = fault_of(rest)
-        except BadLineError as error:
-            return self._reading(
-                heard, status=say("an error that is none of the protocol: {why}", why=Verbatim(str(error)))
-            )
-        self._user_needed = self._user_needed or fault.severity >= USER_NEEDED
-        return self._reading(heard, status=say("the machine says {what}", what=Verbatim(str(fault))))
+        if len(values) == len(_REPORTED):
+            return self._reading(heard, values, point=point)
+        if point is None and not set(_REPORTED) & set(terms):
+            return self._reading(heard)  # a key, a tool: nothing that is measured
+        return self._reading(heard, status=say("a place without X, Y and Z: {seen}", seen=Verbatim(rest)))
 
     def _reading(
         self, heard: HeardLine, values: dict[str, float] | None = None, *, status: Text | None = None, point: str | None = None
     ) -> Reading:  # fmt: skip
         self._number += 1
-        return Reading(
-            self.name, self._number, heard.utc_ns, heard.monotonic_ns, heard.raw, values or {}, status, point
-        )
+        times = heard.utc_ns, heard.monotonic_ns
+        return Reading(self.name, self._number, *times, heard.raw, values or {}, status, point)
 
     def _lost(self, why: Text) -> Iterator[Event]:
         yield from self._unasked()
@@ -216,15 +215,3 @@ class IppMachine:
         self._connected, self.client.within_s = True, ANSWER_WITHIN_S
         now, gap, self._gap_at = self._clock.monotonic_ns(), self._gap_at, -1
         yield Returned(self.name, self._clock.utc_ns(), now, (now - gap) / SECOND)
-
-
-def _no_server(name: str, error: Exception) -> CmmUqError:
-    if isinstance(error, FaultError):
-        fix = "End the session of the other program, and clear the machine's errors"
-        return CmmUqError(f"the server refuses: {error}", where=name, fix=fix)
-    fix = "Check that the port is that of the I++ DME server, usually 1294"
-    return CmmUqError(f"no I++ DME server answers: {error}", where=name, fix=fix)
-
-
-def _ill(error: FaultError) -> Text:
-    return say("the machine says {what}", what=Verbatim(str(error.fault)))

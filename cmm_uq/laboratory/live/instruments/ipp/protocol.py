@@ -1,24 +1,17 @@
-"""I++ DME (VDMA 8722): its lines, and transactions, one command after the other, each to the end of its answer.
+"""I++ DME (VDMA 8722): its lines.
 
-Lines are by the syntax of specification 1.4.3, section 6.1.4: terms such as ``X(12.5)``, and responses with tags and a sign:
+They are by the syntax of specification 1.4.3, section 6.1.4: terms such as ``X(12.5)``, and responses with tags and a sign:
 ``&`` accepts a command, ``#`` brings data, ``!`` an error, ``%`` ends the transaction.
 """
 
 from __future__ import annotations
 
 import re
-from collections import deque
 from dataclasses import dataclass
 from typing import Literal, cast
 
-from cmm_uq.laboratory.live.instruments.conversation import SECOND
-from cmm_uq.laboratory.live.instruments.parsing import Framer
-from cmm_uq.laboratory.live.instruments.profile import MessageFrame
-from cmm_uq.laboratory.live.instruments.source import Clock, Port
-
 ACK, DATA, ERROR, DONE = "&", "#", "!", "%"
 Sign = Literal["&", "#", "!", "%"]
-END = b"\r\n"
 LONGEST = 65536  # characters of a line (section 6.2)
 MOST_DIGITS = 16  # of a number (section 6.1.4.2)
 _RESPONSE = re.compile(r"(?P<tag>\d{5}|E\d{4}) (?P<sign>[&#!%])(?: (?P<rest>.*))?")
@@ -28,6 +21,7 @@ _TOKEN = re.compile(
     rf' *(?:(?P<number>{_NUMBER.pattern})|(?P<name>{_NAME.pattern})|"(?P<text>[^"]*)"|(?P<sign>[(),])) *'
 )
 _DEEPEST = 10
+_END, _CLOSED = ("end", ""), ("sign", ")")
 
 
 class BadLineError(ValueError):
@@ -86,19 +80,14 @@ def arguments_of(text: str) -> tuple[Argument, ...]:
     """Arguments, or data, with commas between them."""
     tokens = _tokens(text)
     found, place = _list(tokens, 0, 0)
-    if place != len(tokens):
+    if tokens[place] != _END:
         raise BadLineError(f"something follows the end: {text}")
     return found
 
 
-def terms_of(text: str) -> dict[str, tuple[Argument, ...]]:
+def terms_of(data: str | tuple[Argument, ...]) -> dict[str, tuple[Argument, ...]]:
     """Data whose parts all are terms, by their names."""
-    found = arguments_of(text)
-    return by_name(found)
-
-
-def by_name(found: tuple[Argument, ...]) -> dict[str, tuple[Argument, ...]]:
-    """Terms by their names."""
+    found = arguments_of(data) if isinstance(data, str) else data
     terms = {one.name: one.arguments for one in found if isinstance(one, Term)}
     if len(terms) < len(found):
         raise BadLineError("not terms alone, each of a name of its own")
@@ -124,7 +113,7 @@ def _tokens(text: str) -> list[tuple[str, str]]:
         kind = cast("str", token.lastgroup)
         found.append((kind, token[kind]))
         place = token.end()
-    return found
+    return [*found, ("end", "")]
 
 
 def _list(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[tuple[Argument, ...], int]:
@@ -132,30 +121,27 @@ def _list(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[tuple[
     if depth > _DEEPEST:
         raise BadLineError("brackets are nested too deeply")
     found: list[Argument] = []
-    if place >= len(tokens) or tokens[place] == ("sign", ")"):
-        return (), place
-    while True:
+    while found or tokens[place] not in (_END, _CLOSED):
         argument, place = _argument(tokens, place, depth)
         found.append(argument)
-        if place >= len(tokens) or tokens[place] != ("sign", ","):
-            return tuple(found), place
+        if tokens[place] != ("sign", ","):
+            break
         place += 1
+    return tuple(found), place
 
 
 def _argument(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[Argument, int]:
-    kind, text = tokens[place] if place < len(tokens) else ("", "")
+    kind, text = tokens[place]
     if kind == "number":
         if sum(c.isdigit() for c in re.split("[Ee]", text)[0]) > MOST_DIGITS:
             raise BadLineError(f"a number of more than {MOST_DIGITS} digits")
         return float(text), place + 1
-    if kind == "text":
-        return text, place + 1
-    if kind != "name":
+    if kind not in ("text", "name"):
         raise BadLineError(f"{text!r} where a number, a text or a name belongs")
-    if place + 1 >= len(tokens) or tokens[place + 1] != ("sign", "("):
+    if kind == "text" or tokens[place + 1] != ("sign", "("):
         return text, place + 1
     inside, place = _list(tokens, place + 2, depth + 1)
-    if place >= len(tokens) or tokens[place] != ("sign", ")"):
+    if tokens[place] != _CLOSED:
         raise BadLineError("a bracket is not closed")
     return Term(text, inside), place + 1
 
@@ -163,10 +149,6 @@ def _argument(tokens: list[tuple[str, str]], place: int, depth: int) -> tuple[Ar
 def number_text(value: float) -> str:
     """A number as it is sent: 16 digits at most, no more than are needed."""
     return f"{value:.12g}"
-
-
-ANSWER_WITHIN_S = 2.0  # time for the acknowledgement, and for data of what does not move the machine
-_KEPT = 1000  # lines sent that are remembered
 
 
 class FaultError(Exception):
@@ -189,87 +171,3 @@ class HeardLine:
     response: ServerLine | None  # what it is; ``None`` where it is none of the protocol
     utc_ns: int
     monotonic_ns: int
-
-
-class Transactions:
-    """Transactions with one server; ``unasked`` are lines that answer no command, or are no response."""
-
-    def __init__(self, port: Port, clock: Clock, within_s: float = ANSWER_WITHIN_S) -> None:
-        self._port, self._clock, self.within_s = port, clock, within_s
-        self._framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
-        self._tag, self._event = 0, 0
-        self._came: deque[HeardLine] = deque()
-        self.unasked: deque[HeardLine] = deque()
-        self.sent: deque[str] = deque(maxlen=_KEPT)
-
-    def call(self, command: str, *, event: bool = False, within_s: float | None = None) -> list[HeardLine]:
-        """Send a command and wait for the end of its transaction; its lines of data."""
-        tag = self._next_event() if event else self._next_tag()
-        self._port.write(f"{tag} {command}\r\n".encode("ascii"))
-        self.sent.append(f"{tag} {command}")
-        data: list[HeardLine] = []
-        faults: list[Fault] = []
-        acknowledged = False
-        while True:
-            heard = self._answer(tag, command, self.within_s if within_s is None else within_s)
-            response = heard.response
-            if response is None or (response.sign != ACK and not acknowledged):
-                raise NoAnswerError(f"{command} was answered {heard.raw!r} before it was acknowledged with {ACK}")
-            if response.sign == ACK:
-                if acknowledged:
-                    raise NoAnswerError(f"{command} was acknowledged twice")
-                acknowledged = True
-            elif response.sign == DATA:
-                data.append(heard)
-            elif response.sign == ERROR:
-                faults.append(_fault(response))
-            else:
-                break
-        stopping = [fault for fault in faults if fault.stops]
-        if stopping:
-            raise FaultError(stopping[0])
-        return data
-
-    def listen(self) -> bool:
-        """Take what comes within a moment; whether anything is in :attr:`unasked`."""
-        self._read()
-        while self._came:
-            self.unasked.append(self._came.popleft())
-        return bool(self.unasked)
-
-    def _answer(self, tag: str, command: str, within_s: float) -> HeardLine:
-        until = self._clock.monotonic_ns() + round(within_s * SECOND)
-        while True:
-            while self._came:
-                heard = self._came.popleft()
-                if heard.response is not None and heard.response.tag == tag:
-                    return heard
-                self.unasked.append(heard)
-            if self._clock.monotonic_ns() >= until:
-                raise NoAnswerError(f"{command} was not answered within {within_s:g} s")
-            self._read()
-
-    def _read(self) -> None:
-        received = self._port.read()
-        utc, monotonic = self._clock.utc_ns(), self._clock.monotonic_ns()
-        for framed in self._framer.feed(received):
-            try:
-                response = response_of(framed.body) if framed.whole else None
-            except BadLineError:
-                response = None
-            self._came.append(HeardLine(framed.raw, response, utc, monotonic))
-
-    def _next_tag(self) -> str:
-        self._tag = self._tag % 99999 + 1
-        return f"{self._tag:05d}"
-
-    def _next_event(self) -> str:
-        self._event = self._event % 9999 + 1
-        return f"E{self._event:04d}"
-
-
-def _fault(response: ServerLine) -> Fault:
-    try:
-        return fault_of(response.rest)
-    except BadLineError as error:
-        raise NoAnswerError(f"an error that is none of the protocol: {error}") from None

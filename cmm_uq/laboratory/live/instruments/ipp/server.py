@@ -35,6 +35,8 @@ TEXTS = {
 }  # fmt: skip
 """Severity and text of errors by their numbers (section 8.2)."""
 
+_TICK_S = 0.02
+_IN_ERROR_TOO = ("ClearAllErrors", "GetErrStatusE", "GetXtdErrStatus", "AbortE", "EndSession", "StartSession")
 LIMIT_MM = 1000.0  # of each axis, both ways
 
 
@@ -53,22 +55,164 @@ class SimulatedState:
     daemons: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
+_SETTINGS = {
+    "clearallerrors": ("error", False), "aborte": ("error", True), "enableuser": ("user", True),
+    "disableuser": ("user", False),
+}  # fmt: skip
+"""Methods that only set something of the state."""
+
+_SAYINGS = {
+    "getmachineclass": ("GetMachineClass(CartCMM)",), "geterrstatuse": ("ErrStatus({0.error:d})",),
+    "getxtderrstatus": ("IsHomed({0.homed:d})", "IsUserEnabled({0.user:d})"), "ishomed": ("IsHomed({0.homed:d})",),
+    "isuserenabled": ("IsUserEnabled({0.user:d})",),
+}  # fmt: skip
+"""Methods that only say something of it."""
+
+
 class MethodError(Exception):
     """An error of a number, which the method answers with."""
 
 
-class Methods:
-    """A CMM: each method gives its data, if any, and is named ``_do_`` and its name in small letters."""
+@dataclass
+class IppMischief:
+    """What a server does wrong; all may be changed while it runs."""
+
+    hangs: bool = False
+    no_ack: bool = False
+    exchanged: bool = False  # sends ``%`` where ``&`` belongs and the reverse, as some published programs do
+    wrong_tag: bool = False
+    halves: bool = False  # cuts each line of data
+    noise: bytes = b""  # bytes before each line
+    delay_s: float = 0.0
+
+
+class SimulatedIppServer:
+    """A CMM behind a server, listening at a port (0: a free one) until it is closed.
+
+    Each method that does more than set or say something gives its data, and is named ``_do_`` and its name in small letters.
+    """
 
     tools = ("RefTool", "NoTool", "Probe1", "Probe2")
 
-    def __init__(self, *, part_c: float | None, version: str | None) -> None:
-        self.state, self.part_c, self.version = SimulatedState(), part_c, version
-        self.radial = 0.0
-        """How far the surface lies from where it is expected, along the normal, mm."""
+    def __init__(self, tcp_port: int = 0, *, part_c: float | None = 20.13, version: str | None = "1.4.3") -> None:
+        self.state, self.mischief, self.port = SimulatedState(), IppMischief(), tcp_port
+        self.part_c, self.version = part_c, version  # ``None``: it does not know the property, the question
+        self.radial = 0.0  # how far the surface lies from where it is expected, along the normal, mm
+        self.lines: list[str] = []  # all that was said, by both sides, with > and <
+        self._sending = threading.Lock()
+        self._connection: socket.socket | None = None
+        self.start()
 
-    def said(self, line: str) -> None:
-        """Say something beside the data of a method: a report of a daemon."""
+    def start(self) -> None:
+        self._listening = socket.create_server(("127.0.0.1", self.port))
+        self.port = self._listening.getsockname()[1]
+        self.url = f"tcp://127.0.0.1:{self.port}"  # as a job names it
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Cut the connection, and listen no more; :meth:`start` begins again."""
+        self._stop.set()
+        self._thread.join()
+        self._listening.close()
+
+    def pick(self, x: float, y: float, z: float) -> None:
+        """The user picks a point by hand (section 9.5.3)."""
+        self.state.position = [x, y, z]
+        self._send(f"E0000 # PtMeas({self.reported(self.state.report, (0, 0, 1))})")
+
+    def press(self, key: str) -> None:
+        """The user presses a key (section 9.5.1)."""
+        self._send(f'E0000 # KeyPress("{key}")')
+
+    def trip(self, number: int = 500) -> None:
+        """Something goes wrong by itself (section 6.2.4.1)."""
+        self.state.error = TEXTS[number][0] >= 2
+        self._send(f"E0000 ! {_error(number, 'HealthCheck')}")
+
+    # --- the connection -----------------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            if not select.select([self._listening], [], [], _TICK_S)[0]:
+                continue
+            self._connection, _ = self._listening.accept()
+            with self._connection, contextlib.suppress(OSError):
+                self._serve(self._connection)
+            self._connection = None
+            self.state.session = False
+            self.state.daemons.clear()
+
+    def _serve(self, connection: socket.socket) -> None:
+        framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
+        while not self._stop.is_set():
+            if not select.select([connection], [], [], _TICK_S)[0]:
+                continue
+            received = connection.recv(4096)
+            if not received:
+                return
+            for framed in framer.feed(received):
+                self._command(framed.body)
+
+    def _send(self, line: str) -> None:
+        self.lines.append(f"< {line}")
+        wrong = self.mischief
+        if wrong.exchanged and line[6:7] in ("&", "%"):
+            line = f"{line[:6]}{'%' if line[6] == '&' else '&'}"
+        if wrong.wrong_tag:
+            line = f"9{line[1:]}"
+        if wrong.halves and line[6:7] == "#":
+            line = line[: len(line) // 2]
+        if self._connection is not None:
+            with self._sending, contextlib.suppress(OSError):
+                self._connection.sendall(wrong.noise + line.encode("ascii") + b"\r\n")
+
+    def _command(self, body: bytes) -> None:
+        """A line of the client, answered in the order of the signs."""
+        line = body.decode("latin-1")
+        self.lines.append(f"> {line}")
+        if self.mischief.hangs:
+            return
+        time.sleep(self.mischief.delay_s)
+        tag, text = line[:5], line[6:]
+        if not (tag[:1].isdigit() or tag[:1] == "E") or not tag[1:].isdigit() or tag in ("00000", "E0000"):
+            self._send(f"E0000 ! {_error(1, 'Tag')}")
+            return
+        if not self.mischief.no_ack:
+            self._send(f"{tag} &")
+        try:
+            (method,) = arguments_of(text)
+            if line[5:6] != " " or not isinstance(method, Term):
+                raise BadLineError("no method")
+        except (BadLineError, ValueError):
+            self._send(f"{tag} ! {_error(8, 'Parser')}")
+            self.state.error = True
+        else:
+            self._answer(tag, method)
+        self._send(f"{tag} %")
+
+    def _answer(self, tag: str, method: Term) -> None:
+        state, name = self.state, method.name.lower()
+        try:
+            if not state.session and method.name not in ("StartSession", "EndSession"):
+                raise MethodError(8)
+            if state.error and method.name not in _IN_ERROR_TOO:
+                raise MethodError(514)
+            act: Callable[[str, Term], list[str] | None] | None = getattr(self, f"_do_{name}", None)
+            if name in _SETTINGS:
+                setattr(state, *_SETTINGS[name])
+            elif act is None and name not in _SAYINGS:
+                raise MethodError(501)
+            data = act(tag, method) if act else [saying.format(state) for saying in _SAYINGS.get(name, ())]
+            for line in data or ():
+                self._send(f"{tag} # {line}")
+        except MethodError as error:
+            number = int(error.args[0])
+            state.error = state.error or TEXTS[number][0] >= 2
+            self._send(f"{tag} ! {_error(number, method.name)}")
+
+    # --- the methods --------------------------------------------------------------------------------------------------------
 
     def _do_startsession(self, tag: str, method: Term) -> None:
         if self.state.session:
@@ -84,35 +228,8 @@ class Methods:
             raise MethodError(501)
         return [f'DMEVersion("{self.version}")']
 
-    def _do_getmachineclass(self, tag: str, method: Term) -> list[str]:
-        return ["GetMachineClass(CartCMM)"]
-
-    def _do_clearallerrors(self, tag: str, method: Term) -> None:
-        self.state.error = False
-
-    def _do_aborte(self, tag: str, method: Term) -> None:
-        self.state.error = True
-
-    def _do_geterrstatuse(self, tag: str, method: Term) -> list[str]:
-        return [f"ErrStatus({int(self.state.error)})"]
-
-    def _do_getxtderrstatus(self, tag: str, method: Term) -> list[str]:
-        return [f"IsHomed({int(self.state.homed)})", f"IsUserEnabled({int(self.state.user)})"]
-
     def _do_home(self, tag: str, method: Term) -> None:
         self.state.homed, self.state.position, self.state.user = True, [0.0, 0.0, 0.0], False
-
-    def _do_ishomed(self, tag: str, method: Term) -> list[str]:
-        return [f"IsHomed({int(self.state.homed)})"]
-
-    def _do_enableuser(self, tag: str, method: Term) -> None:
-        self.state.user = True
-
-    def _do_disableuser(self, tag: str, method: Term) -> None:
-        self.state.user = False
-
-    def _do_isuserenabled(self, tag: str, method: Term) -> list[str]:
-        return [f"IsUserEnabled({int(self.state.user)})"]
 
     def _do_get(self, tag: str, method: Term) -> list[str]:
         return [self.reported(_names(method.arguments, ("X", "Y", "Z", "Tool.A", "Tool.B", "Tool.C")))]
@@ -160,18 +277,13 @@ class Methods:
         self.state.tool = self._tool(method)
 
     def _do_getprop(self, tag: str, method: Term) -> list[str]:
-        told = []
-        for one in method.arguments:
-            name = one.name if isinstance(one, Term) else ""
-            if name == "Tool.Name":
-                told.append(f'Tool.Name("{self.state.tool}")')
-            elif name == "FoundTool.Name":
-                told.append(f'FoundTool.Name("{self.state.found}")')
-            elif name == "Part.Temperature" and self.part_c is not None:
-                told.append(f"Part.Temperature({number_text(self.part_c)})")
-            else:
-                raise MethodError(510)
-        return [", ".join(told)]
+        known = {"Tool.Name": f'"{self.state.tool}"', "FoundTool.Name": f'"{self.state.found}"'}
+        if self.part_c is not None:
+            known["Part.Temperature"] = number_text(self.part_c)
+        names = [one.name if isinstance(one, Term) else "" for one in method.arguments]
+        if not set(names) <= set(known):
+            raise MethodError(510)
+        return [", ".join(f"{name}({known[name]})" for name in names)]
 
     def _tool(self, method: Term) -> str:
         if len(method.arguments) != 1 or method.arguments[0] not in self.tools:
@@ -183,7 +295,7 @@ class Methods:
             raise MethodError(2500)
         self.state.position, self.state.user = place, False
         for tag, names in self.state.daemons.items():
-            self.said(f"{tag} # {self.reported(names)}")
+            self._send(f"{tag} # {self.reported(names)}")
 
     def reported(self, names: tuple[str, ...], normal: tuple[float, float, float] = (0, 0, 1)) -> str:
         """What a report says of the names, with the direction of a measured point."""
@@ -213,158 +325,6 @@ def _target(method: Term, position: list[float]) -> tuple[list[float], tuple[flo
         else:
             raise MethodError(509)
     return place, normal
-
-
-_TICK_S = 0.02
-
-
-@dataclass
-class IppMischief:
-    """What a server does wrong; all may be changed while it runs."""
-
-    hangs: bool = False
-    no_ack: bool = False
-    exchanged: bool = False  # sends ``%`` where ``&`` belongs and the reverse, as some published programs do
-    wrong_tag: bool = False
-    halves: bool = False  # cuts each line of data
-    noise: bytes = b""  # bytes before each line
-    delay_s: float = 0.0
-
-
-class SimulatedIppServer(Methods):
-    """A server, listening at a port (0: a free one) until it is closed."""
-
-    def __init__(self, tcp_port: int = 0, *, part_c: float | None = 20.13, version: str | None = "1.4.3") -> None:
-        super().__init__(part_c=part_c, version=version)
-        self.mischief = IppMischief()
-        self.lines: list[str] = []
-        """All that was said, by both sides, with > and <."""
-        self._sending = threading.Lock()
-        self._connection: socket.socket | None = None
-        self.port = tcp_port
-        self.start()
-
-    @property
-    def url(self) -> str:
-        """As a job names it."""
-        return f"tcp://127.0.0.1:{self.port}"
-
-    def start(self) -> None:
-        self._listening = socket.create_server(("127.0.0.1", self.port))
-        self.port = self._listening.getsockname()[1]
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Cut the connection, and listen no more; :meth:`start` begins again."""
-        self._stop.set()
-        self._thread.join()
-        self._listening.close()
-
-    def pick(self, x: float, y: float, z: float) -> None:
-        """The user picks a point by hand (section 9.5.3)."""
-        self.state.position = [x, y, z]
-        self._send(f"E0000 # PtMeas({self.reported(self.state.report, (0, 0, 1))})")
-
-    def press(self, key: str) -> None:
-        """The user presses a key (section 9.5.1)."""
-        self._send(f'E0000 # KeyPress("{key}")')
-
-    def trip(self, number: int = 500) -> None:
-        """Something goes wrong by itself (section 6.2.4.1)."""
-        severity, text = TEXTS[number]
-        self.state.error = severity >= 2
-        self._send(f'E0000 ! Error({severity}, {number:04d}, "HealthCheck", "{text}")')
-
-    # --- the connection -----------------------------------------------------------------------------------------------------
-
-    def _run(self) -> None:
-        while not self._stop.is_set():
-            if not select.select([self._listening], [], [], _TICK_S)[0]:
-                continue
-            self._connection, _ = self._listening.accept()
-            with self._connection, contextlib.suppress(OSError):
-                self._serve(self._connection)
-            self._connection = None
-            self.state.session = False
-            self.state.daemons.clear()
-
-    def _serve(self, connection: socket.socket) -> None:
-        framer = Framer(MessageFrame(terminator="<CR><LF>", longest=LONGEST))
-        while not self._stop.is_set():
-            if not select.select([connection], [], [], _TICK_S)[0]:
-                continue
-            received = connection.recv(4096)
-            if not received:
-                return
-            for framed in framer.feed(received):
-                self._command(framed.body)
-
-    def said(self, line: str) -> None:
-        self._send(line)
-
-    def _send(self, line: str) -> None:
-        self.lines.append(f"< {line}")
-        wrong = self.mischief
-        if wrong.exchanged and line[6:7] in ("&", "%"):
-            line = f"{line[:6]}{'%' if line[6] == '&' else '&'}"
-        if wrong.wrong_tag:
-            line = f"9{line[1:]}"
-        if wrong.halves and line[6:7] == "#":
-            line = line[: len(line) // 2]
-        if self._connection is not None:
-            with self._sending, contextlib.suppress(OSError):
-                self._connection.sendall(wrong.noise + line.encode("ascii") + b"\r\n")
-
-    def _command(self, body: bytes) -> None:
-        """A line of the client, answered in the order of the signs."""
-        line = body.decode("latin-1")
-        self.lines.append(f"> {line}")
-        if self.mischief.hangs:
-            return
-        time.sleep(self.mischief.delay_s)
-        tag, text = line[:5], line[6:]
-        if not (tag[:1].isdigit() or tag[:1] == "E") or not tag[1:].isdigit() or tag in ("00000", "E0000"):
-            self._send(f"E0000 ! {_error(1, 'Tag')}")
-            return
-        if not self.mischief.no_ack:
-            self._send(f"{tag} &")
-        try:
-            (method,) = arguments_of(text)
-            if line[5:6] != " " or not isinstance(method, Term):
-                raise BadLineError("no method")
-        except (BadLineError, ValueError):
-            self._send(f"{tag} ! {_error(8, 'Parser')}")
-            self.state.error = True
-        else:
-            self._answer(tag, method)
-        self._send(f"{tag} %")
-
-    def _answer(self, tag: str, method: Term) -> None:
-        state = self.state
-        asks = method.name in (
-            "ClearAllErrors",
-            "GetErrStatusE",
-            "GetXtdErrStatus",
-            "AbortE",
-            "EndSession",
-            "StartSession",
-        )
-        try:
-            if not state.session and method.name not in ("StartSession", "EndSession"):
-                raise MethodError(8)
-            if state.error and not asks:
-                raise MethodError(514)
-            act: Callable[[str, Term], list[str] | None] | None = getattr(self, f"_do_{method.name.lower()}", None)
-            if act is None:
-                raise MethodError(501)
-            for data in act(tag, method) or ():
-                self._send(f"{tag} # {data}")
-        except MethodError as error:
-            number = int(error.args[0])
-            state.error = state.error or TEXTS[number][0] >= 2
-            self._send(f"{tag} ! {_error(number, method.name)}")
 
 
 def _error(number: int, cause: str) -> str:
