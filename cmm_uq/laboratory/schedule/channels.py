@@ -13,8 +13,6 @@ import stat
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
-from dataclasses import dataclass
 from email.message import EmailMessage
 from email.utils import formatdate
 from pathlib import Path
@@ -52,42 +50,46 @@ def of_file(path: Path, key: str) -> str:
 LONGEST_SUBJECT = 150
 
 
-@dataclass(frozen=True)
 class Mail:
     """An SMTP server and whom it is to reach; a login is asked for when it is needed."""
 
-    to: tuple[str, ...]
-    sender: str
-    server: str  # and port: where it listens
-    port: int
-    security: str
-    login: Callable[[], tuple[str, str]] | None
-    ca_file: Path | None  # certificates to trust beside none other; those of the system where it is ``None``
-    timeout_s: float
-    events: frozenset[str]
-
-    @property
-    def name(self) -> str:
-        return f"email to {', '.join(self.to)}"
+    def __init__(self, table: EmailTable, folder: Path) -> None:
+        self._table, self._folder = table, folder
+        self.events: frozenset[str] = frozenset(table.on)
+        self.name = f"email to {', '.join(table.to)}"
+        self.port = PORTS[table.security] if table.port is None else table.port
 
     def send(self, message: OutgoingMessage) -> str:
-        letter, login = self.letter(message), self.login() if self.login else None
-        who = f"mail server {self.server}:{self.port}"
+        letter, login = self._letter(message), self._login()
+        who = f"mail server {self._table.server}:{self.port}"
         try:
-            return within(self.timeout_s, lambda: self._deliver(letter, login), who)
+            return within(self._table.timeout_s, lambda: self._deliver(letter, login), who)
         except smtplib.SMTPAuthenticationError as error:
             raise UndeliveredError(f"{who} refused the login: {error.smtp_code}") from None
         except smtplib.SMTPResponseException as error:
-            raise UndeliveredError(f"{who} answered {error.smtp_code} {_text(error.smtp_error)}") from None
+            said = error.smtp_error
+            text = printable(said.decode("utf-8", "replace") if isinstance(said, bytes) else said)[:200]
+            raise UndeliveredError(f"{who} answered {error.smtp_code} {text}") from None
         except smtplib.SMTPRecipientsRefused as error:
             raise UndeliveredError(f"{who} refused {', '.join(error.recipients)}") from None
         except (smtplib.SMTPException, OSError) as error:
             raise UndeliveredError(f"{who}: {printable(str(error)) or type(error).__name__}") from None
 
-    def letter(self, message: OutgoingMessage) -> EmailMessage:
+    def _login(self) -> tuple[str, str] | None:
+        """User and password; ``None`` where the server wants none."""
+        table = self._table
+        if table.user_variable is None:
+            return None
+        if table.password_file is not None:
+            password = of_file(self._folder / table.password_file, "[[email]] password_file")
+        else:
+            password = of_variable(str(table.password_variable), "[[email]] password_variable")
+        return of_variable(table.user_variable, "[[email]] user_variable"), password
+
+    def _letter(self, message: OutgoingMessage) -> EmailMessage:
         """As it is sent; its Message-ID is the message's key, so that a repetition is known for one."""
         letter = EmailMessage()
-        letter["From"], letter["To"] = self.sender, ", ".join(self.to)
+        letter["From"], letter["To"] = self._table.sender, ", ".join(self._table.to)
         letter["Subject"] = printable(f"[cmm-uq] {message.title}")[:LONGEST_SUBJECT]
         letter["Date"] = formatdate()
         letter["Message-ID"] = f"<{message.key}@cmm-uq.invalid>"
@@ -98,71 +100,65 @@ class Mail:
         return letter
 
     def _deliver(self, letter: EmailMessage, login: tuple[str, str] | None) -> str:
-        with self._connected() as smtp:
-            if login is not None:
-                smtp.login(*login)
-            refused = smtp.send_message(letter)
-        return f"the mail server refused {', '.join(refused)}" if refused else ""
-
-    def _connected(self) -> smtplib.SMTP:
-        context = None if self.security == "none" else self._trusted()
-        if self.security == "tls":
-            return smtplib.SMTP_SSL(self.server, self.port, timeout=self.timeout_s, context=context)
-        smtp = smtplib.SMTP(self.server, self.port, timeout=self.timeout_s)
-        if self.security == "starttls":
+        server, port, timeout_s, security = self._table.server, self.port, self._table.timeout_s, self._table.security
+        context = None if security == "none" else trusted(self._table.ca_file, self._folder)
+        smtp = (
+            smtplib.SMTP_SSL(server, port, timeout=timeout_s, context=context)
+            if security == "tls"
+            else smtplib.SMTP(server, port, timeout=timeout_s)
+        )
+        if security == "starttls":
             try:
                 smtp.starttls(context=context)
             except BaseException:
                 smtp.close()
                 raise
-        return smtp
+        with smtp:
+            if login is not None:
+                smtp.login(*login)
+            refused = smtp.send_message(letter)
+        return f"the mail server refused {', '.join(refused)}" if refused else ""
 
-    def _trusted(self) -> ssl.SSLContext:
-        return trusted(self.ca_file)
 
-
-def trusted(ca_file: Path | None) -> ssl.SSLContext:
+def trusted(ca_file: str | None, folder: Path) -> ssl.SSLContext:
     """Certificates that a server is checked against: the system's, or those of one file."""
+    path = None if ca_file is None else str(folder / ca_file)
     try:
-        return ssl.create_default_context(cafile=None if ca_file is None else str(ca_file))
+        return ssl.create_default_context(cafile=path)
     except (OSError, ssl.SSLError) as error:
-        fix = "Give a file in PEM"
-        raise CmmUqError(f"holds no certificates to trust: {error}", where=str(ca_file), fix=fix) from None
-
-
-def _text(answer: bytes | str) -> str:
-    return printable(answer.decode("utf-8", "replace") if isinstance(answer, bytes) else answer)[:200]
+        raise CmmUqError(f"holds no certificates to trust: {error}", where=path, fix="Give a file in PEM") from None
 
 
 SCHEMA = "cmm-uq/message/1"
 SIGNATURE, TIMESTAMP, REPETITION = "X-CMM-UQ-Signature", "X-CMM-UQ-Timestamp", "Idempotency-Key"
 
 
-@dataclass(frozen=True)
 class Webhook:
-    """An address that takes messages."""
+    """An address that takes messages; it may be a secret itself, and a signature's key is one."""
 
-    address: Callable[[], str]  # gives the URL, which may be a secret itself
-    secret: Callable[[], str] | None  # gives the key of the signature; ``None`` where there is none
-    ca_file: Path | None  # certificates to trust; those of the system where it is ``None``
-    timeout_s: float
-    events: frozenset[str]
-    name: str  # what tells it from others
-    clock: Callable[[], float] = time.time  # seconds since 1970
+    def __init__(self, table: WebhookTable, folder: Path) -> None:
+        self._table, self._folder = table, folder
+        self.events: frozenset[str] = frozenset(table.on)
+        self.name = f"webhook of {table.url_variable}"
+        if table.url is not None:
+            digest = hashlib.sha256(table.url.encode()).hexdigest()[:8]  # the path of an address may be a secret
+            self.name = f"webhook at {urlsplit(table.url).hostname} ({digest})"
 
     def send(self, message: OutgoingMessage) -> str:
+        table, stamp = self._table, str(int(time.time()))
         body = json.dumps({"schema": SCHEMA, **message.as_data()}, ensure_ascii=False).encode()
-        address, stamp = self.address(), str(int(self.clock()))
+        address = table.url or self._secret_address()
         headers = {
             "Content-Type": "application/json", "User-Agent": f"cmm-uq/{__version__}", REPETITION: message.key,
             TIMESTAMP: stamp,
         }  # fmt: skip
-        if self.secret is not None:
-            headers[SIGNATURE] = signature(self.secret(), stamp, body)
+        if table.secret_variable is not None:
+            secret = of_variable(table.secret_variable, "[[webhook]] secret_variable")
+            headers[SIGNATURE] = signature(secret, stamp, body)
         who = f"web address at {urlsplit(address).hostname}"
         request = urllib.request.Request(address, body, headers, method="POST")  # noqa: S310 - checked to be http(s)
         try:
-            return within(self.timeout_s, lambda: self._post(request), who)
+            return within(table.timeout_s, lambda: self._post(request), who)
         except urllib.error.HTTPError as error:
             with error:
                 raise UndeliveredError(f"{who} answered {error.code} {printable(str(error.reason))[:200]}") from None
@@ -170,18 +166,25 @@ class Webhook:
             why = getattr(error, "reason", error)
             raise UndeliveredError(f"{who}: {printable(str(why))[:200] or type(error).__name__}") from None
 
+    def _secret_address(self) -> str:
+        key = "[[webhook]] url_variable"
+        url = of_variable(str(self._table.url_variable), key)
+        try:
+            return web_address(url)
+        except ValueError:
+            problem = f"the variable {self._table.url_variable} holds no web address"
+            raise CmmUqError(problem, where=key, fix="Put one into it, as https://example.org/cmm") from None
+
     def _post(self, request: urllib.request.Request) -> str:
-        opener = urllib.request.build_opener(urllib.request.HTTPSHandler(context=trusted(self.ca_file)), _StayHere())
-        with opener.open(request, timeout=self.timeout_s):
+        https = urllib.request.HTTPSHandler(context=trusted(self._table.ca_file, self._folder))
+        with urllib.request.build_opener(https, _StayHere()).open(request, timeout=self._table.timeout_s):
             return ""
 
 
 class _StayHere(urllib.request.HTTPRedirectHandler):
     """A redirection is an answer, not a place to send to."""
 
-    def redirect_request(self, *_: Any) -> None:
-        """None is followed."""
-        return
+    def redirect_request(self, *_: Any) -> None: ...
 
 
 def signature(secret: str, stamp: str, body: bytes) -> str:
@@ -191,53 +194,5 @@ def signature(secret: str, stamp: str, body: bytes) -> str:
 
 def channels(schedule: ScheduleFile, folder: Path) -> list[Channel]:
     """Every way of sending that is named; secrets are asked for when a message is sent."""
-    by_mail = [_mail(table, folder) for table in schedule.email]
-    return [*by_mail, *(_webhook(table, folder) for table in schedule.webhook)]
-
-
-def _mail(table: EmailTable, folder: Path) -> Mail:
-    port = PORTS[table.security] if table.port is None else table.port
-    return Mail(
-        tuple(table.to), table.sender, table.server, port, table.security, _login(table, folder),
-        None if table.ca_file is None else folder / table.ca_file, table.timeout_s, frozenset(table.on),
-    )  # fmt: skip
-
-
-def _login(table: EmailTable, folder: Path) -> Callable[[], tuple[str, str]] | None:
-    user = table.user_variable
-    if user is None:
-        return None
-
-    def login() -> tuple[str, str]:
-        if table.password_file is not None:
-            password = of_file(folder / table.password_file, "[[email]] password_file")
-        else:
-            password = of_variable(str(table.password_variable), "[[email]] password_variable")
-        return of_variable(user, "[[email]] user_variable"), password
-
-    return login
-
-
-def _webhook(table: WebhookTable, folder: Path) -> Webhook:
-    secret = table.secret_variable
-    if table.url is not None:
-        digest = hashlib.sha256(table.url.encode()).hexdigest()[:8]  # the path of an address may be a secret
-        name = f"webhook at {urlsplit(table.url).hostname} ({digest})"
-    else:
-        name = f"webhook of {table.url_variable}"
-
-    def address() -> str:
-        if table.url is not None:
-            return table.url
-        key = "[[webhook]] url_variable"
-        url = of_variable(str(table.url_variable), key)
-        try:
-            return web_address(url)
-        except ValueError:
-            fix = "Put one into it, as https://example.org/cmm"
-            raise CmmUqError(f"the variable {table.url_variable} holds no web address", where=key, fix=fix) from None
-
-    return Webhook(
-        address, None if secret is None else lambda: of_variable(secret, "[[webhook]] secret_variable"),
-        None if table.ca_file is None else folder / table.ca_file, table.timeout_s, frozenset(table.on), name,
-    )  # fmt: skip
+    by_mail = [Mail(table, folder) for table in schedule.email]
+    return [*by_mail, *(Webhook(table, folder) for table in schedule.webhook)]

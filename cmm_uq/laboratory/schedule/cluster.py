@@ -14,6 +14,7 @@ from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import replace
 from importlib import import_module
+from itertools import islice
 from typing import Any
 
 from cmm_uq import __version__
@@ -38,9 +39,8 @@ def cluster_answers(
     client = _client(address)
     try:
         threads = _threads(client, address)
-        chunks = _Chunks(tasks, count, threads)
         packed = replace(work, setting=Packed.of(work.setting))
-        yield from _Run(client, address, packed).through(chunks, _AHEAD * threads)
+        yield from _Run(client, address, packed).through(_chunks(tasks, count, threads), _AHEAD * threads)
     finally:
         with contextlib.suppress(Exception):  # it may be gone
             client.run(end_idle)
@@ -48,22 +48,18 @@ def cluster_answers(
             client.close(timeout=LOOK_S)
 
 
-class _Chunks:
+def _chunks(tasks: Iterable[tuple[int, Any]], count: int, threads: int) -> Iterator[Chunk]:
     """Tasks in portions: large ones at first, smaller ones towards the end (Polychronopoulos and Kuck 1987, guided)."""
-
-    def __init__(self, tasks: Iterable[tuple[int, Any]], count: int, threads: int) -> None:
-        self._tasks, self._left, self._threads = iter(tasks), count, threads
-
-    def next(self) -> Chunk:
-        """The next portion; empty where nothing is left."""
-        most, found, size = min(MOST_TASKS, max(1, self._left // (_AHEAD * self._threads))), [], 0
-        for number, task in self._tasks:
-            found.append((number, packed := Packed.of(task)))
-            size += len(packed.content)
-            if len(found) >= most or size >= MOST_BYTES:
-                break
-        self._left -= len(found)
-        return tuple(found)
+    chunk, size = list[tuple[int, Packed]](), 0
+    for number, task in tasks:
+        chunk.append((number, packed := Packed.of(task)))
+        size += len(packed.content)
+        if len(chunk) >= min(MOST_TASKS, max(1, count // (_AHEAD * threads))) or size >= MOST_BYTES:
+            yield tuple(chunk)
+            count -= len(chunk)
+            chunk, size = [], 0
+    if chunk:
+        yield tuple(chunk)
 
 
 class _Run:
@@ -75,15 +71,13 @@ class _Run:
         self._asked: dict[Any, Chunk] = {}
         self._alone = time.monotonic()
 
-    def through(self, chunks: _Chunks, most: int) -> Iterator[TaskAnswer]:
+    def through(self, chunks: Iterator[Chunk], most: int) -> Iterator[TaskAnswer]:
         """Have all of them answered, ``most`` under way at a time."""
-        more = True
-        while more or self._asked:
-            while more and len(self._asked) < most:
-                chunk = chunks.next()
-                more = bool(chunk)
-                if chunk:
-                    self._ask(chunk)
+        while True:
+            for chunk in islice(chunks, max(0, most - len(self._asked))):
+                self._ask(chunk)
+            if not self._asked:
+                return
             for future in self._done():
                 yield from self._answered(future, self._asked.pop(future))
 
@@ -101,19 +95,12 @@ class _Run:
             if done:
                 self._alone = time.monotonic()
                 return done
-            self._look()
+            with contextlib.suppress(Exception):
+                if self._client.status == "running" and self._client.nthreads():  # somebody is there to answer
+                    self._alone = time.monotonic()
+            if time.monotonic() - self._alone > PATIENCE_S:
+                raise CmmUqError("has no workers any more", where=self._address, fix=_GO_ON)
         return []
-
-    def _look(self) -> None:
-        """Whether anybody is still there to answer."""
-        try:
-            there = self._client.status == "running" and bool(self._client.nthreads())
-        except Exception:
-            there = False
-        if there:
-            self._alone = time.monotonic()
-        elif time.monotonic() - self._alone > PATIENCE_S:
-            raise CmmUqError("has no workers any more", where=self._address, fix=_GO_ON)
 
     def _answered(self, future: Any, chunk: Chunk) -> Iterator[TaskAnswer]:
         try:

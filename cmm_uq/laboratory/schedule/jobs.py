@@ -6,6 +6,7 @@ somebody is at them: they may lie, and where they cannot be right two looks at t
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import os
@@ -103,29 +104,22 @@ def _read(folder: Path, root: Path) -> JobFolder:
     path = folder / JOB_FILE
     try:
         data = toml_of(text_of(content_of(path, JOB_BYTES, ""), str(path)), str(path))
-        identity, recording = data["job"]["id"], data.get("recording", {}).get("file", "")
+        identity, name = data["job"]["id"], data.get("recording", {}).get("file", "")
     except (CmmUqError, tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError):
         return JobFolder(folder, root)
-    if not (isinstance(identity, str) and isinstance(recording, str) and _names_a_folder(identity)):
+    # what is wrong with an id that a job may not have, reading the job says
+    if not (isinstance(identity, str) and isinstance(name, str) and _ID.fullmatch(identity)) or (
+        set(identity) == {"."} or device_name(identity)
+    ):
         return JobFolder(folder, root)
-    return JobFolder(
-        folder, root, identity, recording, _is_to_be_measured(folder / recording, with_plan="plan" in data)
-    )
-
-
-def _names_a_folder(identity: str) -> bool:
-    """Whether an id is one that a job may have; what is wrong with another, reading the job says."""
-    return bool(_ID.fullmatch(identity)) and set(identity) != {"."} and not device_name(identity)
-
-
-def _is_to_be_measured(recording: Path, *, with_plan: bool) -> bool:
     try:
-        with recording.open("rb") as file:
-            return is_planned(file.read(_HEAD))
+        with (folder / name).open("rb") as file:
+            planned = is_planned(file.read(_HEAD))
     except FileNotFoundError:
-        return with_plan
+        planned = "plan" in data
     except (OSError, ValueError):
-        return False
+        planned = False
+    return JobFolder(folder, root, identity, name, planned)
 
 
 Report = Callable[[JobFolder], bytes]
@@ -205,7 +199,7 @@ class JobReporting:
         known = self.state.reported(job.id) if job.id else None
         if known is None:
             return "new"  # one without an id is refused when it is read
-        changed = differing(job, known.inputs)
+        changed = differing(job, known)
         if changed and self.state.released(job.id):
             raise CmmUqError(f"{', '.join(changed)} changed after the certificate was released", where=str(job.folder),
                              fix="Give the new recording a job id of its own, or withdraw the certificate")  # fmt: skip
@@ -213,60 +207,44 @@ class JobReporting:
 
     def take(self, job: JobFolder) -> JobOutcome:
         """Report a job unless it has its certificate, or another run is at it."""
-        begun = time.monotonic()
+        begun, where = time.monotonic(), str(job.folder)
         try:
             ended = self._alone(job)
-        except CmmUqError as error:
-            ended = _stopped(job, error)
-        except MemoryError:
-            ended = _stopped(job, CmmUqError("the memory does not suffice for this input", where=str(job.folder)))
         except Exception as error:  # whatever a job makes break, the next one is to be reported
-            ended = _stopped(job, _fault(error, job))
+            refusal = error if isinstance(error, CmmUqError) else told_with_package(error)
+            if isinstance(error, MemoryError):
+                refusal = CmmUqError("the memory does not suffice for this input", where=where)
+            elif refusal is None:
+                problem = f"a fault of the program: {type(error).__name__}: {error}"
+                refusal = CmmUqError(problem, where=where, fix="Please report it with the input")
+            ended = JobOutcome.refused(job, refusal)
+            if not (job.folder / JOB_FILE).exists() and job.root.is_dir():
+                ended = JobOutcome(job, GONE, "the folder went away meanwhile")
         return replace(ended, seconds=time.monotonic() - begun)
 
     def _alone(self, job: JobFolder) -> JobOutcome:
         if not job.id:
             self.report(job)
             return JobOutcome(job, WAITING, "was changed while it was read: left for the next run")
+        folder = self.out / job.id
         with locks.turn(self.lock_of(job)) as turn:
             if turn is None:
                 return JobOutcome(job, BUSY, "another run is at it")
-            finish_interrupted(self.out / job.id)
+            finish_interrupted(folder)
             why = self.reason(job)  # asked again: another run may have been through with it
             if not why and not turn.resumed:
                 return JobOutcome(job, UNCHANGED)
-            results = json.loads(self.report(job) if why else self._written(job))
+            content = self.report(job) if why else b"{}"
+            if not why:  # of a job whose run ended between its certificate and its messages
+                with contextlib.suppress(OSError):
+                    content = (folder / RESULTS).read_bytes()
+            results = json.loads(content)
             turn.through = False  # until its messages wait to be sent, the next run has to look at it again
-            notices = [*of_results(results, _digest(results), str(self.out / job.id)), *self.further(job)]
+            inputs = results.get("job", {}).get("inputs_sha256", {})
+            digest = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+            notices = [*of_results(results, digest, str(folder)), *self.further(job)]
             self.queue(notices)
             turn.through = True
-            return (
-                JobOutcome(job, REPORTED, why, results=results, notices=notices) if why else JobOutcome(job, UNCHANGED)
-            )
-
-    def _written(self, job: JobFolder) -> bytes:
-        """Of a job whose run ended between its certificate and its messages."""
-        try:
-            return (self.out / job.id / RESULTS).read_bytes()
-        except OSError:
-            return b"{}"
-
-
-def _stopped(job: JobFolder, error: CmmUqError) -> JobOutcome:
-    if not (job.folder / JOB_FILE).exists() and job.root.is_dir():
-        return JobOutcome(job, GONE, "the folder went away meanwhile")
-    return JobOutcome.refused(job, error)
-
-
-def _digest(results: Mapping[str, Any]) -> str:
-    """One hash over those of all inputs."""
-    inputs = results.get("job", {}).get("inputs_sha256", {})
-    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
-
-
-def _fault(error: Exception, job: JobFolder) -> CmmUqError:
-    told = told_with_package(error)
-    if told is not None:
-        return told
-    fix = "Please report it with the input"
-    return CmmUqError(f"a fault of the program: {type(error).__name__}: {error}", where=str(job.folder), fix=fix)
+            if not why:
+                return JobOutcome(job, UNCHANGED)
+            return JobOutcome(job, REPORTED, why, results=results, notices=notices)

@@ -44,7 +44,10 @@ def turn_at(path: Path) -> Turn | None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for _ in range(_ATTEMPTS):
-            descriptor = _opened(path)
+            try:
+                descriptor = locked(path, create=True)
+            except FileExistsError:
+                descriptor = locked(path, create=False)
             if descriptor is not None:
                 break
             if path.exists():
@@ -81,10 +84,3 @@ def was_left(path: Path) -> bool:
         return path.stat().st_size > 0
     except OSError:
         return False
-
-
-def _opened(path: Path) -> int | None:
-    try:
-        return locked(path, create=True)
-    except FileExistsError:
-        return locked(path, create=False)

@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, get_args
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.messages import Text, Verbatim, commas, day, say
-from cmm_uq.jobs.verdicts import Verdict, Verdicts
+from cmm_uq.jobs.verdicts import Verdicts
 
 Event = Literal["fail", "incomplete", "undecided", "mismatch", "drift", "due", "error"]  # what a message may be about
 EVENTS: tuple[Event, ...] = get_args(Event)
@@ -53,7 +53,16 @@ def of_results(results: Mapping[str, Any], inputs: str, where: str) -> list[Noti
     told: dict[Event, list[Text]] = {}
     for one in Verdicts.of_results(results):
         if one.standing != "good":
-            told.setdefault(_OF_OUTCOME.get(one.outcome, "undecided"), []).append(_statement(one))
+            standard, called, said = Verbatim(one.by), Verbatim(one.name), Verbatim(one.outcome)
+            if not one.by:
+                text = say("{name}, tolerance: {decision}", name=Verbatim(one.title or one.name), decision=said)
+            elif not one.name:
+                text = say("{standard}: {decision}", standard=standard, decision=said)
+            else:
+                text = say(
+                    "{standard} {characteristic}: {decision}", standard=standard, characteristic=called, decision=said
+                )
+            told.setdefault(_OF_OUTCOME.get(one.outcome, "undecided"), []).append(text)
     verdict = str((results.get("diagnosis") or {}).get("verdict") or "consistent")
     if verdict != "consistent":
         told.setdefault("mismatch", []).append(_OF_VERDICT.get(verdict, _CONTRADICTS))
@@ -96,15 +105,6 @@ def decisions(results: Mapping[str, Any]) -> list[str]:
     return [one.outcome for one in Verdicts.of_results(results)]
 
 
-def _statement(one: Verdict) -> Text:
-    standard, name, said = Verbatim(one.by), Verbatim(one.name), Verbatim(one.outcome)
-    if not one.by:
-        return say("{name}, tolerance: {decision}", name=Verbatim(one.title or one.name), decision=said)
-    if not one.name:
-        return say("{standard}: {decision}", standard=standard, decision=said)
-    return say("{standard} {characteristic}: {decision}", standard=standard, characteristic=name, decision=said)
-
-
 class UndeliveredError(Exception):
     """A message did not go out; a later attempt may succeed. Its text holds no secret."""
 
@@ -135,15 +135,8 @@ class OutgoingMessage:
 class Channel(Protocol):
     """A way of sending messages."""
 
-    @property
-    def name(self) -> str:
-        """What tells it from others, without a secret."""
-        ...
-
-    @property
-    def events(self) -> frozenset[str]:
-        """That it is told of."""
-        ...
+    name: str  # what tells it from others, without a secret
+    events: frozenset[str]  # that it is told of
 
     def send(self, message: OutgoingMessage) -> str:
         """Send a message; what is to be remarked of it, as a rule nothing."""

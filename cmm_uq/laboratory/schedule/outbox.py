@@ -55,28 +55,25 @@ class Outbox:
     def folder(self) -> Path:
         return self.out / PRIVATE / "outbox"
 
+    def _messages(self, notice: Notice) -> list[tuple[Channel, OutgoingMessage]]:
+        return [(channel, OutgoingMessage.of(notice, channel.name, self.now()))
+                for channel in self.channels if notice.event in channel.events]  # fmt: skip
+
     def add(self, notices: Iterable[Notice]) -> list[Notice]:
         """Let notices go out that have not yet; those of them that were new to any channel."""
         added = []
         for notice in notices:
-            new = False
-            for channel in self.channels:
-                if notice.event in channel.events:
-                    new |= self._wait(OutgoingMessage.of(notice, channel.name, self.now()), channel.name)
-            if new:
-                added.append(notice)
+            new = [self._wait(message, channel.name) for channel, message in self._messages(notice)]
+            added += [notice] if any(new) else []
         return added
 
     def sent_at_once(self, notices: Iterable[Notice]) -> list[Delivery]:
         """Send notices that cannot wait in a file; nothing of it is remembered."""
-        done = []
-        for notice in notices:
-            for channel in self.channels:
-                if notice.event in channel.events:
-                    message = OutgoingMessage.of(notice, channel.name, self.now())
-                    problem, remark = _attempt(channel, message)
-                    done.append(Delivery(message, channel.name, problem, remark))
-        return done
+        return [
+            Delivery(message, channel.name, *_attempt(channel, message))
+            for notice in notices
+            for channel, message in self._messages(notice)
+        ]
 
     def waiting(self) -> int:
         """How many messages have not gone out."""
@@ -89,7 +86,10 @@ class Outbox:
         with turn(self.out / PRIVATE / "messages.lock", patience_s=patience_s) as mine:
             if mine is None:
                 return []
-            self._clear()
+            for path in self.folder.glob(f"{_UNFINISHED}*"):  # of a run that was killed while it wrote a message
+                with contextlib.suppress(OSError):
+                    if time.time() - path.stat().st_mtime > _ABANDONED_S:
+                        path.unlink()
             self._remember()
             done = self._send_all()
             self._remember()
@@ -97,11 +97,15 @@ class Outbox:
 
     def _send_all(self) -> list[Delivery]:
         known, done = {channel.name: channel for channel in self.channels}, list[Delivery]()
-        for name, waiting in self._by_channel().items():
+        by_channel: dict[str, list[tuple[OutgoingMessage, Path]]] = {}
+        for path in self.folder.glob(f"*{_WAITING}"):
+            if (read := _read(path)) is not None:
+                by_channel.setdefault(read[1], []).append((read[0], path))
+        for name, waiting in by_channel.items():
+            waiting.sort(key=lambda one: (one[0].at, one[0].key))
             if name not in known:
-                done += [
-                    Delivery(message, name, "schedule.toml names it no longer: not sent") for message, _ in waiting
-                ]
+                why = "schedule.toml names it no longer: not sent"
+                done += [Delivery(message, name, why) for message, _ in waiting]
                 for _, path in waiting:
                     _drop(path)
                 continue
@@ -114,15 +118,6 @@ class Outbox:
                     with writing_to(path, _MENDED):
                         path.rename(path.with_suffix(_SENT))
         return done
-
-    def _by_channel(self) -> dict[str, list[tuple[OutgoingMessage, Path]]]:
-        """What waits for each channel, oldest first."""
-        found: dict[str, list[tuple[OutgoingMessage, Path]]] = {}
-        for path in self.folder.glob(f"*{_WAITING}"):
-            read = _read(path)
-            if read is not None:
-                found.setdefault(read[1], []).append((read[0], path))
-        return {name: sorted(waiting, key=lambda one: (one[0].at, one[0].key)) for name, waiting in found.items()}
 
     def _remember(self) -> None:
         """Have it in the state which messages went out; what cannot be remembered now stays for the next run."""
@@ -137,13 +132,6 @@ class Outbox:
             except CmmUqError:
                 return
             _drop(path)
-
-    def _clear(self) -> None:
-        """Remove what a run that was killed left while it wrote a message."""
-        for path in self.folder.glob(f"{_UNFINISHED}*"):
-            with contextlib.suppress(OSError):
-                if time.time() - path.stat().st_mtime > _ABANDONED_S:
-                    path.unlink()
 
     def _wait(self, message: OutgoingMessage, channel: str) -> bool:
         place = self.folder / f"{message.key}{_WAITING}"
@@ -182,10 +170,8 @@ def _collected(waiting: Sequence[tuple[OutgoingMessage, Path]]) -> list[tuple[Ou
     key = hashlib.sha256("".join(message.key for message, _ in rest).encode()).hexdigest()[:32]
     titles = [message.title for message, _ in rest]
     listed = "\n".join([*titles[:LISTED], *([f"and {len(titles) - LISTED} more"] if len(titles) > LISTED else [])])
-    (first, _), *_ = rest
-    together = OutgoingMessage(
-        key, first.event, "", str(say("{count} more messages", count=len(rest))), listed, "", first.at
-    )
+    first, title = rest[0][0], str(say("{count} more messages", count=len(rest)))
+    together = OutgoingMessage(key, first.event, "", title, listed, "", first.at)
     return [*((message, [path]) for message, path in alone), (together, [path for _, path in rest])]
 
 

@@ -87,21 +87,21 @@ class WorkerProcess:
             process = self._begun()
             try:
                 value = self._said(process, (number, task), self.work.seconds)
+                break
             except TimeoutError:
                 self._dismiss()
-                failure = CmmUqError(f"took longer than {self.work.seconds:g} s and was stopped",
-                                     fix="Give a longer --time-limit where that is no wonder")  # fmt: skip
-                return TaskAnswer(number, failure=failure, ended=tuple(ended))
+                fix = "Give a longer --time-limit where that is no wonder"
+                value = CmmUqError(f"took longer than {self.work.seconds:g} s and was stopped", fix=fix)
+                break
             except _EndedError:
                 ended.append(self._dismiss())
-                continue
-            if isinstance(value, CmmUqError):
-                return TaskAnswer(number, failure=value, ended=tuple(ended))
-            return TaskAnswer(number, value, ended=tuple(ended))
-        how = ", ".join(dict.fromkeys(ended))
-        failure = CmmUqError(f"{len(ended)} processes ended before its work was done ({how})",
-                             fix="Give fewer --workers where memory is short")  # fmt: skip
-        return TaskAnswer(number, failure=failure, ended=tuple(ended))
+        else:
+            how = ", ".join(dict.fromkeys(ended))
+            problem = f"{len(ended)} processes ended before its work was done ({how})"
+            value = CmmUqError(problem, fix="Give fewer --workers where memory is short")
+        if isinstance(value, CmmUqError):
+            return TaskAnswer(number, failure=value, ended=tuple(ended))
+        return TaskAnswer(number, value, ended=tuple(ended))
 
     def end(self) -> None:
         """Stop the process, whatever it does; nothing is asked any more."""
@@ -118,9 +118,9 @@ class WorkerProcess:
         try:
             refused = self._said(process, self.work.setting, BEGINNING_S)
         except (TimeoutError, _EndedError):
-            how = self._dismiss()
-            raise CmmUqError(f"a process that works could not begin ({how})", where=self.work.program,
-                             fix="Give fewer --workers where memory is short") from None  # fmt: skip
+            problem = f"a process that works could not begin ({self._dismiss()})"
+            fix = "Give fewer --workers where memory is short"
+            raise CmmUqError(problem, where=self.work.program, fix=fix) from None
         if isinstance(refused, CmmUqError):
             self._dismiss()
             raise refused
@@ -185,9 +185,8 @@ def serve(begin: Callable[[Any], Callable[[int, Any], Any]]) -> None:
     os.dup2(2, 1)  # whatever a library prints is no answer
     with contextlib.suppress(BrokenPipeError):
         values = _given(asked)
-        setting = next(values)
         try:
-            answer = begin(_opened(setting))
+            answer = begin(_opened(next(values)))
         except CmmUqError as error:
             put(told, error)
             return
@@ -204,9 +203,8 @@ def _answer(answer: Callable[[int, Any], Any], number: int, task: Any) -> Any:
     except MemoryError:
         return CmmUqError("the memory does not suffice for this input", fix="Give fewer --workers")
     except Exception as error:
-        return told_with_package(error) or CmmUqError(
-            f"a fault of the program: {type(error).__name__}: {error}", fix="Please report it with the input"
-        )
+        problem = f"a fault of the program: {type(error).__name__}: {error}"
+        return told_with_package(error) or CmmUqError(problem, fix="Please report it with the input")
 
 
 def _opened(value: Any) -> Any:
@@ -234,8 +232,6 @@ def _given(stream: BinaryIO) -> Iterator[Any]:
 
 MOST_WORKERS = 256
 _AHEAD = 2  # tasks for each process that are ready before it asks
-_Waiting = queue.SimpleQueue[tuple[int, Any] | None]
-_Answers = queue.SimpleQueue[TaskAnswer | BaseException]
 
 
 def check_workers(workers: int) -> None:
@@ -254,12 +250,12 @@ def processes() -> int:
 
 def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) -> Generator[TaskAnswer, None, None]:
     """Have every numbered task answered, in the order in which they are done; no process is begun without a task."""
-    todo = iter(tasks)
-    waiting: _Waiting = queue.SimpleQueue()
-    done: _Answers = queue.SimpleQueue()
+    todo, asked = iter(tasks), 0
+    waiting: queue.SimpleQueue[tuple[int, Any] | None] = queue.SimpleQueue()
+    done: queue.SimpleQueue[TaskAnswer | BaseException] = queue.SimpleQueue()
     talks: list[WorkerProcess] = []
     threads: list[threading.Thread] = []
-    asked = 0
+
     try:
         for task in islice(todo, _AHEAD * workers):
             waiting.put(task)
@@ -286,7 +282,11 @@ def answers(work: WorkerTask, tasks: Iterable[tuple[int, Any]], workers: int) ->
             thread.join()
 
 
-def _converse(talk: WorkerProcess, waiting: _Waiting, done: _Answers) -> None:
+def _converse(
+    talk: WorkerProcess,
+    waiting: queue.SimpleQueue[tuple[int, Any] | None],
+    done: queue.SimpleQueue[TaskAnswer | BaseException],
+) -> None:
     try:
         while (task := waiting.get()) is not None:
             done.put(talk.ask(*task))

@@ -6,9 +6,11 @@ not answer) is tried again when everything else is done.
 
 from __future__ import annotations
 
+import contextlib
 import datetime as dt
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -67,23 +69,31 @@ class ScheduledRun:
     counted: dict[str, int] = field(default_factory=dict)
     codes: set[int] = field(default_factory=lambda: {0})
 
+    @cached_property
+    def problems(self) -> Problems:
+        return Problems(self.work.out)
+
     def through(self) -> int:
         """The exit code: 0 all is well, 1 something needs a person, 2 bad input, 3 output impossible."""
-        problems = Problems(self.work.out)
-        jobs = self._distinct(self._found(problems), problems)
+        jobs = self._distinct(self._found())
         if self.dry:
             for job in jobs:
-                self._end(self._would(job), problems)
+                self._end(self._would(job))
             return self._conclude()
         self._send(1, last=False)
-        ready, changing = self._parted(jobs, problems)
-        self._report_all(ready, problems)
-        self._report_all(self._settled(changing, {job.id.casefold() for job in jobs}, problems), problems)
-        self._look_what_is_due()
+        ready, changing = self._parted(jobs)
+        self._report_all(ready)
+        self._report_all(self._settled(changing, {job.id.casefold() for job in jobs}))
+        try:
+            for notice in self.due(self.clock.now().date()):
+                new = bool(self._queue([notice])) or not self.outbox.channels
+                self._line({"due": notice.about, "event": notice.event, "why": str(notice.text)}, int(new))
+        except CmmUqError as error:
+            self._line({"due": None, "event": "error", "why": str(error)}, 3 if isinstance(error, OutputError) else 2)
         self._send(self.settings.tries, last=True)
         return self._conclude()
 
-    def _found(self, problems: Problems) -> list[JobFolder]:
+    def _found(self) -> list[JobFolder]:
         found: dict[Path, JobFolder] = {}
         for root in self.folders:
             try:
@@ -92,27 +102,25 @@ class ScheduledRun:
                     fix = "A job is a folder with a job.toml; [run] may_be_empty allows none"
                     raise CmmUqError("holds no job", where=str(root), fix=fix)
             except CmmUqError as error:
-                self._end(JobOutcome.refused(JobFolder(root, root), error), problems)
+                self._end(JobOutcome.refused(JobFolder(root, root), error))
                 continue
-            self._mended(str(root), problems)
+            self._mended(str(root))
             for job in inside:
                 found.setdefault(job.folder.resolve(), job)
         return list(found.values())
 
-    def _distinct(self, jobs: Sequence[JobFolder], problems: Problems) -> list[JobFolder]:
+    def _distinct(self, jobs: Sequence[JobFolder]) -> list[JobFolder]:
         """Jobs whose id no other one has; of the others neither is reported, or each would replace the other's."""
         by_id: dict[str, list[JobFolder]] = {}
         for job in jobs:
             by_id.setdefault(job.id.casefold() or str(job.folder), []).append(job)
-        for same in by_id.values():
+        for same in (same for same in by_id.values() if len(same) > 1):
             for job, other in zip(same, [*same[1:], same[0]], strict=True):
-                if job is not other:
-                    error = CmmUqError(f"its id {job.id!r} is that of {other.folder} too", where=str(job.folder),
-                                       fix="Give each job an id of its own")  # fmt: skip
-                    self._end(JobOutcome.refused(job, error), problems)
-        alone = [same[0] for same in by_id.values() if len(same) == 1]
+                problem = f"its id {job.id!r} is that of {other.folder} too"
+                error = CmmUqError(problem, where=str(job.folder), fix="Give each job an id of its own")
+                self._end(JobOutcome.refused(job, error))
         # a job in which the last run ended comes last, so that it cannot keep the others from being reported
-        return sorted(alone, key=self.work.was_left)
+        return sorted((same[0] for same in by_id.values() if len(same) == 1), key=self.work.was_left)
 
     def _would(self, job: JobFolder) -> JobOutcome:
         if job.planned:
@@ -123,13 +131,11 @@ class ScheduledRun:
             return JobOutcome.refused(job, error)
         if not why:
             return JobOutcome(job, UNCHANGED)
-        unchanged_s = quiet_since(snapshot(job.folder), self.clock.now().timestamp())
-        quiet = unchanged_s >= self.settings.quiet_s
-        return JobOutcome(job, WOULD, why) if quiet else JobOutcome(job, WAITING, "changed a moment ago")
+        if quiet_since(snapshot(job.folder), self.clock.now().timestamp()) < self.settings.quiet_s:
+            return JobOutcome(job, WAITING, "changed a moment ago")
+        return JobOutcome(job, WOULD, why)
 
-    def _parted(
-        self, jobs: Iterable[JobFolder], problems: Problems
-    ) -> tuple[list[JobFolder], dict[JobFolder, tuple[float, Snapshot]]]:
+    def _parted(self, jobs: Iterable[JobFolder]) -> tuple[list[JobFolder], dict[JobFolder, tuple[float, Snapshot]]]:
         """Jobs that can be taken, and those that somebody may still be copying, as they are now."""
         ready, changing = [], {}
         for job in jobs:
@@ -139,63 +145,50 @@ class ScheduledRun:
             elif would.state == WAITING and not job.planned:
                 changing[job] = (self.clock.passed(), snapshot(job.folder))
             else:
-                self._end(would, problems)
+                self._end(would)
         return ready, changing
 
-    def _settled(
-        self, changing: Mapping[JobFolder, tuple[float, Snapshot]], ids: Collection[str], problems: Problems
-    ) -> list[JobFolder]:
+    def _settled(self, changing: Mapping[JobFolder, tuple[float, Snapshot]], ids: Collection[str]) -> list[JobFolder]:
         """Of the jobs that were changed a moment ago, or have times of the future, those that nobody changes now."""
         settled = []
         for job, (looked, seen) in changing.items():
             self.clock.sleep(max(0.0, looked + self.settings.quiet_s - self.clock.passed()))
-            again = _looked_at_again(job)
+            again = job  # it may have been read while it was being copied; where it went away, taking it says so
+            with contextlib.suppress(CmmUqError):
+                again = replace(next(job_folders(job.folder), job), root=job.root)
             same_id = again.id == job.id or again.id.casefold() not in ids
             if snapshot(job.folder) == seen and same_id and not again.planned:
                 settled.append(again)
             else:
-                self._end(JobOutcome(job, WAITING, "is still being changed: left for the next run"), problems)
+                self._end(JobOutcome(job, WAITING, "is still being changed: left for the next run"))
         return settled
 
-    def _report_all(self, jobs: Sequence[JobFolder], problems: Problems) -> None:
+    def _report_all(self, jobs: Sequence[JobFolder]) -> None:
         """Report jobs; those whose output is impossible now again after the others."""
-        left = list(jobs)
         for attempt in range(1, self.settings.tries + 1):
-            left = self._attempt(left, problems, last=attempt == self.settings.tries)
-            if not left:
+            jobs = self._attempt(jobs, last=attempt == self.settings.tries)
+            if not jobs:
                 return
             self._back_off(attempt)
 
-    def _attempt(self, jobs: Sequence[JobFolder], problems: Problems, *, last: bool) -> list[JobFolder]:
+    def _attempt(self, jobs: Sequence[JobFolder], *, last: bool) -> list[JobFolder]:
         """Report jobs; those that are to be tried again."""
-        again: list[JobFolder] = []
-        in_a_row = 0
+        again, in_a_row = list[JobFolder](), 0
         for i, job in enumerate(jobs):
             ended = self.work.take(job)
             if last or ended.state != FAILED:
                 in_a_row = 0
-                self._end(ended, problems)
+                self._end(ended)
                 continue
             again.append(job)
             in_a_row += 1
             self._log(f"will be tried again {ended.name}: {ended.why}")
-            if in_a_row == _IN_A_ROW:
-                return [
-                    *jobs[i + 1 :],
-                    *again,
-                ]  # whatever is wrong with these, it keeps none of the others from its turn
+            if in_a_row == _IN_A_ROW:  # whatever is wrong with these, it keeps none of the others from its turn
+                return [*jobs[i + 1 :], *again]
         return again
 
     def _back_off(self, attempt: int) -> None:
         self.clock.sleep(float(self.settings.back_off_s * 2 ** (attempt - 1)))
-
-    def _look_what_is_due(self) -> None:
-        try:
-            for notice in self.due(self.clock.now().date()):
-                new = bool(self._queue([notice])) or not self.outbox.channels
-                self._line({"due": notice.about, "event": notice.event, "why": str(notice.text)}, int(new))
-        except CmmUqError as error:
-            self._line({"due": None, "event": "error", "why": str(error)}, 3 if isinstance(error, OutputError) else 2)
 
     def _send(self, tries: int, *, last: bool) -> None:
         """Send what waits, again where a server does not answer; of the last failure a person must know."""
@@ -205,38 +198,34 @@ class ScheduledRun:
             except CmmUqError as error:
                 self._line({"message": None, "why": str(error)}, 3)
                 return
-            failed = [one for one in deliveries if one.problem]
-            ended = attempt == tries and last
             for one in deliveries:
-                if ended or not one.problem:
+                if (attempt == tries and last) or not one.problem:
                     self._sent(one)
-            if not failed or attempt == tries:
+            if attempt == tries or not any(one.problem for one in deliveries):
                 return
             self._back_off(attempt)
 
     def _sent(self, one: Delivery) -> None:
-        why, code = one.problem or one.remark or None, int(bool(one.problem))
-        told = {"message": one.message.title, "channel": one.channel, "sent": not one.problem, "why": why}
-        self._line(told, code)
+        why, sent = one.problem or one.remark or None, not one.problem
+        self._line({"message": one.message.title, "channel": one.channel, "sent": sent, "why": why}, int(not sent))
 
-    def _end(self, ended: JobOutcome, problems: Problems) -> None:
+    def _end(self, ended: JobOutcome) -> None:
         """Tell what came of a job; an error goes out once while it stands."""
         self.counted[ended.state] = self.counted.get(ended.state, 0) + 1
-        self.codes.add(ended.code)
-        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **ended.line()})
+        self._tell(ended.line(), ended.code)
         if ended.error is not None and not self.dry:
-            about = ended.name
-            self._queue([of_error(ended.error, about, problems.since(about, ended.why, self.clock.moment()))])
+            since = self.problems.since(ended.name, ended.why, self.clock.moment())
+            self._queue([of_error(ended.error, ended.name, since)])
         elif ended.state not in (BUSY, WAITING, GONE):
-            self._mended(ended.name, problems)
-            self._mended(str(ended.job.folder), problems)
+            self._mended(ended.name)
+            self._mended(str(ended.job.folder))
         if ended.state != UNCHANGED:
             said = ended.why if ended.error is not None else ", ".join(filter(None, (ended.why, *ended.events)))
             self._log(f"{ended.state} {ended.name}" + (f": {said}" if said else ""))
 
-    def _mended(self, about: str, problems: Problems) -> None:
+    def _mended(self, about: str) -> None:
         if not self.dry:
-            problems.mended(about)
+            self.problems.mended(about)
 
     def _queue(self, notices: Sequence[Notice]) -> list[Notice]:
         """Let notices go out; where they cannot be kept they are sent at once, and again by the next run."""
@@ -250,9 +239,12 @@ class ScheduledRun:
             return list(notices)
 
     def _line(self, told: dict[str, Any], code: int) -> None:
-        self.codes.add(code)
-        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **told, "exit_code": code})
+        self._tell({**told, "exit_code": code}, code)
         self._log(", ".join(f"{key} {value}" for key, value in told.items() if value not in (None, "")))
+
+    def _tell(self, told: dict[str, Any], code: int) -> None:
+        self.codes.add(code)
+        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **told})
 
     def _log(self, text: str) -> None:
         if not self.dry:
@@ -260,17 +252,8 @@ class ScheduledRun:
 
     def _conclude(self) -> int:
         code = max(self.codes)
-        told = {"run": self.counted, "dry": self.dry, "messages_waiting": self.outbox.waiting(), "exit_code": code}
-        self.tell({"schema": SCHEMA, "at": self.clock.moment(), **told})
+        waiting = self.outbox.waiting()
+        self._tell({"run": self.counted, "dry": self.dry, "messages_waiting": waiting, "exit_code": code}, code)
         counts = ", ".join(f"{count} {state}" for state, count in self.counted.items()) or "nothing found"
         self._log(f"run ended with {code}: {counts}")
         return code
-
-
-def _looked_at_again(job: JobFolder) -> JobFolder:
-    """A job that may have been read while it was being copied."""
-    try:
-        again = next(job_folders(job.folder), job)
-    except CmmUqError:  # it went away, which taking it says
-        return job
-    return replace(again, root=job.root)

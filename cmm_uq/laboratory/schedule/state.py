@@ -30,18 +30,11 @@ PRIVATE = ".scheduled"  # folder beside the reports with locks and messages
 COMMAND = "report"
 
 
-@dataclass(frozen=True)
-class ReportedInputs:
-    """A certificate that was written."""
-
-    inputs: Mapping[str, str]  # SHA-256 of every file that it was made from, by name
-
-
 class State(Protocol):
     """What is remembered from run to run."""
 
-    def reported(self, job: str) -> ReportedInputs | None:
-        """The newest certificate of a job; ``None`` where it has none."""
+    def reported(self, job: str) -> Mapping[str, str] | None:
+        """SHA-256 by name of every file that a job's newest certificate was made from; ``None`` where it has none."""
         ...
 
     def released(self, job: str) -> bool:
@@ -63,17 +56,13 @@ class FolderState:
 
     out: Path
 
-    def reported(self, job: str) -> ReportedInputs | None:
+    def reported(self, job: str) -> Mapping[str, str] | None:
         folder = self.out / job
         manifest = read_manifest(folder)
         if manifest is None or (manifest.owner.command, manifest.owner.job) != (COMMAND, job):
             return None
-        if sha256_of(folder / RESULTS) != manifest.files.get(RESULTS):
-            return None
-        if not all(os.path.lexists(folder / name) for name in manifest.files):
-            return None
-        inputs = inputs_in(folder)
-        return None if inputs is None else ReportedInputs(inputs)
+        there = all(os.path.lexists(folder / name) for name in manifest.files)
+        return inputs_in(folder) if there and sha256_of(folder / RESULTS) == manifest.files.get(RESULTS) else None
 
     def released(self, job: str) -> bool:
         return False
@@ -102,15 +91,14 @@ class RecordsState:
         self._sent: set[str] = set()
         self._read = 0
 
-    def reported(self, job: str) -> ReportedInputs | None:
-        here = self.folder.reported(job)
-        if here is not None and self._recorded(job):
-            return here
+    def reported(self, job: str) -> Mapping[str, str] | None:
+        if (here := self.folder.reported(job)) is not None:
+            digest = sha256_of(self.folder.out / job / RESULTS)
+            if digest is not None and self.records.has_results(digest) is not None:
+                return here
         newest = self._newest(job)
-        if newest is None:
-            return None
-        inputs = next(self.records.entries(newest.entry)).data.get("inputs") or {}
-        return ReportedInputs({str(name): str(digest) for name, digest in inputs.items()}) if inputs else None
+        inputs = None if newest is None else next(self.records.entries(newest.entry)).data.get("inputs")
+        return {str(name): str(digest) for name, digest in inputs.items()} if inputs else None
 
     def released(self, job: str) -> bool:
         newest = self._newest(job)
@@ -124,10 +112,6 @@ class RecordsState:
 
     def add_sent(self, key: str, content: Mapping[str, Any]) -> None:
         self.records.append("sent", {**content, "key": key})
-
-    def _recorded(self, job: str) -> bool:
-        digest = sha256_of(self.folder.out / job / RESULTS)
-        return digest is not None and self.records.has_results(digest) is not None
 
     def _newest(self, job: str) -> RecordedCertificate | None:
         found = self.records.certificates(job=job, origin=None, values=False)

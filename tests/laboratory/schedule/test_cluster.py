@@ -15,7 +15,7 @@ import pytest
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.laboratory.schedule import cluster
-from cmm_uq.laboratory.schedule.cluster import _Chunks, chunk_answered, cluster_answers, end_idle
+from cmm_uq.laboratory.schedule.cluster import _chunks, chunk_answered, cluster_answers, end_idle
 from cmm_uq.laboratory.schedule.processes import Packed, TaskAnswer, WorkerTask, answers
 from tests.conftest import ROOT
 
@@ -113,15 +113,12 @@ def test_a_process_of_a_worker_stays_for_the_next_portion_and_goes_when_nobody_a
 
 
 def test_portions_are_a_hundred_jobs_and_shrink_towards_the_end() -> None:
-    chunks, sizes = _Chunks(((i, None) for i in range(2000)), 2000, 4), []
-    while chunk := chunks.next():
-        sizes.append(len(chunk))
+    sizes = [len(chunk) for chunk in _chunks(((i, None) for i in range(2000)), 2000, 4)]
     assert sum(sizes) == 2000
     assert sizes[:12] == [100] * 12
     assert sizes == sorted(sizes, reverse=True)
     assert sizes[-1] == 1
-    large = _Chunks(((i, b"x" * 3 * 2**20) for i in range(100)), 100, 1)
-    assert len(large.next()) == 3
+    assert len(next(_chunks(((i, b"x" * 3 * 2**20) for i in range(100)), 100, 1))) == 3
 
 
 def test_a_cluster_that_loses_its_workers_is_said(local: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ from cmm_uq.base.errors import OutputError
 from cmm_uq.laboratory.schedule.locks import turn
 from cmm_uq.laboratory.schedule.notices import Channel, OutgoingMessage
 from cmm_uq.laboratory.schedule.outbox import MOST, Outbox
-from cmm_uq.laboratory.schedule.state import FolderState, ReportedInputs
+from cmm_uq.laboratory.schedule.state import FolderState
 from tests.laboratory.schedule.told import NOW, Kept, notice, notices
 
 
@@ -91,7 +91,7 @@ class Locked:
     failures: int
     keys: set[str] = field(default_factory=set)
 
-    def reported(self, job: str) -> ReportedInputs | None:
+    def reported(self, job: str) -> dict[str, str] | None:
         return None
 
     def released(self, job: str) -> bool:

@@ -15,7 +15,7 @@ from cmm_uq.base.output import Owner, staged
 from cmm_uq.laboratory.records import open_records
 from cmm_uq.laboratory.records.store import Records
 from cmm_uq.laboratory.schedule.jobs import JobFolder, JobReporting
-from cmm_uq.laboratory.schedule.state import FolderState, RecordsState, ReportedInputs
+from cmm_uq.laboratory.schedule.state import FolderState, RecordsState
 from tests.laboratory.records.histories import certificate
 from tests.laboratory.schedule.runs import Jobs, made
 
@@ -43,7 +43,7 @@ def test_a_folder_knows_its_own_whole_reports_alone(tmp_path: Path) -> None:
     state = FolderState(tmp_path)
     assert state.reported("a") is None
     report(tmp_path)
-    assert state.reported("a") == ReportedInputs(INPUTS)
+    assert state.reported("a") == INPUTS
     report(tmp_path, "diagnosed", command="diagnose")
     assert state.reported("diagnosed") is None
     (tmp_path / "a" / "results.json").write_text('{"job": {"inputs_sha256": {}}}')
@@ -55,7 +55,7 @@ def test_what_the_folder_has_and_the_records_have_not_is_to_be_recorded_yet(tmp_
     digest = report(tmp_path / "reports")
     assert state.reported("a") is None
     record(records, digest)
-    assert state.reported("a") == ReportedInputs(INPUTS)
+    assert state.reported("a") == INPUTS
 
 
 def test_a_report_that_was_taken_away_is_not_made_again_and_of_several_the_newest_counts(
@@ -66,7 +66,7 @@ def test_a_report_that_was_taken_away_is_not_made_again_and_of_several_the_newes
     record(records, "a" * 64, inputs={"job.toml": "0" * 64})
     record(records, report(tmp_path / "reports"))
     shutil.rmtree(tmp_path / "reports" / "a")
-    assert state.reported("a") == ReportedInputs(INPUTS)
+    assert state.reported("a") == INPUTS
 
 
 def test_a_released_certificate_is_not_replaced(tmp_path: Path, records: Records) -> None:
