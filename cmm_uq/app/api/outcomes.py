@@ -376,5 +376,4 @@ class Part:
         return f"<p>{escape(repr(self))}</p>{table}" + (f"<ul>{warned}</ul>" if warned else "")
 
 
-Diagnosis, Plan, Proof = DiagnosisOutcome, PlanOutcome, ProofOutcome
-"""Names of version 0.15, for one release more."""
+Diagnosis, Plan, Proof = DiagnosisOutcome, PlanOutcome, ProofOutcome  # names of version 0.15, for one release more

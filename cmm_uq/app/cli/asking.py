@@ -15,7 +15,6 @@ CHAIN = {
     "date": "Date of the certificate, as 2026-05-31", "due": "Last day on which it holds",
 }  # fmt: skip
 _TEXTS = ("name", "serial", "customer", "mpe", *(f"certificate_{key}" for key in CHAIN if key not in ("date", "due")))
-
 InstrumentAnswers = tuple[str, dict[int, str], dict[str, tuple[float, float]], str, str, dict[str, str | int]]
 
 

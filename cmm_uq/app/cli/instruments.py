@@ -22,8 +22,7 @@ app = typer.Typer(
     invoke_without_command=True,
 )
 
-SHOWN = 44
-"""Characters of a message beside what was understood of it."""
+SHOWN = 44  # characters of a message beside what was understood of it
 
 Profile = Annotated[
     str,

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.live.screen import SessionView as View
 
 PROMPT = "> "
-_LINES = 12
-"""Of what happened, that stay on the screen."""
-
+_LINES = 12  # of what happened, that stay on the screen
 _ERASE = ("\x7f", "\b")
 
 

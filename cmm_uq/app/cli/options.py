@@ -20,12 +20,8 @@ if TYPE_CHECKING:
     from cmm_uq.app.commands.certificates.signing import Signing
 
 JOB_FILE = "job.toml"
-
-DEEP = 3
-"""Folders below the one that is typed."""
-
-MOST = 5000
-"""Entries that are looked at: completion must be quick in any folder."""
+DEEP = 3  # folders below the one that is typed
+MOST = 5000  # entries that are looked at: completion must be quick in any folder
 
 
 def job_folders(incomplete: str) -> list[str]:

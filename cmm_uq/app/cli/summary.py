@@ -58,16 +58,9 @@ FILES = {
 
 COLOURS: dict[Standing, str] = {"good": "bold green", "open": "bold yellow", "bad": "bold red", "unknown": "bold"}
 HEADING, FAINT = "bold", "dim"
-
-LINES, WARNING_LINES = 3, 2
-"""Of a text that is shortened, and of a warning."""
-
-ITEMS = 6
-"""Of a list that is shortened."""
-
-NARROWEST = 8
-"""Cells of a column that is folded."""
-
+LINES, WARNING_LINES = 3, 2  # of a text that is shortened, and of a warning
+ITEMS = 6  # of a list that is shortened
+NARROWEST = 8  # cells of a column that is folded
 _GAP, _MORE = "  ", " …"
 
 

@@ -21,11 +21,8 @@ from cmm_uq.base.output.interruption import speaking, written
 if TYPE_CHECKING:
     from cmm_uq.app.commands.files import Stage
 
-NEEDS_A_PERSON = 1
-"""Exit code of a scheduled run after which a person has to look at something, and was told of it."""
-
-BAD_INPUT = 2
-"""Exit code of everything that the user can mend."""
+NEEDS_A_PERSON = 1  # exit code of a scheduled run after which a person has to look at something, and was told of it
+BAD_INPUT = 2  # exit code of everything that the user can mend
 
 NO_OUTPUT = 3
 """Exit code where the input is sound and the output is impossible: disk, permissions, a closed pipe, a fault in here."""
@@ -37,12 +34,8 @@ NOT_VERIFIED, NOT_WHOLLY_CHECKED = 1, 3
 """Exit codes of a verification that found something wrong, and of one that could not check everything."""
 
 NAME = "cmm-uq:"
-
-WIDEST, NARROWEST = 120, 40
-"""Columns that are used: longer lines are hard to read, and fewer are not enough."""
-
-Line = tuple[tuple[str, str], ...]
-"""Parts of a line, each with its style in the words of rich; none for the usual one."""
+WIDEST, NARROWEST = 120, 40  # columns that are used: longer lines are hard to read, and fewer are not enough
+Line = tuple[tuple[str, str], ...]  # parts of a line, each with its style in the words of rich; none for the usual one
 
 NEAREST = {
     "±": "+/-", "−": "-", "–": "-", "—": "-", "·": "*", "×": "x", "→": "->", "…": "...", "″": '"', "′": "'", "µ": "u",

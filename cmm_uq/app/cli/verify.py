@@ -18,8 +18,7 @@ EXAMPLES = examples(
     "verify certificate.pdf", "verify reports/iota-1102-20C", "verify certificate.pdf certificate.html --no-rerun",
     "verify certificate.pdf --trust roots --json",
 )  # fmt: skip
-SHOWN = 20
-"""Findings that are told one by one."""
+SHOWN = 20  # findings that are told one by one
 
 
 def command(

@@ -25,14 +25,9 @@ from cmm_uq.machine.model.machine_maps import maps_named
 from cmm_uq.machine.model.predicted_errors import SAME, PredictedErrors, predicted_errors
 from cmm_uq.machine.physics.catalogue import effects
 
-_FAR = 1.0
-"""mm from a recorded point to the predicted one, from which on it is said."""
-
-_NO_NOISE = 1e-7
-"""mm: residuals below it are digits of the files."""
-
-_LEAST_WEIGHT = 0.05
-"""Least noise of a point over that of all together: nothing is known without limit."""
+_FAR = 1.0  # mm from a recorded point to the predicted one, from which on it is said
+_NO_NOISE = 1e-7  # mm: residuals below it are digits of the files
+_LEAST_WEIGHT = 0.05  # least noise of a point over that of all together: nothing is known without limit
 
 
 _STEP = 0.05
@@ -58,10 +53,7 @@ class Against:
 
 
 def against_simulation(job: Job, facts: SimulationFacts) -> Against:
-    """Join what the simulation leaves of a recording with the model of what it could lack.
-
-    facts : its ``[simulation]``.
-    """
+    """Join what the simulation leaves of a recording with the model of what it could lack."""
     recorded, findings = recorded_model(job)
     artefact, where = recorded.artefact, job.recording_path
     found = _of_maps(job, facts, artefact.points) if facts.map else _of_a_file(job, facts, artefact)

@@ -36,10 +36,7 @@ def write_budget(
     stage: Stage = silent,
     language: Code = ENGLISH,
 ) -> WrittenBudget:
-    """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none.
-
-    file : the model, in TOML.
-    """
+    """Evaluate a model file and write ``budget.html``, ``budget.pdf`` and ``results.json``, all or none."""
     fonts_of(language)  # refused before anything is computed
     model = read_model_file(file)
     folder = out or Path("reports") / file.stem

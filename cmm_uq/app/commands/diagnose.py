@@ -87,12 +87,7 @@ def diagnose_model(
     progress: Progress | None = None, known: NoisyPosterior | None = None, show: bool = False,
     against: Against | None = None,
 ) -> JobDiagnosis:  # fmt: skip
-    """Diagnose the screened model of a job, or what a simulation leaves of its recording.
-
-    ``known`` is its posterior where it was sampled already; ``show`` whether what to measure next shall also show what
-    this recording could not have shown. Against a simulation, figures and decisions are the recording's own: none is
-    corrected.
-    """
+    """Diagnose the screened model of a job, or what a simulation leaves of its recording."""
     facts, kind = job.facts, kind_of(job)
     observe = kind.observing("diagnosed") if against is None else against.observe
     stated_um = facts.recording.u_coordinate_um if against is None else against.stated_um
@@ -154,15 +149,7 @@ def _outcome(result: JobDiagnosis) -> Outcome:
 
 @naming_package()
 def diagnosis_outcome(job: Job, *, seed: int = 0, alpha: float = FALSE_ALARMS, stage: Stage = silent) -> Outcome:
-    """Diagnose a job that was read and compose the page; nothing is written.
-
-    Parameters
-    ----------
-    job : that was read.
-    seed : of everything random.
-    alpha : rate of false alarms.
-    stage : told of progress.
-    """
+    """Diagnose a job that was read and compose the page; nothing is written."""
     readings = f": {len(job.points)} readings" if job.facts.artefact.with_recording else ""
     stage(f"Searching for what was left out{readings}", 0.0)
     found = diagnose_read(
@@ -190,18 +177,8 @@ def write_diagnosis(
 
     Where further set-ups would tell more, ``next_plan.csv`` comes with them.
 
-    Parameters
-    ----------
-    job : the job folder.
-    out : where to write; ``reports/<job id>/diagnosis`` by default.
-    seed : of everything random.
-    alpha : rate of false alarms.
-    against : file of a simulation's prediction that the recording is compared with, whatever the job names.
-    force : keep what stands in the way as ``NAME.previous`` instead of refusing.
-    stage : told of progress.
-    told : of the job, before anything is computed.
-    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
-    language : of the documents, instead of the job's.
+    ``records`` that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the
+    folder.
     """
     read, tell = in_language(read_job(job), language), stage or silent
     if against is not None:

@@ -30,11 +30,8 @@ from cmm_uq.maths.inference.noise import AXES, GROWTH, PLACING, SLOW, Components
 from cmm_uq.maths.inference.posterior import NoisyPosterior, Posterior
 from cmm_uq.maths.uncertainty.quantity import Quantity, expanded_of
 
-_LINES = 2000
-"""Draws of the sizes of the noise, over which a line's uncertainty is taken."""
-
-_ON_LINE = 0.05
-"""Extent of points across a line over that along it."""
+_LINES = 2000  # draws of the sizes of the noise, over which a line's uncertainty is taken
+_ON_LINE = 0.05  # extent of points across a line over that along it
 
 
 def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Finding]]:
@@ -55,12 +52,7 @@ def without_outliers(model: RecordingModel) -> tuple[RecordingModel, list[Findin
 def _told(
     artefact: Artefact, times_off: Mapping[int, float], rows: Mapping[int, int], recurring: Sequence[Ints]
 ) -> Iterator[Finding]:
-    """Outliers one by one, but those of one cause together, where the worst of them stands.
-
-    times_off : of each observation, in its own standard deviations.
-    rows : of the recording, of each of these observations.
-    recurring : rows that stay, of points that are off each time.
-    """
+    """Outliers one by one, but those of one cause together, where the worst of them stands."""
     points, untold = artefact.points, dict(times_off)
     outliers = np.array(sorted(set(rows.values())), dtype=np.int64)
     causes = [
@@ -109,8 +101,6 @@ def named_draws(
     """Draws of all that is reported: of each effect, of the artefact's sizes, and of the noise.
 
     values : (N, k) of the model's unknowns.
-    mixture : whether they are of a mixture, row after row independent, and not of the posterior, row by row. They go with no
-        size of the noise then: those are taken evenly from the posterior, and an ensemble is a chain.
     """
     units, columns, steps = {}, [], posterior.steps // posterior.every
     for (owner, name), (draws, own) in model.reported(values).items():

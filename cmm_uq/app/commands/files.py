@@ -30,11 +30,7 @@ _UNITS_AT_THE_END = ("mm", "um", "arcsec", "ppm", "rad", "deg", "m", "k", "per")
 
 @contextlib.contextmanager
 def opened(where: str | Path | None, out: Path | None) -> Iterator[Records | None]:
-    """The records that a command writes to, made where there are none; ``None`` where there are to be none.
-
-    where : option of the command.
-    out : folder that it writes to, where that is not the default.
-    """
+    """The records that a command writes to, made where there are none; ``None`` where there are to be none."""
     place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
     if place is None:
         yield None
@@ -48,15 +44,7 @@ def opened(where: str | Path | None, out: Path | None) -> Iterator[Records | Non
 def ledger_of(
     records: Records, job: Job, command: str, folder: Path, files: Mapping[str, bytes], results: str
 ) -> Ledger:
-    """For the files of an outcome, that are recorded as they are put in place.
-
-    records : to be added to.
-    job : that the outcome is of.
-    command : report or diagnose.
-    folder : of the files.
-    files : contents by name.
-    results : name of results.json.
-    """
+    """For the files of an outcome, that are recorded as they are put in place."""
     content = content_of(
         records, files[results], job, command, folder, {name: sha256(data).hexdigest() for name, data in files.items()}
     )
@@ -94,14 +82,11 @@ def called(name: str) -> str:
 Stage = Callable[[str, float], None]
 """Told what is being done, after a colon what of it is counted, and the part of the whole that is done."""
 
-Told = Callable[[Job], None]
-"""Told of the job as it was read, before anything is computed of it."""
-
+Told = Callable[[Job], None]  # told of the job as it was read, before anything is computed of it
 REPORTS, RESULTS = Path("reports"), "results.json"
 
 
-Finished = Callable[[str, bytes], bytes]
-"""What becomes of a document that was made, by its name."""
+Finished = Callable[[str, bytes], bytes]  # what becomes of a document that was made, by its name
 
 
 def unchanged(name: str, content: bytes) -> bytes:
@@ -159,7 +144,6 @@ class Written:
 
     @property
     def conforming(self) -> bool:
-        """See :class:`~cmm_uq.certificate.outcome.Outcome`."""
         return self.outcome.conforming
 
 
@@ -194,10 +178,8 @@ class Form:
     ) -> Written:
         """Make sure of the folder, then compute, render and write, all or none, and record it with that.
 
-        job : that the outcome is of.
-        outcome : computes it.
-        records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the folder.
-        signing : who signs the documents; ``None`` for nobody.
+        records : file or URL of the records; ``none`` for none, ``None`` for those of the environment, else beside the
+        folder; signing : who signs the documents; ``None`` for nobody.
         """
         fonts_of(job.facts.job.language)  # refused before anything is computed
         owner = self.owner(job)
@@ -224,12 +206,7 @@ class Form:
     def contents(
         self, outcome: Outcome, stage: Stage = silent, *, results_only: bool = False, finished: Finished = unchanged
     ) -> dict[str, bytes]:  # fmt: skip
-        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted.
-
-        outcome : that is written.
-        results_only : whether nothing but ``results.json`` is wanted.
-        finished : what becomes of a document before the next is made of it, as of one that is signed.
-        """
+        """Bytes of every file, by name; of ``results.json`` alone where only figures are wanted."""
         from cmm_uq.certificate.results.plain import as_json
 
         if results_only:
@@ -262,7 +239,6 @@ class Form:
         return {**rendered, **further}
 
     def names(self, job: Job) -> list[str]:
-        """Of the documents of a job."""
         from cmm_uq.certificate.origin import file_name
 
         return [file_name(document, job.origin) for document in self.documents]

@@ -28,8 +28,7 @@ from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.maths.inference.least_squares import RANK_TOLERANCE
 from cmm_uq.maths.inference.linear_model import Freedoms
 
-FEWEST_LEFT = 3
-"""Observations that the noise is estimated from, beside those that sizes and set-ups could explain."""
+FEWEST_LEFT = 3  # observations that the noise is estimated from, beside those that sizes and set-ups could explain
 
 
 def model_of(job: Job, artefact: Artefact) -> RecordingModel:
@@ -103,10 +102,7 @@ def _refuse_hidden_noise(model: RecordingModel, where: str) -> None:
 
 
 def recorded_model(job: Job, *, placings: bool = False) -> tuple[RecordingModel, tuple[Finding, ...]]:
-    """The model that a job names, of what the screening leaves of its recording, and what it found.
-
-    placings : whether nothing but the placings is of interest, for which nominal coordinates serve as well.
-    """
+    """The model that a job names, of what the screening leaves of its recording, and what it found."""
     kind = kind_of(job)
     where, observe = job.recording_path, kind.observing("screened")
     acting = effects(job.facts.model.effects, where="job.toml [model] effects")
@@ -183,12 +179,7 @@ def refuse_unmeasured(job: Job) -> None:
 def recipe_of(
     job: Job, own: Callable[[OwnAnalysis], Recipe | None], usual: Callable[[Kind], Recipe], what: str
 ) -> Recipe:  # fmt: skip
-    """How a job is analysed: in its kind's own way, or as observations that named effects explain.
-
-    own : what is asked of a kind's own analysis.
-    usual : of a kind that observes an artefact.
-    what : cannot be done of a kind that does neither, as ``reported``.
-    """
+    """How a job is analysed: in its kind's own way, or as observations that named effects explain."""
     refuse_unmeasured(job)
     kind = kind_of(job)
     offered = kind.offers("own", OwnAnalysis)

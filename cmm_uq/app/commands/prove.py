@@ -271,8 +271,6 @@ def write_proof(
 
     Truth and answers are kept in ``cases.unfinished`` while they come; the same call goes on with what an interrupted
     one left.
-
-    ``language`` of the page, instead of the job's.
     """
     tell = stage or silent
     tell("Reading the job", 0.0)

@@ -31,10 +31,7 @@ NAMEABLE = Nameable(table_of, names, Standards(standard_named, standard_names))
 
 @naming_package()
 def read_job(folder: Path, *, recorded: bool = True) -> Job:
-    """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`.
-
-    recorded : whether the recording must be there; otherwise a job still to be measured has no points.
-    """
+    """Read and check a job; see :func:`cmm_uq.jobs.reading.read_job`."""
     return reading.read_job(folder, NAMEABLE, recorded=recorded)
 
 
@@ -46,11 +43,7 @@ def read_machine(folder: Path) -> Job:
 
 @naming_package()
 def job_of(files: Mapping[str, bytes], *, recorded: bool = True) -> Job:
-    """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`.
-
-    files : contents of job.toml and of all that it names, by name.
-    recorded : whether the recording must be there; otherwise a job still to be measured has no points.
-    """
+    """Read and check a job that lies in no folder yet; see :func:`cmm_uq.jobs.reading.job_of`."""
     return reading.job_of(files, NAMEABLE, recorded=recorded)
 
 
@@ -69,9 +62,7 @@ def compared_with(job: Job, prediction: Path) -> Job:
 
 
 RECORDING, PREDICTION = "recording.csv", "predicted.csv"
-NO_DATE = dt.date(1970, 1, 1)
-"""Of a job that says none: the clock is never read."""
-
+NO_DATE = dt.date(1970, 1, 1)  # of a job that says none: the clock is never read
 NO_DATE_REMARK = "The date of the measurement was not given."
 
 
@@ -82,9 +73,8 @@ def job_from_frames(
 ) -> Job:
     """The job that a job.toml with these tables and a recording with these rows would be.
 
-    points : the recording, one row a point; ``None`` for a kind without one, or where it is still to be measured.
-    tables : of job.toml, by name; what is ``None`` or empty is left out.
-    files : further tables that job.toml names, such as error maps, by name.
+    points : the recording, one row a point; ``None`` for a kind without one, or where it is still to be measured; tables
+    : of job.toml, by name; what is ``None`` or empty is left out.
     """
     told = {name: table for name, table in tables.items() if table}
     recording = dict(_mapping(told.get("recording", {}), "recording"))

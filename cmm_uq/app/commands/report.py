@@ -124,10 +124,7 @@ def outcome_of(found: AnalysisResult, seed: int = 0) -> Outcome:
 
 @naming_package()
 def report_outcome(job: Job, *, seed: int = 0, stage: Stage = silent, composed: bool = True) -> Outcome:
-    """Analyse a job that was read and compose its certificate; nothing is written.
-
-    composed : whether the certificate is composed, too, so that whatever stops it is said here; figures are the same.
-    """
+    """Analyse a job that was read and compose its certificate; nothing is written."""
 
     def sampling(part: float) -> None:
         stage(f"Sampling the posterior: {part:.0%} of the draws", 0.1 + 0.4 * part)
@@ -149,8 +146,8 @@ def write_report(
 
     A kind may add files of its own. Documents of a recording that was not measured carry its origin in their names.
 
-    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the folder.
-    signing : who signs the certificate; ``None`` for nobody.
+    records : that it is recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside the
+    folder; signing : who signs the certificate; ``None`` for nobody.
     """
     tell = stage or silent
     tell("Reading the job", 0.0)

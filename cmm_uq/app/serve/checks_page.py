@@ -43,9 +43,7 @@ from cmm_uq.laboratory.records.listing import entry_of
 from cmm_uq.laboratory.records.place import shown as shown_place
 from cmm_uq.laboratory.records.store import Records
 
-MOST_CERTIFICATES = 50
-"""Certificates of one number that are compared: it is issued once, and drafted a few times."""
-
+MOST_CERTIFICATES = 50  # certificates of one number that are compared: it is issued once, and drafted a few times
 _OF_PAGE = re.compile(rb'class="number">[^<]{0,40}<bdi>([^<]{1,300})</bdi>')
 _OF_PDF = re.compile(rb"<pdf:Keywords>([^<]{1,300})</pdf:Keywords>")
 

@@ -24,9 +24,7 @@ from urllib.parse import parse_qsl, urlsplit
 from cmm_uq.base.errors import printable, shortened, suggestion
 from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
 
-LONGEST_VALUE = 300
-"""Characters of one value of a query: the longest serial or job id that the records take is shorter."""
-
+LONGEST_VALUE = 300  # characters of one value of a query: the longest serial or job id that the records take is shorter
 MOST_VALUES = 20
 LAST_PAGE = 10**6
 
@@ -168,12 +166,8 @@ class WebResponse:
         }  # fmt: skip
 
 
-LARGEST = 256 * 2**20
-"""Bytes of a file that is looked up; a certificate with its inputs has a hundredth."""
-
-HELD = 16 * 2**20
-"""Bytes of a file that is asked what it says it is."""
-
+LARGEST = 256 * 2**20  # bytes of a file that is looked up; a certificate with its inputs has a hundredth
+HELD = 16 * 2**20  # bytes of a file that is asked what it says it is
 _HEAD = 8192
 _BLOCK = 2**18
 _BOUNDARY = re.compile(r'multipart/form-data;\s*boundary="?([0-9A-Za-z\'()+_,./:=? -]{1,70})"?', re.IGNORECASE)

@@ -34,7 +34,6 @@ from cmm_uq.laboratory.records.facts import ArtefactRow
 from cmm_uq.laboratory.records.listing import CertificateFilter
 
 ANY = ("", say("Any"))
-
 _KEYS = ("text", "machine", "artefact", "origin", "state", "decision", "since", "until", "page")
 
 

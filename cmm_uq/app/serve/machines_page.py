@@ -41,11 +41,8 @@ from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, lis
 from cmm_uq.laboratory.records.facts import RecordedMachine
 from cmm_uq.laboratory.records.listing import CertificateFilter, chosen
 
-MOST_PLACES = 40
-"""Places that are offered to choose from; more are searched for by name."""
-
-MOST_NAMED = 4
-"""Artefacts that are named; a page of its own has all."""
+MOST_PLACES = 40  # places that are offered to choose from; more are searched for by name
+MOST_NAMED = 4  # artefacts that are named; a page of its own has all
 
 COLUMNS = columns(
     say("Machine"),
@@ -157,8 +154,7 @@ def _row(one: MachineStanding) -> tuple[Cell, ...]:
     )  # fmt: skip
 
 
-LISTED = 10
-"""Certificates that are listed here; a list of its own has all."""
+LISTED = 10  # certificates that are listed here; a list of its own has all
 
 
 def machine_page(view: SiteView, asked: WebRequest) -> WebPage:

@@ -20,8 +20,7 @@ from cmm_uq.certificate.document import Standing
 from cmm_uq.laboratory.records.listing import Newest, standing_of_all
 from cmm_uq.laboratory.records.store import Records
 
-SOON = dt.timedelta(days=60)
-"""What is due within it is shown before it is late."""
+SOON = dt.timedelta(days=60)  # what is due within it is shown before it is late
 
 
 class DueDate(NamedTuple):
@@ -41,10 +40,7 @@ DueDates = Callable[[Records, dt.date], Mapping[str, DueDate]]
 
 
 def by_rule(records: Records, today: dt.date) -> dict[str, DueDate]:
-    """Of all machines, each by its own rule, its interim checks and its adjustments.
-
-    ``today``: the day for which they are asked.
-    """
+    """Of all machines, each by its own rule, its interim checks and its adjustments."""
     found = due_in(records, (), today) if records.head()[0] else []
     return {one.serial: DueDate(one.due, one.why, one.beyond) for one in found if one.item == "machine"}
 

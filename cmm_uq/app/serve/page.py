@@ -23,10 +23,7 @@ from cmm_uq.certificate.document import Standing
 def address(path: str, **query: object) -> str:
     """A path with its query; what is ``None`` or empty is left out.
 
-    Examples
-    --------
-    >>> address("/machine", serial="A/7 <b>", page=None)
-    '/machine?serial=A%2F7+%3Cb%3E'
+    >>> address("/machine", serial="A/7 <b>", page=None) '/machine?serial=A%2F7+%3Cb%3E'
     """
     given = {name.rstrip("_"): value for name, value in query.items() if value not in (None, "")}
     return f"{path}?{urlencode(given)}" if given else path

@@ -21,8 +21,7 @@ from cmm_uq.base.messages import Verbatim, say
 from cmm_uq.base.output.manifest import plain_name, read_manifest
 from cmm_uq.laboratory.records.entries import Entry
 
-LARGEST = 128 * 2**20
-"""Bytes of a file that the page hands out."""
+LARGEST = 128 * 2**20  # bytes of a file that the page hands out
 
 PDF = "default-src 'none'; object-src 'self'; style-src 'unsafe-inline'; base-uri 'none'; frame-ancestors 'none'"
 """A browser's own viewer of PDF does not work in a sandbox."""

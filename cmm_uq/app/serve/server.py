@@ -26,13 +26,9 @@ from cmm_uq.base.messages import Verbatim, say
 HEAD_S, BODY_S, ANSWER_S = 10.0, 60.0, 60.0
 """Seconds that a browser has to send its request's head, to send a file, and to take its answer."""
 
-AT_ONCE = 32
-"""Requests that are answered at the same time; further ones are turned away."""
-
+AT_ONCE = 32  # requests that are answered at the same time; further ones are turned away
 LOOPBACK = ("localhost", "127.0.0.1", "[::1]")
-
-Answering = Callable[[WebRequest | RefusedRequest], WebResponse]
-"""Given a request, or why it is none; never raises."""
+Answering = Callable[[WebRequest | RefusedRequest], WebResponse]  # given a request, or why it is none; never raises
 
 
 class RecordsServer(ThreadingHTTPServer):

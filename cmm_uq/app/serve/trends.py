@@ -27,12 +27,8 @@ WIDTH, HEIGHT = 340, 150
 RIGHT, TOP, BOTTOM = 8, 8, 20
 """Of the picture and its margins, CSS pixels at its natural size; the left one is as wide as the figures in it."""
 
-DIGIT = 6.8
-"""Width of a figure of the lettering in the widest of the style sheet's faces, CSS pixels."""
-
-IN_SIGHT = 0.2
-"""Part of a limit that the values must come to for it to be drawn: a far one would flatten them."""
-
+DIGIT = 6.8  # width of a figure of the lettering in the widest of the style sheet's faces, CSS pixels
+IN_SIGHT = 0.2  # part of a limit that the values must come to for it to be drawn: a far one would flatten them
 _STEPS = (1.0, 2.0, 5.0, 10.0, 20.0)
 
 
@@ -158,10 +154,7 @@ def _axes(frame: PlotFrame, first: int, last: int) -> list[str]:
 def ticks(low: float, high: float, most: int = 4) -> tuple[list[float], list[str]]:
     """Round figures inside a range, at most ``most``, and their texts.
 
-    Examples
-    --------
-    >>> ticks(-0.3, 1.1)
-    ([0.0, 0.5, 1.0], ['0.0', '0.5', '1.0'])
+    >>> ticks(-0.3, 1.1) ([0.0, 0.5, 1.0], ['0.0', '0.5', '1.0'])
     """
     span = high - low
     if not (isfinite(span) and span > 0):
@@ -204,11 +197,8 @@ def _row(quantity: str, unit: str, one: RecordedValue | CourseValue) -> tuple[Ce
     )  # fmt: skip
 
 
-DRAWN = 200
-"""Certificates whose values are drawn, the newest."""
-
-FIGURES = "performance:"
-"""What the name of a figure of performance begins with: on these a standard decides."""
+DRAWN = 200  # certificates whose values are drawn, the newest
+FIGURES = "performance:"  # what the name of a figure of performance begins with: on these a standard decides
 
 _NOTE = say(
     "Newest value with its stated 95 % interval, and the measured values that stand: neither withdrawn nor replaced. A line "

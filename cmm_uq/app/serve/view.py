@@ -28,11 +28,8 @@ from cmm_uq.laboratory.records.facts import ArtefactRow, ChainFinding
 from cmm_uq.laboratory.records.listing import CertificateFilter, ListedCertificate, chosen
 from cmm_uq.laboratory.records.store import Records
 
-MOST = 100
-"""Findings that are shown."""
-
-AT_ONCE_S = 1.0
-"""How long whoever asks waits for the result; a longer comparison goes on without him."""
+MOST = 100  # findings that are shown
+AT_ONCE_S = 1.0  # how long whoever asks waits for the result; a longer comparison goes on without him
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ EXAMPLES = examples(
     "batch jobs --out /srv/reports --resume --json",
     "batch jobs --scheduler tcp://head:8786",
 )
-TOLD = 20
-"""Failed jobs that are named where not everything is asked for."""
+TOLD = 20  # failed jobs that are named where not everything is asked for
 
 
 def command(

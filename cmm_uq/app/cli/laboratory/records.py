@@ -19,8 +19,7 @@ app = typer.Typer(
 )
 app.callback(invoke_without_command=True)(helped)
 
-SHOWN = 50
-"""Findings that are printed."""
+SHOWN = 50  # findings that are printed
 
 
 def _entries(count: int) -> str:

@@ -15,8 +15,7 @@ from cmm_uq.base.errors import OutputError
 if TYPE_CHECKING:
     from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions as Asked
 
-STANDARD_OUTPUT = Path("-")
-"""In place of a file for the lines."""
+STANDARD_OUTPUT = Path("-")  # in place of a file for the lines
 
 
 def run(asked: Asked, lines: Path | None) -> int:

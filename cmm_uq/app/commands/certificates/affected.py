@@ -38,12 +38,8 @@ if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
 CORRECTIONS, JOB = "corrections.toml", "job.toml"
-
-SAME = 1e-9
-"""Relative difference within which figures are the same: results.json has ten digits."""
-
-Figures = tuple[float, float, float, float]
-"""RecordedValue, u, lower and upper end of the interval."""
+SAME = 1e-9  # relative difference within which figures are the same: results.json has ten digits
+Figures = tuple[float, float, float, float]  # recordedValue, u, lower and upper end of the interval
 
 
 @dataclass(frozen=True)
@@ -188,10 +184,7 @@ def affected_certificates(
 ) -> Iterator[AffectedCertificate]:  # fmt: skip
     """Certificates of versions from the first on that corrections up to the last touch, by day.
 
-    first, last : versions; only the installed one can compute anew.
-    recompute : whether they are computed again.
     out : folder for drafts that are to replace those that changed; ``None`` to write none.
-    where : records that the drafts are kept in.
     """
     if order(last) > order(__version__):
         raise CmmUqError(

@@ -30,12 +30,7 @@ class KeyFiles:
 
 
 def new_test_key(path: Path, name: str, asking: Asking) -> KeyFiles:
-    """Make a test key; a file that is there is not written over.
-
-    path : of the PKCS#12 file; its certificate comes beside it, ``.pem`` in place of the suffix.
-    name : of whom it is for.
-    asking : for the passphrase where the environment has none.
-    """
+    """Make a test key; a file that is there is not written over."""
     beside = path.with_suffix(".pem")
     if beside == path:
         raise CmmUqError("is the name of its certificate", where=str(path), fix="Name the key .p12")

@@ -51,16 +51,11 @@ _ELSEWHERE = frozenset({
 })  # fmt: skip
 """Keys of results.json that are no figures of the certificate, or are read by themselves."""
 
-Shown = tuple[Text, Text, Text]
-"""What a decision or a figure is, how it is printed, and its unit."""
+Shown = tuple[Text, Text, Text]  # what a decision or a figure is, how it is printed, and its unit
 
 
 def with_replaced(job: Job, where: str | Path | None, out: Path | None) -> Job:
-    """The job with the results of the certificate that it replaces, where it names no file of them and the records have them.
-
-    where : option that names the records.
-    out : folder that is written to, where that is not the default.
-    """
+    """The job with the results of the certificate that it replaces, where it names no file of them and the records have them."""
     replaces = job.facts.job.replaces
     place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
     if replaces is None or job.origin != MEASURED or _name(job) is not None or place is None:
@@ -120,12 +115,7 @@ def reissued(outcome: Outcome) -> Outcome:
 
 
 def compared(number: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> Reissue:
-    """What differs between both results, as printed.
-
-    number : of the certificate that is replaced.
-    before : its results.json, or what the records have of it.
-    after : results.json of the one in its place.
-    """
+    """What differs between both results, as printed."""
     differences, added, count = list[ChangedFigure](), list[ChangedFigure](), 0
     for shown in (_decisions, _figures):
         then, now = shown(before), shown(after)

@@ -14,11 +14,8 @@ from cmm_uq.laboratory.records.facts import STANDING, RecordedCertificate, spell
 if TYPE_CHECKING:
     from cmm_uq.laboratory.records.store import Records
 
-TWO_EYES, FOUR_EYES = 1, 2
-"""How many persons release a certificate."""
-
-_TOLD, _NEWEST = 4, 2000
-"""Entries that a message names, and certificates that an unknown name is compared with."""
+TWO_EYES, FOUR_EYES = 1, 2  # how many persons release a certificate
+_TOLD, _NEWEST = 4, 2000  # entries that a message names, and certificates that an unknown name is compared with
 
 
 @dataclass(frozen=True)
@@ -34,10 +31,7 @@ class Release:
 
 
 def certificate_named(records: Records, name: str, states: Collection[str]) -> RecordedCertificate:
-    """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest.
-
-    states : that are asked for.
-    """
+    """The certificate of a number, entry, job, folder or hash of results.json; where none is in these states, the newest."""
     found = [one for one in records.named(name) if one.command == "report"]
     if not found:
         raise CmmUqError(f"no certificate {name!r} is recorded", where=records.shown, fix=_near(records, name))
@@ -63,13 +57,7 @@ def release(
     records: Records, name: str, *, by: str, reason: str = "", despite: str = "",
     ask: Callable[[str], str] | None = None,
 ) -> Release:  # fmt: skip
-    """Release a certificate, or sign it as the first of two persons.
-
-    by : who releases it.
-    reason : for the record.
-    despite : what is said of a certificate that states no pass; it stays in the records.
-    ask : asks for that where it is not given.
-    """
+    """Release a certificate, or sign it as the first of two persons."""
     certificate, person = certificate_named(records, name, ("draft",)), _person(by)
     if (why := blocked(certificate)) is not None:
         raise CmmUqError(f"{certificate.number} cannot be released: {why}", where=records.shown)
@@ -99,12 +87,7 @@ def release(
 
 
 def withdraw(records: Records, name: str, *, by: str, reason: str, replaced_by: str | None = None) -> Release:
-    """Withdraw a certificate, or put another in its place.
-
-    by : who withdraws it.
-    reason : why.
-    replaced_by : the certificate in its place, which must be released.
-    """
+    """Withdraw a certificate, or put another in its place."""
     certificate, person = certificate_named(records, name, STANDING), _person(by)
     if not reason.strip():
         raise CmmUqError(
@@ -142,10 +125,7 @@ def blocked(certificate: RecordedCertificate) -> str | None:
 
 
 def no_pass(certificate: RecordedCertificate, content: Mapping[str, Any]) -> str:
-    """What a certificate states that is no pass, in words; empty where nobody has to say a word of it.
-
-    content : of its entry; one of an earlier version has the gravest decision alone.
-    """
+    """What a certificate states that is no pass, in words; empty where nobody has to say a word of it."""
     if certificate.decision in ("pass", "conditional pass", NONE):
         return ""
     each = [f"{one.called}: {one.outcome}" for one in Verdicts.of_results(content) if one.standing != "good"]

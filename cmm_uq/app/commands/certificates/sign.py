@@ -28,10 +28,7 @@ RESULTS, SUFFIXES = "results.json", (".pdf", ".xml")
 class Signed:
     """What was signed.
 
-    Parameters
-    ----------
-    files : that have a signature now.
-    records : that know of it, as they are shown; empty where none do.
+    ``files`` that have a signature now; ``records`` that know of it, as they are shown; empty where none do.
     """
 
     files: tuple[Path, ...]
@@ -43,18 +40,8 @@ def sign_files(
 ) -> Signed:  # fmt: skip
     """Sign certificates where they are, or copies of them elsewhere.
 
-    Parameters
-    ----------
-    paths : PDF and XML files of one folder.
-    signing : who signs, and how.
-    out : folder for the signed copies; without it a file is replaced in the set that it is of.
-    records : that are told of it where the certificate is recorded in them: file, URL, ``none``, or ``None`` for those of the
-        environment, else beside the folder.
-
-    Raises
-    ------
-    CmmUqError : a file is neither PDF nor XML, is of no set, was altered, or cannot be signed.
-    OutputError : the folder cannot be written to, or the records.
+    ``records`` that are told of it where the certificate is recorded in them: file, URL, ``none``, or ``None`` for those
+    of the environment, else beside the folder.
     """
     folder = _folder_of(paths)
     if out is not None:
@@ -79,12 +66,7 @@ def sign_files(
 
 
 def _folder_of(paths: Sequence[Path]) -> Path:
-    """The folder of all files.
-
-    Raises
-    ------
-    CmmUqError : they are of several, one is named twice, or is of a sort that is not signed.
-    """
+    """The folder of all files."""
     for path in paths:
         if path.suffix.lower() not in SUFFIXES:
             raise CmmUqError("is neither PDF nor XML", where=str(path), fix="Name certificate.pdf or certificate.xml")
@@ -122,12 +104,7 @@ def _laboratory(pdf: bytes) -> Mapping[str, Any]:
 
 
 def _whole(folder: Path, manifest: Manifest) -> dict[str, bytes]:
-    """The files of a set, as they were written.
-
-    Raises
-    ------
-    CmmUqError : one was altered or removed.
-    """
+    """The files of a set, as they were written."""
     contents = {}
     for name, digest in manifest.files.items():
         path = folder / name

@@ -26,21 +26,16 @@ from cmm_uq.certificate.sign.token import SCHEME, signer_of_token
 from cmm_uq.laboratory.schedule import channels as credentials
 
 PASSPHRASE, PASSPHRASE_FILE = "CMM_UQ_SIGN_PASSPHRASE", "CMM_UQ_SIGN_PASSPHRASE_FILE"
-
-Asking = Callable[[str], str]
-"""Asks whoever is at the keyboard for a secret; a :class:`CmmUqError` where nobody is."""
+Asking = Callable[[str], str]  # asks whoever is at the keyboard for a secret; a :class:`CmmUqError` where nobody is
 
 
 @dataclass(frozen=True)
 class Wanted:
     """How it is to be signed.
 
-    Parameters
-    ----------
-    key : PKCS#12 file, or URI ``pkcs11:…`` of a key on a token.
-    level : of PAdES; ``None`` for B-T with a time stamp server, else B-B.
-    server : address of a time stamp server.
-    trust : files or folders of certificates that chains must lead to.
+    ``key`` PKCS#12 file, or URI ``pkcs11:…`` of a key on a token; ``level`` of PAdES; ``None`` for B-T with a time
+    stamp server, else B-B; ``server`` address of a time stamp server; ``trust`` files or folders of certificates that
+    chains must lead to.
     """
 
     key: str
@@ -53,11 +48,7 @@ class Wanted:
 class Signing:
     """A signer at work on the files of one command, all at one time.
 
-    Parameters
-    ----------
-    signer : who signs.
-    at : time of signing.
-    stamping : level above B-B; ``None`` for B-B.
+    ``signer`` who signs; ``at`` time of signing; ``stamping`` level above B-B; ``None`` for B-B.
     """
 
     signer: Signer
@@ -67,14 +58,7 @@ class Signing:
     def finished(
         self, laboratory: Mapping[str, Any], *, language: str = "en", said: Callable[[Text], Text] | None = None
     ) -> Callable[[str, bytes], bytes]:  # fmt: skip
-        """Signs a document by its name: PDF and XML; others stay as they are.
-
-        Parameters
-        ----------
-        laboratory : name and accreditation, for the seal, where they are known.
-        language : of the documents.
-        said : says a text in that language.
-        """
+        """Signs a document by its name: PDF and XML; others stay as they are."""
 
         def signed(name: str, data: bytes) -> bytes:
             if name.endswith(".xml"):
@@ -91,17 +75,7 @@ class Signing:
 
 
 def signing(wanted: Wanted, asking: Asking) -> Signing:
-    """Open the key, before anything is computed.
-
-    Parameters
-    ----------
-    wanted : how it is to be signed.
-    asking : for the passphrase or the PIN where the environment has none.
-
-    Raises
-    ------
-    CmmUqError : the key cannot be opened, must not sign now, or the level does not go with what was given.
-    """
+    """Open the key, before anything is computed."""
     stamping = _stamping(wanted)
     at = signing_time()
     if wanted.key.startswith(SCHEME):
@@ -113,12 +87,7 @@ def signing(wanted: Wanted, asking: Asking) -> Signing:
 
 
 def secret(question: str, asking: Asking) -> str:
-    """A passphrase or PIN: from the environment, from a file that it names, else from the keyboard.
-
-    Raises
-    ------
-    CmmUqError : there is none, or others may read the file.
-    """
+    """A passphrase or PIN: from the environment, from a file that it names, else from the keyboard."""
     if named := os.environ.get(PASSPHRASE_FILE, ""):
         return credentials.of_file(Path(named), PASSPHRASE_FILE)
     return os.environ.get(PASSPHRASE, "") or asking(question)

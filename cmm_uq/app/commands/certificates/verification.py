@@ -29,11 +29,8 @@ if TYPE_CHECKING:
 class Verification:
     """What was verified, and what came out.
 
-    Parameters
-    ----------
-    given : the forms of the certificate.
-    inquiry : what was found.
-    job : of the inputs, where they are there and sound; of a part's report none.
+    ``given`` the forms of the certificate; ``inquiry`` what was found; ``job`` of the inputs, where they are there and
+    sound; of a part's report none.
     """
 
     given: Given
@@ -68,8 +65,7 @@ def verify_given(
 ) -> Verification:  # fmt: skip
     """Verify files that were read.
 
-    ``rerun``: whether everything is computed again. ``trust``: files and folders of certificates that are trusted; ``None``
-    for nobody, and then nothing need be signed. ``schema``: folder with PTB's schemas.
+    ``None`` for nobody, and then nothing need be signed. ``schema``: folder with PTB's schemas.
     """
     inquiry = Inquiry()
     _check_schema(inquiry, given)

@@ -21,18 +21,7 @@ def verify(
 ) -> Verification:  # fmt: skip
     """Verify the files of one certificate.
 
-    Parameters
-    ----------
-    paths : PDF, XML, HTML, ``results.json`` and what belongs to them, or the folder of a report.
-    rerun : whether everything is computed again from the inputs.
-    trust : files and folders of certificates that are trusted; ``None`` for nobody, and then nothing need be signed.
-    schema : folder with PTB's schemas, that the digital certificate is held to as well.
-    compute : the second computation of a machine's certificate; as ``report`` and ``diagnose`` do where none is given.
-    stage : told of progress.
-
-    Raises
-    ------
-    CmmUqError : a file cannot be read, is hostile, or nothing of a certificate.
+    ``None`` for nobody, and then nothing need be signed.
     """
     trusted = None if trust is None else tuple(trust)
 

@@ -19,16 +19,13 @@ if TYPE_CHECKING:
     from cmm_uq.certificate.verify.again import Again
     from cmm_uq.jobs.job import Job
 
-Compute = Callable[["Given", "Job"], "Again"]
-"""The second computation: of the job that is inside a certificate."""
+Compute = Callable[["Given", "Job"], "Again"]  # the second computation: of the job that is inside a certificate
 
 
 def compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) -> bool:
     """Compute everything from the inputs, by this version, and keep what differs.
 
-    Returns
-    -------
-    whether the documents are the same to the byte.
+    Gives whether the documents are the same to the byte.
     """
     if given.results is None:
         return False
@@ -49,12 +46,7 @@ def compute_again(inquiry: Inquiry, given: Given, job: Job, compute: Compute) ->
 
 
 def again(given: Given, job: Job, stage: Stage = lambda what, part: None) -> Again:
-    """What the inputs of a certificate give.
-
-    Raises
-    ------
-    CmmUqError : nothing.
-    """
+    """What the inputs of a certificate give."""
     from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS
     from cmm_uq.app.commands.diagnose import DIAGNOSE, diagnosis_outcome
     from cmm_uq.app.commands.report import REPORT, report_outcome

@@ -68,10 +68,7 @@ def _compute_again(inquiry: Inquiry, given: Given, job: PartJob, trust: Iterable
 def compare_part(inquiry: Inquiry, given: Given, *, rerun: bool, trust: Iterable[Path] | None) -> PartJob | None:
     """Figures, decisions, inputs and the machine's certificate of a part's report; its job, where the inputs are sound.
 
-    Parameters
-    ----------
-    rerun : whether the machine's certificate is computed again.
-    trust : files and folders of certificates that are trusted; ``None`` for nobody.
+    ``None`` for nobody.
     """
     if given.results is None:
         return None
@@ -121,12 +118,7 @@ def _without_feet(given: Given) -> str:
 
 
 def part_job(inputs: Mapping[str, bytes], data: Mapping[str, Any]) -> PartJob:
-    """The job of the inputs of a part's report, with those of the machine's job where that was analysed.
-
-    Raises
-    ------
-    CmmUqError : they are no job of a part.
-    """
+    """The job of the inputs of a part's report, with those of the machine's job where that was analysed."""
     language = language_of(data)
     stated = {name: content for name, content in inputs.items() if name != HISTORY}
     own = {name: content for name, content in stated.items() if not name.startswith(CALIBRATION)}
@@ -217,15 +209,6 @@ def part_again(
     """Files that the inputs of a part's report give, by name, and which of them are not inside the PDF.
 
     ``None`` where that cannot be known, with the reason kept.
-
-    Parameters
-    ----------
-    data : of results.json.
-    finished : what becomes of a document before the next is made of it.
-
-    Raises
-    ------
-    CmmUqError : they give nothing.
     """
     said, simulation = data["machine"], data["simulation"]
     held = bool(said["signatures_held_to_trusted"])

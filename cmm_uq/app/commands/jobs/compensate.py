@@ -31,16 +31,11 @@ from cmm_uq.machine.physics.kinematics import euler_313
 from cmm_uq.machine.physics.map_interpolation import Beyond, ErrorMaps
 from cmm_uq.machine.physics.point_cloud import cloud_files, cloud_header, transform_cloud
 
-PROVENANCE = "compensation.json"
-"""How the coordinates were corrected, in the folder of a compensated job."""
+PROVENANCE = "compensation.json"  # how the coordinates were corrected, in the folder of a compensated job
 
 
 def compensate_job(job: Job, *, beyond: Beyond = "refuse") -> tuple[Points, dict[str, object]]:
-    """The recording of a job at the coordinates that its error maps make of it, and how it came about.
-
-    job : with ``[machine] error_map``.
-    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
-    """
+    """The recording of a job at the coordinates that its error maps make of it, and how it came about."""
     maps = maps_of(job)
     refuse_planned(job)
     if not job.facts.artefact.with_recording:
@@ -73,11 +68,7 @@ def write_compensated(
 
 
 def compensated_job(job: Job, *, beyond: Beyond = "refuse") -> Job:
-    """The job that :func:`write_compensated` writes, in memory.
-
-    job : with ``[machine] error_map``.
-    beyond : ``refuse`` points outside the maps, or extrapolate and flag them.
-    """
+    """The job that :func:`write_compensated` writes, in memory."""
     _refuse(job)
     return job_of(_files(job, beyond, {}))
 
@@ -143,8 +134,7 @@ def _of_the_log(points: Points, log: TemperatureLog | None) -> dict[str, object]
     }
 
 
-FORMS = (".csv", ".npy", ".parquet")
-"""Endings of what is read and written; a folder of ``.npy`` files becomes one."""
+FORMS = (".csv", ".npy", ".parquet")  # endings of what is read and written; a folder of ``.npy`` files becomes one
 
 
 def write_compensated_cloud(

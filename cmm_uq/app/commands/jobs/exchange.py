@@ -29,10 +29,7 @@ _MARK = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*")
 
 @naming_package()
 def read_export(path: Path, keys: ImportKeys | None = None) -> ImportedTable:
-    """A file in any format that is known.
-
-    keys : what it leaves open.
-    """
+    """A file in any format that is known."""
     content = content_of(path, TABLE_BYTES, "Check its name")
     found = imported(content, str(path), keys or ImportKeys())
     points_of(found.columns, found.lines.tolist(), str(path), Machine())  # refused as a job refuses it
@@ -53,12 +50,7 @@ def own_format(found: ImportedTable) -> bytes:
 
 
 def write_recording(path: Path, found: ImportedTable, out: Path) -> None:
-    """Write a recording in the project's own format, whole or not at all, and over nothing.
-
-    path : of the export; a first line that says what a recording was made by is kept.
-    found : what was read of it.
-    out : to write to.
-    """
+    """Write a recording in the project's own format, whole or not at all, and over nothing."""
     mark = _MARK.match(content_of(path, TABLE_BYTES, "Check its name"))
     content = (mark[0].removeprefix(b"\xef\xbb\xbf") if mark else b"") + own_format(found)
     write_new(out, content)
@@ -72,10 +64,7 @@ def write_job_of_export(
 
     Nothing is made up: artefact, limits and travel are those that are given, whatever a new job of the kind would begin with.
 
-    kind : of measurement.
     folder : that does not exist, or is empty.
-    given : what job.toml is to say, by table and key; the machine's name at least.
-    keys : what the export leaves open.
     """
     from cmm_uq.app.commands.jobs.new import check_empty, job_id, job_of_export
     from cmm_uq.base.output import Owner, staged
@@ -97,11 +86,7 @@ _FIX = "Name the results.json of a report, or the folder it lies in"
 
 
 def write_qif(report: Path, out: Path | None = None) -> Path:
-    """Write the results of a report as QIF.
-
-    report : its results.json, or the folder it lies in.
-    out : file to write, ``<job id>.qif`` by default.
-    """
+    """Write the results of a report as QIF."""
     path = report / RESULTS if report.is_dir() else report
     found = read_results(
         ReportResults, content_of(path, TABLE_BYTES, _FIX), str(path), "is no results.json of a report", _FIX
@@ -115,7 +100,6 @@ def write_qif(report: Path, out: Path | None = None) -> Path:
 def read_certificate(file: Path, schema: Path | None = None) -> Certificate:
     """The certificate of a file.
 
-    file : XML.
     schema : folder of the schemas; ``None`` for our own checks alone.
     """
     content = content_of(file, DCC_BYTES, "Name a digital calibration certificate (.xml)")

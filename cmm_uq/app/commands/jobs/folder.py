@@ -19,12 +19,8 @@ from cmm_uq.jobs.tables.origin import EXAMPLE, SIMULATED
 from cmm_uq.machine.model.kind import Kind
 
 RECORDING, SCHEMA, README = "recording.csv", ".cmm-uq/job.schema.json", "README.md"
-KEPT = (SCHEMA, README)
-"""Files beside those of the job itself."""
-
-PLAN, BUDGET = "plan", "budget"
-"""Names beside those of kinds."""
-
+KEPT = (SCHEMA, README)  # files beside those of the job itself
+PLAN, BUDGET = "plan", "budget"  # names beside those of kinds
 Tables = Mapping[str, Mapping[str, Any]]
 
 
@@ -32,14 +28,7 @@ def job_files(
     kind: str, tables: Tables, files: Mapping[str, bytes], examples: Collection[str] = (), *,
     begin: Beginning | None = None,
 ) -> dict[str, bytes]:  # fmt: skip
-    """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next.
-
-    kind : of measurement.
-    tables : what job.toml says.
-    files : the recording that it names, and other files.
-    examples : dotted keys whose figures are an example's; a measured recording is refused beside them.
-    begin : what the job begins with, if not what its kind does.
-    """
+    """A job's folder around a recording: job.toml with every other key as a comment, its schema, and what to do next."""
     found = kind_or_refused(kind)
     job = read_new(found, tables, files)
     begin = found.beginning(kind) if begin is None else begin

@@ -49,8 +49,7 @@ __all__ = [
     "new_job", "new_plan", "titles", "usual", "write_new",
 ]  # fmt: skip
 
-SEED = 1
-"""Of the simulated readings."""
+SEED = 1  # of the simulated readings
 
 
 def known() -> dict[str, str]:
@@ -82,11 +81,7 @@ def usual(name: str) -> dict[str, Any]:
 
 @naming_package()
 def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
-    """Contents of every file of a new job, by name.
-
-    name : of the kind, or of a further way of it, such as ``shift_plate``.
-    given : what job.toml is to say, by table and key, in place of what the kind begins with.
-    """
+    """Contents of every file of a new job, by name."""
     kind, begin = _begun(name)
     tables = _tables(kind, begin, given, id)
     if begin.files is not None:
@@ -104,12 +99,7 @@ def new_job(name: str, given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: 
 
 
 def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: str) -> dict[str, bytes]:  # noqa: A002
-    """A new job of a recording that was measured: nothing of machine, artefact and limits but what is given.
-
-    kind : of measurement, or a further name of it.
-    given : what job.toml is to say, by table and key.
-    files : the recording that it names, and other files.
-    """
+    """A new job of a recording that was measured: nothing of machine, artefact and limits but what is given."""
     found, begin = _begun(kind)
     if "date" not in given.get("job", {}):
         raise CmmUqError("an export does not say when it was measured", where="[job] date",
@@ -121,10 +111,7 @@ def job_of_export(kind: str, given: Tables, files: Mapping[str, bytes], *, id: s
 
 @naming_package()
 def new_plan(given: Tables, *, id: str) -> dict[str, bytes]:  # noqa: A002
-    """Contents of every file of a job that is only planned: nothing is recorded.
-
-    given : what job.toml is to say; its kind is ``artefact.kind``, a ballbar by default.
-    """
+    """Contents of every file of a job that is only planned: nothing is recorded."""
     name = str(given.get("artefact", {}).get("kind", "ballbar"))
     kind, begin = _begun(name)
     if kind.plan is None:
@@ -140,11 +127,7 @@ def write_new(
 ) -> dict[str, Path]:
     """Write the folder of a new job, of a part or of a new budget; never over anything.
 
-    name : see :func:`known`, or :data:`PLAN`, :data:`PART` or :data:`BUDGET`.
     folder : that does not exist, or is empty.
-    given : see :func:`new_job`.
-    drawing : QIF plan or DMIS program that a part begins from.
-    answers : what the user described of a part.
     """
     check_empty(folder)
     id = job_id(folder, given, name)  # noqa: A001

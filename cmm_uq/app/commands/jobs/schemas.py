@@ -55,14 +55,12 @@ def budget() -> Schema:
 
 
 def part() -> Schema:
-    """Of the job of a part."""
     from cmm_uq.jobs.part.tables import PartFile
 
     return schema_of(PartFile, "job.toml of a part, for cmm-uq")
 
 
 def instrument() -> Schema:
-    """Of the profile of an instrument."""
     return schema_of(ProfileFile, "instrument profile of cmm-uq")
 
 
@@ -99,5 +97,4 @@ def shipped(name: str) -> str:
 
 
 def as_text(schema: Mapping[str, Any]) -> str:
-    """As it is written."""
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"

@@ -34,21 +34,14 @@ from cmm_uq.machine.model.artefact import Artefact
 from cmm_uq.machine.physics.catalogue import effects
 from cmm_uq.machine.physics.effect import Effect
 
-TRUTH = "truth.toml"
-"""Name of the truth in the folder of a simulated job."""
-
+TRUTH = "truth.toml"  # name of the truth in the folder of a simulated job
 _TRUTH_GIVES = "It gives the effects, the noise and the seed"
 _FIX = "Give effects, sizes and noise that a machine can have"
 
 
 @naming_package()
 def simulate(job: Job, truth: Truth, *, seed: int | None = None, truth_path: str = TRUTH) -> Points:
-    """The points of a recording with the placings of the job's own.
-
-    job : its recording gives the placings and the columns.
-    truth : what acts.
-    truth_path : file that it was read from, for messages.
-    """
+    """The points of a recording with the placings of the job's own."""
     columns = {name: np.full(len(job.points), value) for name, value in truth.columns.items()}
     points = replace(job.points, columns={**job.points.columns, **columns})
     observe = kind_of(job).observing("simulated")
@@ -115,11 +108,7 @@ def write_simulation(
 
 
 def simulated_job(job: Job, truth: Path | Mapping[str, Any], *, seed: int | None = None) -> Job:
-    """The job that :func:`write_simulation` writes, in memory.
-
-    job : whose recording gives the placings and the columns.
-    truth : what acts, as the path of a ``truth.toml``, or as what such a file says.
-    """
+    """The job that :func:`write_simulation` writes, in memory."""
     kind_of(job).observing("simulated")
     if isinstance(truth, Path):
         return job_of(_files(job, content_of(truth, JOB_BYTES, _TRUTH_GIVES), truth, seed))

@@ -131,11 +131,8 @@ class Batch:
         }  # fmt: skip
 
 
-WRITERS = 4
-"""Threads that write: most of the time each waits until the disk has what it was given."""
-
-_AHEAD = 2
-"""Reports for each of them that may wait."""
+WRITERS = 4  # threads that write: most of the time each waits until the disk has what it was given
+_AHEAD = 2  # reports for each of them that may wait
 
 _NO_ROOM = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO})
 """What the system says where no other job could be written either."""
@@ -280,9 +277,8 @@ def write_batch(
 ) -> Batch:  # fmt: skip
     """Report every job in folders and below them, as :func:`~cmm_uq.app.commands.report.write_report` reports one.
 
-    ``out``: folder in which each job has one of its id; ``reports`` by default; ``records``: that reports are
-    recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside them.
-    Gives what came of it; a job that fails never stops the others.
+    ``records``: that reports are recorded in: file, URL, ``none``, or ``None`` for those of the environment, else beside
+    them. Gives what came of it; a job that fails never stops the others.
     """
     how, tell, place = asked or BatchOptions(), stage or silent, out or REPORTS
     if parquet is not None:

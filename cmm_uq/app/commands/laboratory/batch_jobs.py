@@ -82,7 +82,6 @@ class BatchOutput:
         return self.out / job.facts.job.id
 
     def names(self, job: Job) -> list[str]:
-        """Of the files that are certain to be written."""
         return [RESULTS] if self.results_only else [*REPORT.names(job), RESULTS]
 
     def check(self, job: Job) -> None:

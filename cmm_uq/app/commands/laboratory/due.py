@@ -61,10 +61,7 @@ def read_fleet(file: Path | None) -> FleetFile:
 
 
 SCHEMA = "cmm-uq/due/1"
-
-WITHIN = dt.timedelta(days=90)
-"""How far ahead something is due and no longer later, where nothing is said."""
-
+WITHIN = dt.timedelta(days=90)  # how far ahead something is due and no longer later, where nothing is said
 FILES = ("due.html", "due.json")
 
 
@@ -107,13 +104,7 @@ def what_is_due(
     within: dt.timedelta | None = None,
     fleet: Path | None = None,
 ) -> WhatIsDue:
-    """What is due for calibration when, and why.
-
-    ``where``: the records; see :func:`cmm_uq.laboratory.records.open_records`; ``machines``: serials or names; all
-    machines and all artefacts where none is named; ``on``: the day asked about; today where nothing is said;
-    ``within``: only what is due that soon, or cannot be dated; everything where nothing is said; ``fleet``:
-    ``fleet.json`` of the fleet that the drift model is to take as prior; its default one where nothing is said.
-    """
+    """What is due for calibration when, and why."""
     day = on or dt.datetime.now().astimezone().date()
     learnt = read_fleet(fleet)
     with open_records(where, read_only=True) as records:

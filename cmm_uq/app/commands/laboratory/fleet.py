@@ -24,11 +24,7 @@ FILES = ("fleet.html", "fleet.json", "fleet.csv")
 def fleet(
     where: str | Path | None = None, names: Collection[str] = (), *, seed: int = 1, stage: Stage = silent
 ) -> FleetResult:
-    """Learn what drift is usual for the machines of the records, and which of them do not belong.
-
-    ``where``: the records; see :func:`cmm_uq.laboratory.records.open_records`; ``names``: of values, such as
-    ``scale_x.ppm``; all for which a limit is recorded where none is named, or all if none has one.
-    """
+    """Learn what drift is usual for the machines of the records, and which of them do not belong."""
     with open_records(where, read_only=True) as records:
         frame = records.all_series(names or None)
         adjusted = {one.serial: one.adjusted[-1].toordinal() for one in records.machines() if one.adjusted}

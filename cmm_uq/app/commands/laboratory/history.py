@@ -16,11 +16,7 @@ FILES = ("history.html", "history.json")
 def history_of(
     machine: str, where: str | Path | None = None, *, on: dt.date | None = None, fleet: Path | None = None
 ) -> MachineHistory:
-    """The history of a machine.
-
-    ``where``: the records; see :func:`cmm_uq.laboratory.records.open_records`; ``on``: up to which day; today where
-    nothing is said.
-    """
+    """The history of a machine."""
     day = on or dt.datetime.now().astimezone().date()
     learnt = read_fleet(fleet)
     with open_records(where, read_only=True) as records:

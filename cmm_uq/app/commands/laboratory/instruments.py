@@ -28,9 +28,7 @@ def ready_profiles() -> list[tuple[str, str, str]]:
 def declared(what: str, port: str, job: Path | None) -> tuple[DeclaredSource, Path]:
     """The source that is meant, and the folder that its files lie in.
 
-    what : a profile, or the name of a source where a job is given.
     port : at which it is; empty where the job says it.
-    job : folder.
     """
     if job is None:
         name = re.sub(r"[^A-Za-z0-9._-]", "_", Path(what).name.removesuffix(ENDING))
@@ -86,7 +84,6 @@ def write_profile(out: Path, wanted: ProfileDraft) -> None:
 def simulated_instrument(profile: str, way: str) -> Iterator[str]:
     """A simulated instrument, at the port that is given, until it is left.
 
-    profile : a ready one.
     way : ``pty``, ``socket`` or ``rfc2217``; empty for the usual one.
     """
     from cmm_uq.laboratory.live.instruments.simulated_line import WAYS, simulated

@@ -149,11 +149,7 @@ class Retained:
 
 
 def retention(records: Records, keep_years: int, today: dt.date) -> Retained:
-    """Certificates and diagnoses that are older, with the files of them that are as they were written.
-
-    ``keep_years``: how many years files are kept after the day of the measurement; ``today``: the day from which
-    years are counted.
-    """
+    """Certificates and diagnoses that are older, with the files of them that are as they were written."""
     try:
         before = today.replace(year=today.year - keep_years)
     except ValueError:

@@ -107,11 +107,7 @@ def ready_files(
     scheduler: str, folders: Sequence[Path], schedule: Path | None = None, *, at: str = "06:15", days: str = "",
     system: str = sys.platform,
 ) -> dict[str, str]:  # fmt: skip
-    """Files for what starts a scheduled run, by name.
-
-    ``schedule``: the file; by default ``schedule.toml`` in the first folder; ``at``: time of day, as 06:15; ``days``:
-    of the week, as MON,THU; every day by default.
-    """
+    """Files for what starts a scheduled run, by name."""
     if scheduler not in READY:
         raise CmmUqError(f"there is no scheduler {scheduler!r}", fix=suggestion(scheduler, READY))
     for folder in folders:

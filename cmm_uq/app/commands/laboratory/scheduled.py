@@ -48,10 +48,7 @@ def opened(place: str | Path | None, *, dry: bool) -> Iterator[Records | None]:
 
 
 def due_notices(records: Records | None, on: dt.date, within: dt.timedelta) -> Iterable[Notice]:
-    """What is to be calibrated soon, or should have been.
-
-    ``records``: that say so; nothing is due without them; ``within``: how long before its day something is told.
-    """
+    """What is to be calibrated soon, or should have been."""
     if records is None:
         return
     _check_clock(records, on)
@@ -88,9 +85,7 @@ def _check_clock(records: Records, on: dt.date) -> None:
 
 
 Tell = Callable[[dict[str, Any]], None]
-
-_RUN = "the run"
-"""What an error is about that ends all of it."""
+_RUN = "the run"  # what an error is about that ends all of it
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,7 @@ from cmm_uq.certificate.origin import program
 from cmm_uq.certificate.plots.plans import gain_plot, placing_pictures
 from cmm_uq.maths.inference.linear_model import Unknown
 
-SHOWN = 6
-"""Repeats in the table; results.json has all that are compared."""
-
+SHOWN = 6  # repeats in the table; results.json has all that are compared
 _PRIOR = say("not known: averaged over the prior")
 
 

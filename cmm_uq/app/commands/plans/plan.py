@@ -34,10 +34,7 @@ PLAN = Form("plan", ("plan.html",), "plan", (TO_FILL_IN,))
 
 @naming_package()
 def plan_outcome(job: Job, *, power: bool = True, seed: int = 0, stage: Stage = silent) -> Outcome:
-    """Plan a job that was read, whose recording may be missing; nothing is written.
-
-    power : whether to predict what the diagnosis would find, which takes most of the time.
-    """
+    """Plan a job that was read, whose recording may be missing; nothing is written."""
     from cmm_uq.app.commands.plans.planning import make_plan
 
     plan = make_plan(job, power=power, seed=seed, progress=stage)
@@ -67,9 +64,6 @@ def write_plan(
 
     ``plan.csv`` has the columns of a recording of the artefact, at nominal coordinates; it is left out where nothing is left
     to measure.
-
-    job : the job folder; its recording may be missing.
-    power : whether to predict what the diagnosis would find, which takes most of the time.
     """
     read, tell = in_language(read_job(job, recorded=False), language), stage or silent
     return PLAN.write(

@@ -35,12 +35,7 @@ _NANOMETRE = 1e-6
 
 
 def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded: int) -> tuple[Condition, ...]:
-    """Conditions of the standard that a ready plan is named after, and of all that the job wishes to be decided.
-
-    name : of the plan.
-    points : of everything that will have been measured.
-    recorded : how many of them were, the first ones; of these copies do not count.
-    """
+    """Conditions of the standard that a ready plan is named after, and of all that the job wishes to be decided."""
     if setting.observe is None:
         return ()
     points = _no_copies(points, recorded)
@@ -62,11 +57,7 @@ def of_standards(job: Job, setting: Setting, name: str, points: Points, recorded
 def completing(
     job: Job, setting: Setting, recorded: Points, after: Callable[[Sequence[SetUp]], Points]
 ) -> tuple[SetUp, ...]:  # fmt: skip
-    """Placings of the usual ready plan of which each supplies something that the standards' tests still lack.
-
-    recorded : what was measured.
-    after : the recording with further placings.
-    """
+    """Placings of the usual ready plan of which each supplies something that the standards' tests still lack."""
     if not job.facts.conformity:
         return ()
 
@@ -95,8 +86,7 @@ def _no_copies(points: Points, recorded: int) -> Points:
     return points.at(xyz)
 
 
-RECORDED = say("recording")
-"""Name of the placings of a recording that is there already."""
+RECORDED = say("recording")  # name of the placings of a recording that is there already
 
 SPREAD = say("an even spread of candidates")
 """Name of the placings to compare with where the usual plan is not possible."""
@@ -181,11 +171,7 @@ def minutes(setting: Setting, placing: SetUp) -> float:
 
 @refusing_overflow("job.toml", OVERFLOW_FIX)
 def make_plan(job: Job, *, power: bool = True, seed: int = 0, progress: Progress | None = None) -> MeasurementPlan:
-    """Plan a job.
-
-    job : with or without a recording.
-    power : whether to predict what the diagnosis would find.
-    """
+    """Plan a job."""
     tell = progress or (lambda what, part: None)
     tell("Finding what the placings determine", 0.05)
     refuse_planned(job)

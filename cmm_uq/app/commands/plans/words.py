@@ -151,7 +151,6 @@ def absorbed(found: Identifiability) -> list[Text]:
 
 
 def base_name(plan: MeasurementPlan) -> Text:
-    """Of the placings to start from."""
     count = len(plan.start.placings)
     return (
         say("the recording ({count} placings)", count=count)
