@@ -29,7 +29,7 @@ READ = {
     "cmm_uq/app/commands/parts/new.py": {"now"},
     "cmm_uq/laboratory/live/instruments/source.py": {"time_ns"},
     "cmm_uq/laboratory/live/instruments/simulated_line.py": {"monotonic"},
-    "cmm_uq/laboratory/records/entries.py": {"now"}, "cmm_uq/app/cli/laboratory/records.py": {"now"},
+    "cmm_uq/laboratory/records/entries.py": {"now"}, "cmm_uq/app/cli/records.py": {"now"},
     "cmm_uq/app/commands/laboratory/due.py": {"now"}, "cmm_uq/app/commands/laboratory/history.py": {"now"},
     "cmm_uq/app/commands/laboratory/schedule.py": {"now"}, "cmm_uq/app/commands/laboratory/scheduled.py": {"now"},
     "cmm_uq/laboratory/schedule/run.py": {"now"}, "cmm_uq/laboratory/schedule/outbox.py": {"now", "time"},

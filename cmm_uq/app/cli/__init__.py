@@ -11,6 +11,7 @@ import gc
 import os
 import sys
 import warnings
+from types import ModuleType
 
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Matrices here are small: more threads cost more than they gain, and how many there are would show in the last digits."""
@@ -21,7 +22,6 @@ NEW_OBJECTS = 1_000_000
 
 def main() -> None:
     """Run the command; whatever happens ends with one line and a documented exit code, never with a traceback."""
-    from cmm_uq.app.cli.lighter import lighten
     from cmm_uq.app.cli.terminal import NO_OUTPUT, any_character, closed, tell
     from cmm_uq.base.output.interruption import done, watch
 
@@ -44,6 +44,13 @@ def main() -> None:
     done()
     gc.freeze()  # or Python looks through all that there is before it ends, for a tenth of a report
     sys.exit(code)
+
+
+def lighten() -> None:
+    """Let ``scipy.stats`` be: an empty module for the sampler's move that needs it, in the command's own process alone."""
+    empty = ModuleType("emcee.moves.kde")
+    empty.__dict__["KDEMove"] = None
+    sys.modules.setdefault(empty.__name__, empty)
 
 
 def run_command() -> int:

@@ -1,4 +1,4 @@
-"""``cmm-uq release``, ``affected``, ``read``, ``qif``, ``keys``, ``standards``, ``schema``: certificates and files."""
+"""``cmm-uq verify``, ``sign``, ``release``, ``affected``, ``read``, ``qif``, ``keys``, ``standards``, ``schema``."""
 
 from __future__ import annotations
 
@@ -7,23 +7,106 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.options import (
-    Json,
-    Quiet,
-    Records,
-    Verbose,
-    argument,
-    ask_secret,
-    examples,
-    flag,
-    option,
-)
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, can_answer, helped, progress, put, put_data, put_json, say
+from cmm_uq.app.cli import options as opt, terminal
+from cmm_uq.app.cli.options import argument, examples, flag, option
+from cmm_uq.app.cli.terminal import progress, put, put_data, put_json, say
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
-    from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange, Figures
-    from cmm_uq.jobs.dcc.shown import CertificateView as Shown, Grid
+    from cmm_uq.app.commands.certificates.affected import AffectedCertificate, FigureChange
+    from cmm_uq.app.commands.certificates.verification import Verification
+    from cmm_uq.jobs.dcc.shown import CertificateView, Grid
+
+
+FINDINGS_SHOWN = 20  # findings of a verification that are told one by one
+
+
+def verify(
+    files: Annotated[
+        list[Path],
+        argument(
+            "PDF, XML, HTML, results.json of one certificate, in any choice, or the folder of its report.", "FILE…"
+        ),
+    ],
+    rerun: Annotated[bool, flag("--rerun/--no-rerun", "Compute everything again from the inputs, and compare.")] = True,
+    trust: Annotated[
+        list[Path] | None,
+        option("Certificates that you trust, PEM or DER: a file or a folder; again for more.", "FILE|DIR", "nobody"),
+    ] = None,
+    schema: Annotated[
+        Path | None, option("Folder with PTB's schemas of the DCC, that the XML is held to.", "DIR", "none")
+    ] = None,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+) -> None:
+    """Compare the forms of a certificate with each other, its figures, decisions and inputs, and compute it again.
+
+    Exit code 0 where it is verified, 1 where something is wrong, 3 where nothing is but not all could be checked, 2 where a
+    file cannot be read.
+    """
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.certificates.verify import verify
+
+        found = verify(files, rerun=rerun, trust=trust or None, schema=schema, stage=stage or (lambda what, part: None))
+    inquiry = found.inquiry
+    if json:
+        put_data({"schema": "cmm-uq/verification/1", "subject": found.subject, **inquiry.as_data()})
+    elif not quiet:
+        _show_verification(found, verbose=verbose)
+    if inquiry.findings:
+        raise typer.Exit(terminal.NOT_VERIFIED)
+    if inquiry.unchecked:
+        raise typer.Exit(terminal.NOT_WHOLLY_CHECKED)
+
+
+def _show_verification(found: Verification, *, verbose: bool) -> None:
+    from cmm_uq.certificate.verify.found import CHECKS
+
+    inquiry = found.inquiry
+    shown = inquiry.findings if verbose else inquiry.findings[:FINDINGS_SHOWN]
+    lines = [f"{inquiry.word}  {found.subject}", *(f"  {one}" for one in shown)]
+    if more := len(inquiry.findings) - len(shown):
+        lines.append(f"  and {more} more: --verbose shows all")
+    lines += [f"  not checked: {left}" for left in inquiry.unchecked]
+    for name, what in CHECKS.items():
+        wrong = any(one.check == name for one in inquiry.findings)
+        count = inquiry.done.get(name, 0)
+        if wrong or count:
+            lines.append(f"  {name:<10}  {'✗' if wrong else '✓'}  {what} ({count})")
+    for line in [*lines, *(f"  {note}" for note in inquiry.notes)]:
+        say(printable(line))
+
+
+def sign(
+    files: Annotated[list[Path], argument("certificate.pdf, certificate.xml.", "FILE...")],
+    key: opt.Key,
+    time_server: opt.TimeServer = None,
+    level: opt.Level = None,
+    trust: opt.Trusted = None,
+    out: Annotated[Path | None, option("Folder for signed copies.", "DIR", "signed where they are")] = None,
+    records: opt.Records = None,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
+) -> None:
+    """Sign certificates, so that four eyes may look at them first: PDF by PAdES, XML by XAdES B-B.
+
+    The set in their folder is written anew, all or none, and records that know the certificate are told.
+    """
+    signing = opt.open_key(key, time_server, level, trust)
+    from cmm_uq.app.commands.certificates.sign import sign_files
+
+    done = sign_files(files, signing, out=out, records=records)
+    if json:
+        put_data({
+            "signer": signing.signer.name, "test_key": signing.signer.test_key, "at": signing.at.isoformat(),
+            "level": "B-B" if signing.stamping is None else signing.stamping.level,
+            "files": [str(path) for path in done.files], "records": done.records,
+        })  # fmt: skip
+    elif not quiet:
+        if done.records:
+            say(printable(f"Recorded in {done.records}."))
+        opt.show_signatures(signing, done.files)
 
 
 def release(
@@ -37,9 +120,9 @@ def release(
     replaced_by: Annotated[
         str | None, option("Released certificate that takes its place.", "CERTIFICATE", "none")
     ] = None,
-    records: Records = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    records: opt.Records = None,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Release a certificate: until then it is a draft. By two persons where [laboratory] four_eyes = true.
 
@@ -56,7 +139,7 @@ def release(
         if withdraw or replaced_by is not None:
             done = releases.withdraw(history, certificate, by=by, reason=reason, replaced_by=replaced_by)
         else:
-            ask = _ask_why if not (quiet or json) and can_answer() else None
+            ask = _ask_why if not (quiet or json) and terminal.can_answer() else None
             done = releases.release(history, certificate, by=by, reason=reason, despite=despite, ask=ask)
         signatures = history.signatures(done.certificate.entry)
     now = done.certificate
@@ -86,10 +169,10 @@ def affected(
     to: Annotated[str | None, option("Version that has the corrections.", "B", "the installed one", "--to")] = None,
     only_list: Annotated[bool, flag("--list", "Only list them; compute nothing again.")] = False,
     write: Annotated[Path | None, option("Folder for a draft in place of each that changed.", "DIR", "none")] = None,
-    records: Records = None,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
+    records: opt.Records = None,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
 ) -> None:
     """Find the certificates that corrections touch, compute them again from the inputs in their PDF, compare figure by figure.
 
@@ -117,7 +200,7 @@ def affected(
         touched = "1 certificate touched" if count == 1 else f"{count} certificates touched"
         say(touched if only_list else f"{touched}, {sum(one.changed for one in certificates)} changed")
     if any(one.changed or (one.problem and not only_list) for one in certificates):
-        raise typer.Exit(NOT_CONFORMING)
+        raise typer.Exit(terminal.NOT_CONFORMING)
 
 
 def _show_affected(one: AffectedCertificate) -> None:
@@ -137,18 +220,12 @@ def _show_affected(one: AffectedCertificate) -> None:
 
 
 def _change(change: FigureChange) -> str:
-    before, after = (_figure(figures, change.unit) for figures in (change.before, change.after))
-    if before == after and change.before is not None and change.after is not None:
-        before, after = (
-            f"95 % interval {figures[2]:.10g} to {figures[3]:.10g} {change.unit}"
-            for figures in (change.before, change.after)
-        )
-    return f"{before} -> {after}"
-
-
-def _figure(figures: Figures | None, unit: str) -> str:
     """With the ten digits of results.json: fewer would print a small change as none."""
-    return "none" if figures is None else f"{figures[0]:.10g} (u {figures[1]:.10g}) {unit}"
+    pair, unit = (change.before, change.after), change.unit
+    words = ["none" if each is None else f"{each[0]:.10g} (u {each[1]:.10g}) {unit}" for each in pair]
+    if words[0] == words[1]:
+        words = ["none" if each is None else f"95 % interval {each[2]:.10g} to {each[3]:.10g} {unit}" for each in pair]
+    return " -> ".join(words)
 
 
 def _affected_data(one: AffectedCertificate) -> dict[str, Any]:
@@ -173,8 +250,8 @@ def read(
         Path | None,
         option("Folder with the schemas of DCC and D-SI (.xsd), to check the files by as well.", "DIR", "own checks"),
     ] = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Print digital calibration certificates (DCC). Exit code 2 for a file that is none.
 
@@ -192,7 +269,7 @@ def read(
             put(_certificate_text(str(file), shown(one)))
 
 
-def _certificate_text(file: str, certificate: Shown) -> str:
+def _certificate_text(file: str, certificate: CertificateView) -> str:
     lines = [file, *_labels(certificate.rows)]
     for title, rows, grids in certificate.parts:
         lines += ["", title, *_labels(rows)]
@@ -204,25 +281,22 @@ def _certificate_text(file: str, certificate: Shown) -> str:
 def _labels(rows: tuple[tuple[str, str], ...]) -> list[str]:
     """Labels in a column, the lines of a text below each other."""
     width = max((len(label) for label, _ in rows), default=0)
-    return [
-        f"  {'' if number else label:<{width}}  {line}"
-        for label, text in rows
-        for number, line in enumerate(text.splitlines())
-    ]
+    each = ((label, number, line) for label, text in rows for number, line in enumerate(text.splitlines()))
+    return [f"  {'' if number else label:<{width}}  {line}" for label, number, line in each]
 
 
 def _table(grid: Grid) -> list[str]:
     """Columns as wide as their widest cell; a value never breaks."""
     cells = [grid.headings, *grid.rows]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-    head, *rows = ("  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in cells)
-    return [f"  {grid.title}", f"    {head}", *(f"    {row}" for row in rows)]
+    rows = ("  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in cells)
+    return [f"  {grid.title}", *(f"    {row}" for row in rows)]
 
 
 def qif(
     report: Annotated[Path, argument("Folder of a report, or its results.json.", "REPORT")],
     out: Annotated[Path | None, option("File to write.", "FILE", "<job id>.qif")] = None,
-    quiet: Quiet = False,
+    quiet: opt.Quiet = False,
 ) -> None:
     """Write every value that a standard decided on, and the error factors, as QIF 3.0. Nothing is overwritten."""
     from cmm_uq.app.commands.jobs.exchange import write_qif
@@ -232,20 +306,18 @@ def qif(
         say(printable(str(file)))
 
 
-keys = typer.Typer(
-    help="Keys for electronic signatures: a new one for trying. Those that count come from a trust service.",
-    epilog=examples("keys new test.p12 --name 'Calibration laboratory'"),
-    rich_markup_mode=None,
+keys = opt.group(
+    "Keys for electronic signatures: a new one for trying. Those that count come from a trust service.",
+    examples("keys new test.p12 --name 'Calibration laboratory'"),
 )
-keys.callback(invoke_without_command=True)(helped)
 
 
 @keys.command("new", epilog=examples("keys new test.p12 --name 'Calibration laboratory'"))
 def new_key(
     file: Annotated[Path, argument("PKCS#12 file to be made.", "FILE")],
     name: Annotated[str, option("Of whom it is for.", "NAME")] = "cmm-uq",
-    quiet: Quiet = False,
-    json: Json = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Make a test key with its certificate, FILE for signing and FILE.pem for whoever is to trust it.
 
@@ -255,7 +327,7 @@ def new_key(
     from cmm_uq.app.commands.certificates.keys import new_test_key
     from cmm_uq.certificate.sign import TEST_NOTE
 
-    made = new_test_key(file, name, lambda question: ask_secret(question, twice=True))
+    made = new_test_key(file, name, lambda question: opt.ask_secret(question, twice=True))
     if json:
         put_data({"key": str(made.key), "certificate": str(made.certificate), "test_key": True})
     elif not quiet:

@@ -10,8 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli import certificates, diagnose, evaluations, instruments, jobs, part, prove, sign, verify
-from cmm_uq.app.cli.laboratory import acquire, batch, due, fleet, history, records, schedule, serve
+from cmm_uq.app.cli import certificates, evaluations, instruments, jobs, laboratory, part, records, schedule
 from cmm_uq.app.cli.options import examples
 from cmm_uq.app.cli.terminal import BAD_INPUT, say
 from cmm_uq.base.errors import CmmUqError
@@ -48,16 +47,37 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
                  "report --scheduled jobs --dry-run"),
     ),
     "part": (part.command, "The uncertainty of what is measured on a part, and whether it conforms.", part.EXAMPLES),
-    "batch": (batch.command, "The reports of many jobs, by processes or a cluster.", batch.EXAMPLES),
-    "diagnose": (diagnose.command, "What a recording shows that its model leaves out.", diagnose.EXAMPLES),
+    "batch": (
+        laboratory.batch, "The reports of many jobs, by processes or a cluster.",
+        examples("batch jobs/2026", "batch jobs --workers 8 --results-only --parquet values.parquet",
+                 "batch jobs --out /srv/reports --resume --json", "batch jobs --scheduler tcp://head:8786"),
+    ),
+    "diagnose": (
+        evaluations.diagnose, "What a recording shows that its model leaves out.",
+        examples("diagnose examples/iota-1102-20C", "diagnose JOB --against predicted.csv",
+                 "diagnose JOB --strict --quiet"),
+    ),
     "plan": (
         evaluations.plan, "What to measure, and what it will tell.",
         examples("plan examples/plan-ballbar", "plan JOB --no-power", "plan JOB --verbose"),
     ),
-    "prove": (prove.command, "The diagnosis tried on sealed cases with a job's set-ups.", prove.EXAMPLES),
-    "history": (history.command, "Every value of a machine over time, from the records.", history.EXAMPLES),
-    "due": (due.command, "What is due for calibration, when and why, from the records.", due.EXAMPLES),
-    "acquire": (acquire.command, "A recording taken live, led by the plan.", acquire.EXAMPLES),
+    "prove": (
+        evaluations.prove, "The diagnosis tried on sealed cases with a job's set-ups.",
+        examples("prove examples/iota-1102-20C", "prove JOB --cases 400 --workers 8",
+                 "prove examples/plan-ballbar --strict"),
+    ),
+    "history": (
+        laboratory.history, "Every value of a machine over time, from the records.",
+        examples("history 1102", "history 1102 --out DIR", "history 'CMM of hall 3' --on 2026-12-31 --json"),
+    ),
+    "due": (
+        laboratory.due, "What is due for calibration, when and why, from the records.",
+        examples("due", "due --within 90d", "due 1102 --on 2026-12-31 --json", "due --strict --out DIR"),
+    ),
+    "acquire": (
+        laboratory.acquire, "A recording taken live, led by the plan.",
+        examples("acquire JOB", "acquire examples/plan-ballbar --simulate --out trial", "acquire JOB --plain"),
+    ),
     "simulate": (
         jobs.simulate, "A recording drawn from known errors, as a job of its own.",
         examples("simulate JOB --truth truth.toml --out DIR", "simulate JOB --truth truth.toml --out DIR --seed 7"),
@@ -68,15 +88,17 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
                  "compensate JOB --cloud scan.csv --out DIR"),
     ),
     "fleet": (
-        fleet.command, "The drift that is usual for all machines of the records, and who differs.", fleet.EXAMPLES,
+        laboratory.fleet, "The drift that is usual for all machines of the records, and who differs.",
+        examples("fleet", "fleet --name scale_x.ppm --out DIR", "fleet --records lab.db --json"),
     ),
     "budget": (
         evaluations.budget, "The uncertainty of any measurement model in a file.",
         examples("budget model.toml", "budget model.toml --seed 2 --out DIR", "budget model.toml --json --strict"),
     ),
     "verify": (
-        verify.command, "A certificate's files against each other, its figures, and its inputs computed again.",
-        verify.EXAMPLES,
+        certificates.verify, "A certificate's files against each other, its figures, and its inputs computed again.",
+        examples("verify certificate.pdf", "verify reports/iota-1102-20C",
+                 "verify certificate.pdf certificate.html --no-rerun", "verify certificate.pdf --trust roots --json"),
     ),
     "release": (
         certificates.release, "A certificate released, withdrawn or replaced.",
@@ -93,13 +115,22 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, str]] = {
         certificates.read, "A digital calibration certificate (DCC), printed.",
         examples("read certificate.xml", "read ball-plate.xml --json", "read certificate.xml --schema schemas"),
     ),
-    "sign": (sign.command, "A certificate signed electronically: PDF and XML.", sign.EXAMPLES),
+    "sign": (
+        certificates.sign, "A certificate signed electronically: PDF and XML.",
+        examples(
+            "sign reports/K-2026-104/certificate.pdf --key laboratory.p12",
+            "sign certificate.pdf certificate.xml --key laboratory.p12 --time-server https://stamps.example/ --out signed",
+        ),
+    ),
     "affected": (
         certificates.affected, "Which certificates a correction of the package touches.",
         examples("affected --version 0.4.0", "affected --version 0.4.0 --list --json",
                  "affected --version 0.4.0 --write replacements"),
     ),
-    "serve": (serve.command, "The records to look at, in a browser.", serve.EXAMPLES),
+    "serve": (
+        laboratory.serve, "The records to look at, in a browser.",
+        examples("serve", "serve --records lab.db --open", "serve --records postgresql://lab@db/records --port 9000"),
+    ),
     "standards": (
         certificates.standards, "The standards that are decided, clause by clause, and forms to check them by.",
         examples("standards", 'standards "ISO 10360-2:2009"',

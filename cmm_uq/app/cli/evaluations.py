@@ -1,7 +1,8 @@
-"""``cmm-uq report``, ``plan``, ``budget`` and ``selftest``: recordings, plans and measurement models evaluated."""
+"""``cmm-uq report``, ``diagnose``, ``plan``, ``prove``, ``budget`` and ``selftest``: all that is evaluated."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -9,40 +10,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cmm_uq.app.cli import options as opt
 from cmm_uq.app.cli.jobs import show_imported
-from cmm_uq.app.cli.options import (
-    Force,
-    Json,
-    Language,
-    Level,
-    Quiet,
-    Records,
-    Seed,
-    Settled,
-    Sign,
-    Strict,
-    TimeServer,
-    Trusted,
-    Verbose,
-    argument,
-    flag,
-    job_folder,
-    open_key,
-    option,
-    out,
-    show_signatures,
-    toml_files,
-)
+from cmm_uq.app.cli.options import argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude, screen_layout, show_summary
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, put_json, show
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, progress, put_data, put_json, say, show
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import ENGLISH
 
 if TYPE_CHECKING:
-    from cmm_uq.base.messages import Text
-    from cmm_uq.certificate.wording import Headline as Verdict, Summary
+    from cmm_uq.certificate.wording import Summary
     from cmm_uq.maths.uncertainty.evaluation import Evaluation
-    from cmm_uq.maths.uncertainty.reference.selftest import SelfTestResult as Outcome
+    from cmm_uq.maths.uncertainty.reference.selftest import SelfTestResult
 
 
 def report(
@@ -52,26 +31,24 @@ def report(
             "Job folder: job.toml and the recording that it names; with --scheduled folders that hold job folders."
         ),
     ],
-    out: Annotated[Path | None, out("reports/<job id>")] = None,
-    seed: Seed = 0,
-    force: Force = False,
-    strict: Strict = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
-    language: Language = None,
-    records: Records = None,
-    sign: Sign = None,
-    time_server: TimeServer = None,
-    level: Level = None,
-    trust: Trusted = None,
+    out: Annotated[Path | None, opt.out("reports/<job id>")] = None,
+    seed: opt.Seed = 0,
+    force: opt.Force = False,
+    strict: opt.Strict = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+    language: opt.Language = None,
+    records: opt.Records = None,
+    sign: opt.Sign = None,
+    time_server: opt.TimeServer = None,
+    level: opt.Level = None,
+    trust: opt.Trusted = None,
     scheduled: Annotated[
-        bool,
-        flag("--scheduled", "Every job that is new or changed; a line of JSON for each; DIR holds them all."),
+        bool, flag("--scheduled", "Every job that is new or changed; a line of JSON for each; DIR holds them all.")
     ] = False,
     schedule: Annotated[
-        Path | None,
-        option("With --scheduled: what the run goes by.", "FILE", "schedule.toml in the first JOB"),
+        Path | None, option("With --scheduled: what the run goes by.", "FILE", "schedule.toml in the first JOB")
     ] = None,
     lines: Annotated[
         Path | None, option("With --scheduled: file that the lines are added to.", "FILE", "printed")
@@ -79,18 +56,22 @@ def report(
     dry_run: Annotated[bool, flag("--dry-run", "With --scheduled: say what would happen, and do nothing.")] = False,
 ) -> None:
     """Estimate, decide, and write certificate.html, certificate.pdf, certificate.xml and results.json."""
-    alone: dict[str, object] = {
-        "--force": force, "--strict": strict, "--verbose": verbose, "--language": language, "--sign": sign,
-    }  # fmt: skip
-    many: dict[str, object] = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
-    _refuse_other_way(job, alone if scheduled else many, scheduled=scheduled)
+    alone = {"--force": force, "--strict": strict, "--verbose": verbose, "--language": language, "--sign": sign}
+    many = {"--schedule": schedule, "--lines": lines, "--dry-run": dry_run}
+    for name, value in (alone if scheduled else many).items():
+        if value:
+            fix = "Leave it out" if scheduled else "Add --scheduled"
+            raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=name, fix=fix)
     if scheduled:
-        from cmm_uq.app.cli.laboratory.scheduled import STANDARD_OUTPUT, run
-        from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions as Asked
+        from cmm_uq.app.cli.schedule import STANDARD_OUTPUT, run
+        from cmm_uq.app.commands.laboratory.scheduled import ScheduledOptions
 
-        asked = Asked(tuple(job), out, schedule, records, seed or None, dry_run)
-        raise typer.Exit(run(asked, None if quiet and lines is None else lines or STANDARD_OUTPUT))
-    signing = None if sign is None else open_key(sign, time_server, level, trust)
+        options = ScheduledOptions(tuple(job), out, schedule, records, seed or None, dry_run)
+        raise typer.Exit(run(options, None if quiet and lines is None else lines or STANDARD_OUTPUT))
+    if len(job) > 1:
+        raise CmmUqError(f"{len(job)} jobs are named, and a report is of one", where=str(job[1]),
+                         fix="Report them one after the other, or with --scheduled")  # fmt: skip
+    signing = None if sign is None else opt.open_key(sign, time_server, level, trust)
     with progress(quiet=quiet or json, verbose=verbose) as stage:
         from cmm_uq.app.commands.report import write_report
 
@@ -102,33 +83,51 @@ def report(
         conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
     finally:
         if signing is not None and not (quiet or json):
-            show_signatures(signing, [path for path in written.files.values() if path.suffix in (".pdf", ".xml")])
+            opt.show_signatures(signing, [path for path in written.files.values() if path.suffix in (".pdf", ".xml")])
 
 
-def _refuse_other_way(jobs: list[Path], options: dict[str, object], *, scheduled: bool) -> None:
-    """Refuse what belongs to the other way of the command."""
-    for name, value in options.items():
-        if value:
-            fix = "Leave it out" if scheduled else "Add --scheduled"
-            raise CmmUqError(f"goes {'without' if scheduled else 'with'} --scheduled", where=name, fix=fix)
-    if len(jobs) > 1 and not scheduled:
-        raise CmmUqError(f"{len(jobs)} jobs are named, and a report is of one", where=str(jobs[1]),
-                         fix="Report them one after the other, or with --scheduled")  # fmt: skip
+def diagnose(
+    job: opt.Job,
+    out: Annotated[Path | None, opt.out("reports/<job id>/diagnosis")] = None,
+    seed: opt.Seed = 0,
+    alpha: Annotated[float, option("Rate of false alarms, a probability from 0.000001 to 0.5.", "P")] = 0.01,
+    against: Annotated[
+        Path | None,
+        option("Coordinates or lengths that a simulation predicts, or an error map.", "FILE", "the job's model"),
+    ] = None,
+    force: opt.Force = False,
+    strict: opt.Strict = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+    language: opt.Language = None,
+    records: opt.Records = None,
+) -> None:
+    """Locate a mismatch, name the physics that was left out, and show what modelling it improves."""
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.diagnose import write_diagnosis
+
+        told = None if quiet or json else show_imported
+        written = write_diagnosis(
+            job, out, seed=seed, alpha=alpha, against=against, force=force, stage=stage, told=told, language=language,
+            records=records,
+        )  # fmt: skip
+    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
 
 
 def plan(
     job: Annotated[Path, job_folder("Job folder; its recording may still be missing.")],
-    out: Annotated[Path | None, out("reports/<job id>/plan")] = None,
+    out: Annotated[Path | None, opt.out("reports/<job id>/plan")] = None,
     power: Annotated[
         bool, option("Predict how large an effect must be for the diagnosis to find it; takes most of the time.")
     ] = True,
     seed: Annotated[int, option("Seed of the recordings drawn for that.", "N", min=0)] = 0,
-    force: Force = False,
-    strict: Strict = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
-    language: Language = None,
+    force: opt.Force = False,
+    strict: opt.Strict = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+    language: opt.Language = None,
 ) -> None:
     """Say what placings determine, search for better ones, and write plan.csv, plan.html and results.json."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -138,19 +137,55 @@ def plan(
     conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
 
 
+def prove(
+    job: Annotated[Path, job_folder("Job folder; its recording may still be missing where its noise is stated.")],
+    out: Annotated[Path | None, opt.out("reports/<job id>/prove")] = None,
+    cases: Annotated[int, option("How many sealed cases to draw.", "N")] = 200,
+    workers: Annotated[
+        int | None,
+        option("Processes at once; the figures do not depend on it.", "N", "as many as there are processors"),
+    ] = None,
+    seed: Annotated[int, option("Seed of the cases; the same seed gives the same bytes.", "N", min=0)] = 0,
+    alpha: Annotated[float, option("Rate of false alarms that the diagnosis is asked for.", "P")] = 0.01,
+    force: opt.Force = False,
+    strict: Annotated[
+        bool, flag("--strict", "Exit code 4 where the cases show that an acceptance figure is missed.")
+    ] = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+    language: opt.Language = None,
+) -> None:
+    """Draw cases with known truth on a job's set-ups, diagnose them, and write what a laboratory files as validation."""
+
+    def sealed(sha256: str) -> None:
+        """Before the first diagnosis, so that nobody can say the truth was made to fit."""
+        say(f"Truth sealed: sha256 {sha256}")
+        sys.stdout.flush()
+
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.prove import ProofOptions, write_proof
+        from cmm_uq.laboratory.schedule.processes import processes
+
+        options = ProofOptions(cases, processes() if workers is None else workers, seed, alpha)
+        tell = None if quiet or json else sealed
+        written = write_proof(job, options, out, force=force, stage=stage, sealed=tell, language=language)
+    conclude(written, json=json, quiet=quiet, strict=strict, verbose=verbose)
+
+
 def budget(
     file: Annotated[
         Path,
-        argument("Measurement model: outputs, inputs, correlations, in TOML.", "FILE", autocompletion=toml_files),
+        argument("Measurement model: outputs, inputs, correlations, in TOML.", "FILE", autocompletion=opt.toml_files),
     ],
-    out: Annotated[Path | None, out("reports/<name of the file>")] = None,
+    out: Annotated[Path | None, opt.out("reports/<name of the file>")] = None,
     seed: Annotated[int | None, option("Seed of the Monte Carlo.", "N", "the file's", min=0)] = None,
-    force: Force = False,
-    strict: Settled = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
-    language: Language = None,
+    force: opt.Force = False,
+    strict: opt.Settled = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+    language: opt.Language = None,
 ) -> None:
     """Propagate uncertainty by the GUM and by Monte Carlo, and write budget.html, budget.pdf and results.json."""
     with progress(quiet=quiet or json, verbose=verbose) as stage:
@@ -169,12 +204,12 @@ def budget(
 def _budget_summary(evaluation: Evaluation) -> Summary:
     """Each output as a certificate could state it; in full as the row of a table too."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict, Summary
+    from cmm_uq.certificate.wording import Headline, Summary
     from cmm_uq.maths.uncertainty.budget_results import SUMMARY, statement, summary_rows
 
     names = tuple(evaluation.stated)
     unstable = () if evaluation.stable else tuple(
-        Verdict("NOT STABLE", "open", Verbatim(name), (evaluation.stated[name].reason,)) for name in names
+        Headline("NOT STABLE", "open", Verbatim(name), (evaluation.stated[name].reason,)) for name in names
     )  # fmt: skip
     return Summary(
         plural(len(names), one=say("one output"), many=say("{count} outputs", count=len(names))), verdicts=unstable,
@@ -184,8 +219,8 @@ def _budget_summary(evaluation: Evaluation) -> Summary:
 
 def selftest(
     quiet: Annotated[bool, flag("--quiet", "Print only what fails, and the count.", "-q")] = False,
-    verbose: Verbose = False,
-    json: Json = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
 ) -> None:
     """Compute published reference figures and compare: expected, got, source. Exit code 4 when any differs."""
     from cmm_uq import __version__
@@ -198,22 +233,21 @@ def selftest(
         program = f"cmm-uq {__version__}"
         put_data({"schema": "cmm-uq/selftest/1", "program": program, "passed": passed, "figures": figures})
     else:
-        show(screen_layout(verbose=verbose).screen(_selftest_summary(outcomes, quiet=quiet, verbose=verbose)))
+        show(screen_layout(verbose=verbose).screen(_selftest_summary(outcomes, passed, quiet=quiet, verbose=verbose)))
     if passed < len(outcomes):
         raise typer.Exit(NOT_CONFORMING)
 
 
-def _selftest_summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool) -> Summary:
+def _selftest_summary(outcomes: Sequence[SelfTestResult], passed: int, *, quiet: bool, verbose: bool) -> Summary:
     """The count, what fails or all figures, and how many there are of each source."""
     from cmm_uq import __version__
-    from cmm_uq.base.messages import NOTHING, Verbatim, say
-    from cmm_uq.certificate.wording import Headline as Verdict, Summary
+    from cmm_uq.base.messages import NOTHING, Text, Verbatim, say
+    from cmm_uq.certificate.wording import Headline, Summary
     from cmm_uq.maths.uncertainty.reference.selftest import as_text
 
-    def verdict(what: Text, passed: bool, *remarks: Text) -> Verdict:
-        return Verdict("PASS", "good", what, remarks) if passed else Verdict("FAIL", "bad", what, remarks)
+    def verdict(what: Text, passed: bool, *remarks: Text) -> Headline:
+        return Headline("PASS" if passed else "FAIL", "good" if passed else "bad", what, remarks)
 
-    passed = sum(outcome.passed for outcome in outcomes)
     count = say(
         "cmm-uq {version}: {passed} of {total} figures within their tolerance", version=Verbatim(__version__),
         passed=passed, total=len(outcomes),
@@ -223,10 +257,8 @@ def _selftest_summary(outcomes: Sequence[Outcome], *, quiet: bool, verbose: bool
         if not outcome.passed or (verbose and not quiet):
             figures = Verbatim(f"{got}, expected {expected} within {tolerance} ({source})")
             verdicts.append(verdict(Verbatim(case), outcome.passed, figures))
-    if quiet or verbose:
-        return Summary(verdicts=tuple(verdicts))
     sources: dict[str, list[bool]] = {}
-    for outcome in outcomes:
+    for outcome in () if quiet or verbose else outcomes:
         sources.setdefault(outcome.source, []).append(outcome.passed)
     return Summary(verdicts=tuple(verdicts), figures=tuple(
         (Verbatim(source), say("{passed} of {total}", passed=sum(each), total=len(each)), NOTHING)

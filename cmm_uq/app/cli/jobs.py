@@ -10,30 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cmm_uq.app.cli.asking import job_answers, value_of
-from cmm_uq.app.cli.options import (
-    Force,
-    Json,
-    Quiet,
-    Verbose,
-    argument,
-    flag,
-    job_folder,
-    job_folders,
-    kinds,
-    option,
-    toml_files,
-)
+from cmm_uq.app.cli import options as opt
+from cmm_uq.app.cli.asking import job_answers, part_answers, value_of
+from cmm_uq.app.cli.options import argument, flag, job_folder, option
 from cmm_uq.app.cli.summary import conclude_derived, put_manifest, screen_layout
 from cmm_uq.app.cli.terminal import BAD_INPUT, can_answer, progress, put, put_data, say, show
 from cmm_uq.base.errors import CmmUqError, printable
 
 if TYPE_CHECKING:
     from cmm_uq.app.commands.jobs.check import JobCheck
-    from cmm_uq.app.commands.parts.new import Answers
     from cmm_uq.certificate.wording import Summary
     from cmm_uq.jobs.importing.keys import ImportKeys
-    from cmm_uq.jobs.importing.sheet import Recognition as Recognised
+    from cmm_uq.jobs.importing.sheet import Recognition
     from cmm_uq.jobs.job import Job
 
 Columns = Annotated[
@@ -51,7 +39,7 @@ def new(
     kind: Annotated[
         str,
         argument("Kind of measurement, shift_plate, plan, part or budget; without it they are listed.", "KIND",
-                 autocompletion=kinds),
+                 autocompletion=opt.kinds),
     ] = "",
     folder: Annotated[Path | None, argument("New folder.", "FOLDER", "the kind's name")] = None,
     machine: Annotated[str, option("Name of the machine.", "TEXT", "asked for, or a name to be replaced")] = "",
@@ -67,8 +55,8 @@ def new(
     ] = None,
     column: Columns = None,
     key: Keys = None,
-    quiet: Quiet = False,
-    json: Json = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:  # fmt: skip
     """Begin a job: job.toml with every key explained, and a simulated recording to be replaced by your own.
 
@@ -93,11 +81,17 @@ def new(
         )
     tables = _tables(machine, serial, settings or [])
     if export is not None and kind != PART:
-        files = _write_imported(kind, export, target, tables, import_keys(column, key), quiet=silent)
+        from cmm_uq.app.commands.jobs.exchange import read_export, write_job_of_export
+
+        keys = import_keys(column, key)
+        recognised = read_export(export, keys).recognised
+        if not silent:
+            show_recognised(recognised)
+        files: Mapping[str, Path] = write_job_of_export(kind, export, target, tables, keys)
     else:
         if not (tables or silent) and kind != BUDGET and kind in known() and can_answer():
             tables = job_answers(kind)
-        answers = _part_answers() if kind == PART and not (export or tables or silent) else None
+        answers = part_answers() if kind == PART and not (export or tables or silent) and can_answer() else None
         files = write_new(kind, target, tables, drawing=export, answers=answers)
     if json:
         put_manifest(files)
@@ -109,9 +103,8 @@ def new(
 
 def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[str, Any]]:
     """What the options say, by table and key."""
-    tables: dict[str, dict[str, Any]] = {}
-    if named := {name: value for name, value in (("name", machine), ("serial", serial)) if value}:
-        tables["machine"] = dict(named)
+    named = {name: value for name, value in (("name", machine), ("serial", serial)) if value}
+    tables: dict[str, dict[str, Any]] = {"machine": dict(named)} if named else {}
     for setting in settings:
         place, equals, text = setting.partition("=")
         table, dot, key = place.strip().partition(".")
@@ -123,26 +116,6 @@ def _tables(machine: str, serial: str, settings: list[str]) -> dict[str, dict[st
     return tables
 
 
-def _part_answers() -> Answers | None:
-    if not can_answer():
-        return None
-    from cmm_uq.app.cli.asking_part import part_answers
-
-    return part_answers()
-
-
-def _write_imported(
-    kind: str, export: Path, folder: Path, tables: dict[str, dict[str, Any]], keys: ImportKeys, *, quiet: bool
-) -> Mapping[str, Path]:  # fmt: skip
-    """Show what is recognised of an export, then write the job around it."""
-    from cmm_uq.app.commands.jobs.exchange import read_export, write_job_of_export
-
-    recognised = read_export(export, keys).recognised
-    if not quiet:
-        show_recognised(recognised)
-    return write_job_of_export(kind, export, folder, tables, keys)
-
-
 def import_export(
     file: Annotated[Path, argument("Export: CSV, .xlsx, .ods, PC-DMIS, Calypso, DMIS, QIF, I++.", "FILE")],
     column: Columns = None,
@@ -150,7 +123,7 @@ def import_export(
     out: Annotated[
         Path | None, option("Write it as a recording, such as recording.csv.", "FILE", "not written")
     ] = None,
-    quiet: Quiet = False,
+    quiet: opt.Quiet = False,
     json: Annotated[bool, flag("--json", "Print what is recognised as JSON.")] = False,
 ) -> None:
     """Show what is recognised of a laboratory's export; a job takes the same file with the same keys under [recording]."""
@@ -193,7 +166,7 @@ def _setting(text: str) -> tuple[str, str | int]:
     return name, int(value) if value.isdecimal() else value.strip("\"'")
 
 
-def show_recognised(recognised: Recognised) -> None:
+def show_recognised(recognised: Recognition) -> None:
     """What was recognised, as a table."""
     show([(("Recognised", "bold"),), *screen_layout(verbose=True).table(recognised.rows), ()])
 
@@ -205,12 +178,12 @@ def show_imported(job: Job) -> None:
 
 
 def check(
-    jobs: Annotated[list[Path], argument("Job folders.", "JOB...", autocompletion=job_folders)],
+    jobs: Annotated[list[Path], argument("Job folders.", "JOB...", autocompletion=opt.job_folders)],
     clauses: Annotated[
         bool, flag("--clauses", "Every clause of ISO/IEC 17025:2017, 7.8, and what of it is stated.")
     ] = False,
-    quiet: Quiet = False,
-    json: Json = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
 ) -> None:
     """Say all that is wrong with each job at once: file, line, key, fix. Exit code 2 when something would stop report.
 
@@ -246,15 +219,15 @@ def _show_clauses(check: JobCheck) -> None:
 def _check_summary(check: JobCheck) -> Summary:
     """Whether anything would stop report, and all that is wrong."""
     from cmm_uq.base.messages import Verbatim, plural, say
-    from cmm_uq.certificate.wording import Headline as Verdict, Summary
+    from cmm_uq.certificate.wording import Headline, Summary
 
     count = len(check.problems)
     if check.sound:
         nothing = say("nothing would stop {command}", command=Verbatim(check.command))
-        verdict = Verdict("SOUND", "good", Verbatim(check.job), (nothing,))
+        verdict = Headline("SOUND", "good", Verbatim(check.job), (nothing,))
     else:
         stops = plural(count, one=say("1 problem"), many=say("{count} problems", count=count))
-        verdict = Verdict("STOPS", "bad", Verbatim(check.job), (stops,))
+        verdict = Headline("STOPS", "bad", Verbatim(check.job), (stops,))
     problems, warnings = (tuple(map(Verbatim, each)) for each in (check.problems, check.warnings))
     return Summary(verdicts=(verdict,), remarks=problems, warnings=warnings)
 
@@ -262,14 +235,14 @@ def _check_summary(check: JobCheck) -> Summary:
 def simulate(
     job: Annotated[Path, job_folder("Job folder whose recording gives the placings.")],
     truth: Annotated[
-        Path, option("TOML file with the effects, the noise and the seed.", "FILE", autocompletion=toml_files)
+        Path, option("TOML file with the effects, the noise and the seed.", "FILE", autocompletion=opt.toml_files)
     ],
     out: Annotated[Path, option("Folder for the simulated job.", "DIR")],
     seed: Annotated[int | None, option("Seed of everything random.", "N", "the truth's", min=0)] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
+    force: opt.Force = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
 ) -> None:
     """Draw a recording from the same model that report fits, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.simulate import write_simulation
@@ -291,10 +264,10 @@ def compensate(
         option("Cloud of a digitizer to correct instead: .csv, .parquet, .npy or a folder of them.", "FILE",
                "the job's recording"),
     ] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
-    json: Json = False,
+    force: opt.Force = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
 ) -> None:  # fmt: skip
     """Correct a recording by its machine's error maps, as a job folder of its own."""
     from cmm_uq.app.commands.jobs.compensate import write_compensated, write_compensated_cloud

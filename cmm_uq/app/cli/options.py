@@ -100,6 +100,18 @@ def of_environment(text: str, metavar: str, name: str, variable: str, otherwise:
     return option(text, metavar, default, name, envvar=variable, show_envvar=False)
 
 
+def group(text: str, epilog: str) -> typer.Typer:
+    """A group of commands; its help where none of them is named."""
+    app = typer.Typer(help=text, epilog=epilog, rich_markup_mode=None)
+
+    @app.callback(invoke_without_command=True)
+    def alone(context: typer.Context) -> None:
+        if context.invoked_subcommand is None:
+            say(context.get_help())
+
+    return app
+
+
 def examples(*lines: str) -> str:
     """What stands at the end of a help: calls as they are typed, each on a line of its own."""
     return "\n".join(["\b", "Examples:", *(f"  cmm-uq {line}" for line in lines)])

@@ -12,7 +12,6 @@ from contextlib import contextmanager, suppress
 from io import StringIO
 from typing import TYPE_CHECKING, Any, TextIO
 
-import typer
 from rich.cells import cell_len
 
 from cmm_uq.base.errors import LONGEST_MESSAGE, CmmUqError, OutputError, printable, shortened
@@ -123,12 +122,6 @@ def closed() -> OutputError:
     """Standard output is closed, or its disk is full."""
     there = ", ".join(map(str, written()))
     return OutputError("standard output cannot be written", fix=f"The files are written in {there}" if there else None)
-
-
-def helped(context: typer.Context) -> None:
-    """The help of a group of commands where none of them is named."""
-    if context.invoked_subcommand is None:
-        say(context.get_help())
 
 
 def on_terminal(stream: TextIO | None) -> bool:

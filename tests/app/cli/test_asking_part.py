@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from cmm_uq.analysis.parts.setup import plan_of, refuse_unfit
-from cmm_uq.app.cli import asking_part
+from cmm_uq.app.cli import asking
 from cmm_uq.app.commands.jobs.new import write_new
 from cmm_uq.app.commands.parts.new import PART
 from cmm_uq.jobs.part.job import PartJob, read_part
@@ -41,7 +41,7 @@ def said(monkeypatch: pytest.MonkeyPatch, answers: list[str]) -> list[str]:
 
 
 def job_of(folder: Path) -> PartJob:
-    write_new(PART, folder, {}, answers=asking_part.part_answers())
+    write_new(PART, folder, {}, answers=asking.part_answers())
     job = read_part(folder)
     refuse_unfit(job)
     return job

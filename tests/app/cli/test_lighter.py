@@ -5,7 +5,7 @@ import sys
 
 COMMAND = """
 import sys
-from cmm_uq.app.cli.lighter import lighten
+from cmm_uq.app.cli import lighten
 lighten()
 import emcee
 assert "scipy.stats" not in sys.modules

@@ -55,7 +55,7 @@ Shown = tuple[Text, Text, Text]  # what a decision or a figure is, how it is pri
 
 
 def with_replaced(job: Job, where: str | Path | None, out: Path | None) -> Job:
-    """The job with the results of the certificate that it replaces, where it names no file of them and the records have them."""
+    """The job with the results of the certificate that it replaces, from the records where it names no file of them."""
     replaces = job.facts.job.replaces
     place = place_of(where, DEFAULT if out is None else beside(out.absolute()))
     if replaces is None or job.origin != MEASURED or _name(job) is not None or place is None:

@@ -8,16 +8,14 @@ from typing import Annotated
 
 import typer
 
-from cmm_uq.app.cli.options import Json, Quiet, Records, examples
-from cmm_uq.app.cli.terminal import NOT_CONFORMING, helped, put_data, say
+from cmm_uq.app.cli.options import Json, Quiet, Records, argument, examples, flag, group, option
+from cmm_uq.app.cli.terminal import NOT_CONFORMING, put_data, say
 from cmm_uq.base.errors import CmmUqError, printable
 
-app = typer.Typer(
-    help="The history of machines and certificates: verified, backed up, imported, kept small, brought to a new version.",
-    epilog=examples("records import reports", "records verify --head HASH", "records backup records-2026.db"),
-    rich_markup_mode=None,
+app = group(
+    "The history of machines and certificates: verified, backed up, imported, kept small, brought to a new version.",
+    examples("records import reports", "records verify --head HASH", "records backup records-2026.db"),
 )
-app.callback(invoke_without_command=True)(helped)
 
 SHOWN = 50  # findings that are printed
 
@@ -30,12 +28,9 @@ def _entries(count: int) -> str:
 def verify(
     records: Records = None,
     head: Annotated[
-        str | None,
-        typer.Option(
-            "--head", help="Hash that records head printed, filed elsewhere.", metavar="HASH", show_default="none"
-        ),
+        str | None, option("Hash that records head printed, filed elsewhere.", "HASH", "none", "--head")
     ] = None,
-    files: Annotated[bool, typer.Option("--files/--no-files", help="Compare the files of the reports too.")] = True,
+    files: Annotated[bool, flag("--files/--no-files", "Compare the files of the reports too.")] = True,
     json: Json = False,
 ) -> None:
     """Find every entry that was altered, deleted or exchanged, every table and file that is not as it was recorded.
@@ -45,25 +40,21 @@ def verify(
     from cmm_uq.laboratory.records import open_records
 
     with open_records(records, read_only=True) as opened:
-        found = opened.verify(None if head is None else head.strip().lower(), files=files)
+        findings = opened.verify(None if head is None else head.strip().lower(), files=files)
         number, last = opened.head()
-    wrong = [finding for finding in found if finding.kind != "missing"]
+    sound = all(finding.kind == "missing" for finding in findings)
     if json:
         put_data({
-            "records": str(opened.shown), "entries": number, "head": last, "sound": not wrong,
-            "findings": [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in found],
+            "records": str(opened.shown), "entries": number, "head": last, "sound": sound,
+            "findings": [{"kind": one.kind, "entry": one.entry, "problem": one.problem} for one in findings],
         })  # fmt: skip
     else:
-        for one in found[:SHOWN]:
-            say(
-                printable(
-                    f"{one.kind}: entry {one.entry}: {one.problem}" if one.entry else f"{one.kind}: {one.problem}"
-                )
-            )
-        if len(found) > SHOWN:
-            say(f"and {len(found) - SHOWN} more")
-        say(f"{_entries(number)}, {'sound' if not wrong else 'NOT sound'}; the last has the hash {last}")
-    if wrong:
+        for one in findings[:SHOWN]:
+            say(printable(f"{one.kind}: {f'entry {one.entry}: ' if one.entry else ''}{one.problem}"))
+        if len(findings) > SHOWN:
+            say(f"and {len(findings) - SHOWN} more")
+        say(f"{_entries(number)}, {'sound' if sound else 'NOT sound'}; the last has the hash {last}")
+    if not sound:
         raise typer.Exit(NOT_CONFORMING)
 
 
@@ -82,18 +73,18 @@ def head(records: Records = None, json: Json = False) -> None:
 
 @app.command("import", epilog=examples("records import reports", "records import /archive/2025 --records lab.db"))
 def import_reports(
-    folders: Annotated[list[Path], typer.Argument(help="Folders that hold reports, at any depth.", metavar="FOLDER…")],
+    folders: Annotated[list[Path], argument("Folders that hold reports, at any depth.", "FOLDER…")],
     records: Records = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Record reports and diagnoses that were written before; what is recorded already is passed over."""
-    from cmm_uq.app.commands.laboratory import records as records_kept
+    from cmm_uq.app.commands.laboratory import records as commands
     from cmm_uq.laboratory.records import open_records
 
-    reports = records_kept.reports_in(folders)  # told before records are made for them
+    reports = commands.reports_in(folders)  # before records are made for them
     with open_records(records, create=True) as opened:
-        done = records_kept.import_reports(opened, reports)
+        done = commands.import_reports(opened, reports)
     if json:
         put_data({
             "recorded": len(done.added), "recorded_before": len(done.known),
@@ -104,15 +95,15 @@ def import_reports(
         say(f"{len(done.added)} recorded, {len(done.known)} recorded before, {len(done.refused)} refused")
         for path in done.bare:
             say(printable(f"{path}: the inputs of its job cannot be read, so only results.json was gone by"))
+    for path, error in done.refused[1 : SHOWN + 1]:
+        say(printable(f"{path}: not recorded: {error}"))
     if done.refused:
-        for path, error in done.refused[1 : SHOWN + 1]:
-            say(printable(f"{path}: not recorded: {error}"))
         raise done.refused[0][1]
 
 
 @app.command("backup", epilog=examples("records backup records-2026-11-22.db"))
 def backup(
-    file: Annotated[Path, typer.Argument(help="New file of the backup.", metavar="FILE")],
+    file: Annotated[Path, argument("New file of the backup.", "FILE")],
     records: Records = None,
     quiet: Quiet = False,
     json: Json = False,
@@ -129,20 +120,27 @@ def backup(
         say(f"{_entries(number)} in {file}; the last has the hash {last}")
 
 
+def _place(records: str | None) -> str | Path:
+    from cmm_uq.laboratory.records.place import place_of
+
+    place = place_of(records)
+    if place is None:
+        raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
+    return place
+
+
 @app.command("restore", epilog=examples("records restore records-2026-11-22.db --records reports/records.db"))
 def restore(
-    file: Annotated[Path, typer.Argument(help="File of a backup.", metavar="FILE")],
+    file: Annotated[Path, argument("File of a backup.", "FILE")],
     records: Records = None,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
     """Make records of a backup whose chain holds; a file in its place is kept as NAME.before-restore."""
     from cmm_uq.laboratory.records import backup as backups
-    from cmm_uq.laboratory.records.place import place_of, shown
+    from cmm_uq.laboratory.records.place import shown
 
-    place = place_of(records)
-    if place is None:
-        raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
+    place = _place(records)
     number, last = backups.restore(file, place)
     if json:
         put_data({"records": shown(place), "entries": number, "head": last})
@@ -152,9 +150,9 @@ def restore(
 
 @app.command("retain", epilog=examples("records retain --keep-years 10 --dry-run"))
 def retain(
-    keep_years: Annotated[int, typer.Option(help="Years for which files are kept.", metavar="N", min=1, max=1000)],
+    keep_years: Annotated[int, option("Years for which files are kept.", "N", min=1, max=1000)],
     records: Records = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would be removed.")] = False,
+    dry_run: Annotated[bool, flag("--dry-run", "Only say what would be removed.")] = False,
     quiet: Quiet = False,
     json: Json = False,
 ) -> None:
@@ -169,29 +167,25 @@ def retain(
         found = retention(opened, keep_years, dt.datetime.now(dt.UTC).date())
         if not dry_run:
             remove_retained(opened, found, keep_years)
+    paths, count = [str(path) for path in found.files], len(found.certificates)
     if json:
-        put_data({
-            "removed": not dry_run, "files": [str(path) for path in found.files], "certificates": len(found.certificates),
-        })  # fmt: skip
+        put_data({"removed": not dry_run, "files": paths, "certificates": count})
     elif not quiet:
-        for path in found.files:
-            say(printable(str(path)))
-        would = "would be removed" if dry_run else "removed"
-        say(f"{len(found.files)} files of {len(found.certificates)} reports {would}")
+        for path in paths:
+            say(printable(path))
+        say(f"{len(paths)} files of {count} reports {'would be removed' if dry_run else 'removed'}")
 
 
 @app.command("migrate", epilog=examples("records backup before.db", "records migrate"))
 def migrate(records: Records = None, quiet: Quiet = False, json: Json = False) -> None:
     """Bring the tables of an older version to this one; entries stay as they are. Back up first."""
     from cmm_uq.laboratory.records import migrations
-    from cmm_uq.laboratory.records.place import place_of, shown
+    from cmm_uq.laboratory.records.place import shown
 
-    place = place_of(records)
-    if place is None:
-        raise CmmUqError("no records are asked for", where="--records none", fix="Name a file or a URL")
+    place = _place(records)
     before, after = migrations.migrate(place)
     if json:
         put_data({"records": shown(place), "from": before, "to": after})
     elif not quiet:
-        told = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
-        say(f"{shown(place)}: {told}")
+        change = f"are of revision {after} already" if before == after else f"brought from revision {before} to {after}"
+        say(f"{shown(place)}: {change}")

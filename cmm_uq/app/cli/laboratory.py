@@ -1,0 +1,273 @@
+"""``cmm-uq acquire``, ``batch``, ``due``, ``fleet``, ``history`` and ``serve``: a laboratory over time."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cmm_uq.app.cli import options as opt
+from cmm_uq.app.cli.options import argument, flag, option
+from cmm_uq.app.cli.summary import COLOURS, HEADING, folder_of, screen_layout, show_summary
+from cmm_uq.app.cli.terminal import BAD_INPUT, NOT_CONFORMING, Line, progress, put_data, say_now, show
+from cmm_uq.base.errors import CmmUqError
+from cmm_uq.base.output.interruption import keeping
+
+if TYPE_CHECKING:
+    from cmm_uq.app.commands.laboratory.batch import Batch
+    from cmm_uq.certificate.wording import Summary
+
+FAILED_SHOWN = 20  # failed jobs that are named where not everything is asked for
+
+
+def acquire(
+    job: Annotated[Path, opt.job_folder("Job folder; its instruments are named in [acquire].")],
+    simulate: Annotated[bool, option("Try it without instruments: simulated ones, in a job so marked.")] = False,
+    out: Annotated[
+        Path | None, option("With --simulate: folder for a copy of the job, so marked.", "DIR", "the job itself")
+    ] = None,
+    seed: Annotated[int, option("Seed of what simulated instruments say.", "N", min=0)] = 0,
+    plain: Annotated[bool, flag("--plain", "Lines instead of a screen, as without a terminal.")] = False,
+    skip_damaged: Annotated[
+        bool, flag("--skip-damaged", "Go on behind damaged lines of earlier journals; the recording then says so.")
+    ] = False,
+    quiet: opt.Quiet = False,
+) -> None:
+    """Take the recording of a job from its instruments, a folder of results or the keyboard, point by point of its plan.
+
+    Type help for the words; the same command goes on where the last session ended.
+    """
+    from cmm_uq.app.cli.operating import operated
+    from cmm_uq.app.commands.laboratory.acquire import begin_acquisition, write_trial
+
+    if out is not None and not simulate:
+        fix = "Add --simulate, or leave --out away: the recording goes into the job"
+        raise CmmUqError("--out is for a trial", fix=fix)
+    folder = job if out is None else write_trial(job, out)
+    session = begin_acquisition(folder, simulate=simulate, seed=seed, skip_damaged=skip_damaged)
+    operated(session, plain=plain, quiet=quiet)
+
+
+def batch(
+    folders: Annotated[
+        list[Path],
+        argument(
+            "Job folders, or folders with job folders anywhere below.", "FOLDER...", autocompletion=opt.job_folders
+        ),
+    ],
+    out: Annotated[Path | None, opt.out("reports")] = None,
+    workers: Annotated[
+        int | None, option("Processes at once; no byte depends on it.", "N", "as many as there are processors")
+    ] = None,
+    scheduler: Annotated[
+        str | None, option("Address of a Dask cluster that computes instead.", "tcp://HOST:PORT")
+    ] = None,
+    results_only: Annotated[
+        bool, flag("--results-only", "Write results.json alone: the same bytes, no document, no picture.")
+    ] = False,
+    parquet: Annotated[Path | None, option("Write a Parquet file, too: a row for each value.", "FILE")] = None,
+    resume: Annotated[
+        bool, flag("--resume", "Leave jobs alone whose report is there, from the same files by this version.")
+    ] = False,
+    time_limit: Annotated[float, option("Seconds that one job may take before it is stopped.", "S")] = 1800.0,
+    tries: Annotated[
+        int, option("Processes that one job may end (killed, out of memory) before it is given up.", "N")
+    ] = 3,
+    seed: opt.Seed = 0,
+    force: opt.Force = False,
+    strict: opt.Strict = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+    records: opt.Records = None,
+) -> None:
+    """Write the report of every job as `report` does; one that fails never stops the others. Exit code 2 when one failed."""
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.laboratory.batch import BatchOptions, write_batch
+
+        options = BatchOptions(workers, scheduler, results_only, seed, resume, force, time_limit, tries)
+        done = write_batch(folders, out, options, parquet=parquet, stage=stage, records=records)
+    if json:
+        put_data(done.as_data())
+    elif not quiet:
+        show(screen_layout(verbose=verbose).screen(_batch_summary(done, verbose=verbose)))
+    if done.failed:
+        raise typer.Exit(BAD_INPUT)
+    if strict and done.not_conforming:
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def _batch_summary(batch: Batch, *, verbose: bool) -> Summary:
+    """What came of it, and which jobs failed."""
+    from cmm_uq.base.messages import Text, Verbatim, plural, say
+    from cmm_uq.certificate.wording import Headline, Summary
+    from cmm_uq.laboratory.schedule.progress import duration, pace
+
+    counts = (
+        (batch.already, say("{count} there already", count=batch.already)),
+        (batch.planned, say("{count} still to be measured", count=batch.planned)),
+        (batch.not_conforming, say("{count} not conforming or inconsistent", count=batch.not_conforming)),
+        (len(batch.failed), say("{count} failed", count=len(batch.failed))),
+    )
+    counted = (say("{count} written", count=batch.written), *(text for count, text in counts if count))
+    jobs = plural(batch.count, one=say("1 job"), many=say("{count} jobs", count=batch.count))
+    verdict = Headline("FAILED" if batch.failed else "DONE", "bad" if batch.failed else "good", jobs, counted)
+    remarks: list[Text] = [say("Reports: {folder}", folder=Verbatim(batch.out))]
+    if batch.records:
+        remarks.append(say("Recorded in {records}", records=Verbatim(batch.records)))
+    if batch.parquet is not None:
+        remarks.append(say("Values: {file}", file=Verbatim(batch.parquet)))
+    if batch.written and batch.seconds > 0:
+        took, rate = Verbatim(duration(batch.seconds)), Verbatim(pace(batch.written / batch.seconds))
+        remarks.append(say("{took}, {rate}", took=took, rate=rate))
+    if batch.ended:
+        one = say("1 process ended over a job, which was then given to another.")
+        many = say("{count} processes ended over a job, which was then given to another.", count=batch.ended)
+        remarks.append(plural(batch.ended, one=one, many=many))
+    warnings: list[Text] = [Verbatim(each) for each in (batch.failed if verbose else batch.failed[:FAILED_SHOWN])]
+    if more := len(batch.failed) - len(warnings):
+        warnings.append(say("{more} more failed; --verbose names them all, --json as data.", more=more))
+    return Summary(verdicts=(verdict,), remarks=tuple(remarks), warnings=tuple(warnings))
+
+
+def due(
+    machines: Annotated[
+        list[str] | None, argument("Serial numbers or names; all machines and artefacts without.", "[MACHINE]...")
+    ] = None,
+    records: opt.ReadRecords = None,
+    on: opt.On = None,
+    fleet: opt.Fleet = None,
+    within: Annotated[
+        str | None, option("Only what is due that soon (90d, 12w, 3m, 1y), or has no date.", "TIME", "all")
+    ] = None,
+    out: Annotated[Path | None, option("Folder for due.html and due.json.", "DIR", "none")] = None,
+    force: opt.Force = False,
+    strict: Annotated[bool, flag("--strict", "Exit code 4 where anything is overdue.")] = False,
+    quiet: opt.Quiet = False,
+    json: opt.Json = False,
+) -> None:
+    """Say which machines and artefacts are due for calibration, when, and why."""
+    from cmm_uq.app.commands.laboratory.due import what_is_due, write_due
+
+    found = what_is_due(records, machines or (), on=opt.day_of(on), within=opt.time_of(within), fleet=fleet)
+    files = {} if out is None else write_due(found, out, force=force)
+    if json:
+        put_data(found.data())
+    elif not quiet:
+        from cmm_uq.certificate.pages.due import counts, due_row
+
+        text, standing = counts(found.items, found.on, found.within)
+        head = ((f"{found.on.isoformat()}: ", HEADING), (text, COLOURS[standing]))
+        # every reason whole: a list that says why is what is asked for
+        _show_table(head, [due_row(one, found.on, found.within) for one in found.items], (), files, verbose=True)
+    if strict and found.of("overdue"):
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def fleet(
+    records: opt.ReadRecords = None,
+    name: Annotated[
+        list[str] | None,
+        option("Value to look at, such as scale_x.ppm; may be repeated.", "NAME", "all with a limit", "--name"),
+    ] = None,
+    out: Annotated[Path | None, option("Folder for fleet.html, fleet.json and fleet.csv.", "DIR", "none")] = None,
+    seed: opt.Seed = 1,
+    force: opt.Force = False,
+    strict: Annotated[bool, flag("--strict", "Exit code 4 where a machine does not belong.")] = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+) -> None:
+    """Learn from all machines of the records what drift is usual for models and places, and which do not belong."""
+    with progress(quiet=quiet or json, verbose=verbose) as stage:
+        from cmm_uq.app.commands.files import silent
+        from cmm_uq.app.commands.laboratory.fleet import fleet, write_fleet
+        from cmm_uq.certificate.pages.fleet_summary import fleet_data, fleet_summary
+
+        found = fleet(records, name or (), seed=seed, stage=stage or silent)
+        files = {} if out is None else write_fleet(found, out, force=force)
+    if json:
+        put_data(fleet_data(found))
+    elif not quiet:
+        show_summary(fleet_summary(found), files, verbose=verbose)
+    if strict and found.outsiders:
+        raise typer.Exit(NOT_CONFORMING)
+
+
+def history(
+    machine: Annotated[str, argument("Serial number of the machine, or its name.", "MACHINE")],
+    records: opt.ReadRecords = None,
+    on: opt.On = None,
+    fleet: opt.Fleet = None,
+    out: Annotated[
+        Path | None, option("Folder for history.html, with pictures, and history.json.", "DIR", "none")
+    ] = None,
+    force: opt.Force = False,
+    quiet: opt.Quiet = False,
+    verbose: opt.Verbose = False,
+    json: opt.Json = False,
+) -> None:
+    """Say how every error factor and figure of a machine has gone, what changed last, and when a limit will be crossed."""
+    from cmm_uq.app.commands.laboratory.history import history_of, write_history
+    from cmm_uq.certificate.pages.history import history_data, summary_row, terminal_note
+
+    found = history_of(machine, records, on=opt.day_of(on), fleet=fleet)
+    files = {} if out is None else write_history(found, out, force=force)
+    if json:
+        put_data(history_data(found))
+    elif not quiet:
+        serial = "" if found.machine.by_name else f", serial number {found.machine.serial}"
+        count = len(found.certificates)
+        recordings = "one recording" if count == 1 else f"{count} recordings"
+        head = ((f"{found.machine.name}{serial}", HEADING), (f": {recordings} up to {found.on.isoformat()}", ""))
+        notes: list[Line] = [((terminal_note(found), ""),)] if found.values else []
+        notes += [((text, COLOURS["open"]),) for text in found.remarks]
+        _show_table(head, [summary_row(found, one) for one in found.values], notes, files, verbose=verbose)
+
+
+def _show_table(
+    head: Line, rows: Iterable[Sequence[str]], notes: Iterable[Line], files: dict[str, Path], *, verbose: bool
+) -> None:
+    written = [(("Written to ", HEADING), (folder_of(files), ""))] if files else []
+    show([head, *screen_layout(verbose=verbose).table(rows), *notes, *written])
+
+
+def serve(
+    records: opt.ReadRecords = None,
+    port: Annotated[int, option("Port to listen on; 0 takes a free one.", "N", min=0, max=65535)] = 8765,
+    bind: Annotated[
+        str,
+        option(
+            "Address to listen on; 0.0.0.0 is every network of this machine. Whoever reaches it can read the records.",
+            "ADDRESS",
+        ),
+    ] = "127.0.0.1",
+    name: Annotated[
+        list[str] | None,
+        option("Further name by which browsers reach this machine; repeatable.", "HOST", "this machine's own"),
+    ] = None,
+    open_: Annotated[bool, flag("--open", "Open the page in a browser.")] = False,
+    quiet: opt.Quiet = False,
+) -> None:
+    """Show the records in a browser: what is due or fails, trends, certificates, artefacts. Nothing can be changed there."""
+    from cmm_uq.app.serve.server import RecordsServer
+    from cmm_uq.app.serve.site import Site
+
+    site = Site(records)
+    with (
+        RecordsServer(site.answer, bind=bind, port=port, names=name or ()) as server,
+        keeping(lambda: "the page is closed"),
+    ):
+        if not quiet:
+            say_now(f"{site.place} at {server.url} until Ctrl-C")
+            if not server.alone:
+                say_now("Whoever reaches this address can read the records: there are no passwords")
+        threading.Thread(target=site.warm, daemon=True).start()
+        if open_:
+            import webbrowser
+
+            threading.Thread(target=webbrowser.open, args=(server.url,), daemon=True).start()
+        server.serve_forever()

@@ -1,1 +1,0 @@
-"""The commands of a laboratory over time: records, due dates, schedules, live recordings."""
