@@ -63,10 +63,7 @@ def certificate_of(
     job: Job, sections: list[Section], warnings: tuple[Text, ...], produced_by: Text, files: tuple[Text, ...] = (),
     overview: Overview | None = None,
 ) -> Document:  # fmt: skip
-    """Sections and warnings between what every certificate has.
-
-    Warnings on what the job does not state follow ``warnings``; ``files`` are attached beside job and recording.
-    """
+    """Sections and warnings between what every certificate has; ``files`` are attached beside job and recording."""
     facts = job.facts
     name, date = Verbatim(facts.machine.name), day(facts.job.date)
     return in_words(Document(
@@ -124,7 +121,6 @@ def _particulars(of: Job) -> tuple[Facts, ...]:
 
 
 def grouped(*groups: tuple[Row, ...]) -> tuple[Facts, ...]:
-    """Particulars, without what a job does not state."""
     return tuple(Facts(rows) for group in groups if (rows := tuple((k, foreign(v)) for k, v in group if v)))
 
 
@@ -188,10 +184,7 @@ def _replacement(job: Identification) -> tuple[tuple[Text, str], ...]:
 
 
 def with_capability(result: Result) -> tuple[Result, StatedUncertainty]:
-    """The result as a certificate states it, and what was raised.
-
-    Lengths are taken at the artefact's longest dimension. The noise is a figure of the recording and stays.
-    """
+    """The result as a certificate states it, and what was raised; lengths are taken at the artefact's longest dimension."""
     longest = max((s.nominal for s in result.artefact.sizes if s.role == "dimension" and s.unit == "mm"), default=0.0)
     stating = StatedUncertainty.of(result.job, longest)
     reported = [size.name for size in result.artefact.sizes if size.role != "set-up"]
@@ -235,10 +228,7 @@ def _certificate(result: Result, page: Page, warned: tuple[Text, ...]) -> Docume
 
 
 def _ordered(result: Result, own: list[Section]) -> list[Section]:
-    """Results first, then what is decided on them and what they rest on, then what else the kind shows (``own``).
-
-    The results of an artefact without lengths are the error factors, and without these the first of the kind's own sections.
-    """
+    """Results first (figures of lengths, else error factors, else the first of ``own``), then decisions and their basis."""
     figures, factors, decided = performance(result), error_factors(result), conformity_section(result.statements)
     before = as_found_section(result.job, quantities_left(result), result.verdicts)
     rests_on = traceability(result)

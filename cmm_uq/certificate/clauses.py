@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 from cmm_uq.analysis.conformity.decision import rule_name
@@ -39,30 +40,22 @@ NOT_OURS = say(
 )
 """7.8.2.2, where there are such data."""
 
-DRAFT = say(
-    "DRAFT, not complete by ISO/IEC 17025:2017, 7.8"
-)  # on every page of a certificate that lacks what each must state
+# on every page of a certificate that lacks what each must state
+DRAFT = say("DRAFT, not complete by ISO/IEC 17025:2017, 7.8")
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """One thing that a clause asks for.
+    """What a clause asks for, and whether the certificate has it."""
 
-    ``clause``: its number, with the letter where it has one; ``asks``: what for; a text that can be said in other
-    languages where a certificate may have to name it; ``status``: whether the certificate has it; ``stated``: what
-    satisfies it; empty where nothing does; ``key``: of job.toml, that states it or would; empty where the form of the
-    certificate does.
-    """
-
-    clause: str
-    asks: str
+    clause: str  # its number, with the letter where it has one
+    asks: str  # a text that can be said in other languages where a certificate may have to name it
     status: Status
-    stated: str
-    key: str
+    stated: str  # what satisfies it; empty where nothing does
+    key: str  # of job.toml, that states it or would; empty where the form of the certificate does
 
     @property
     def data(self) -> dict[str, Any]:
-        """For ``results.json``."""
         return {
             "clause": self.clause, "asks": str.__str__(self.asks), "status": self.status,
             "stated": self.stated or None, "key": self.key or None,
@@ -71,7 +64,7 @@ class Requirement:
 
 def clauses(job: Job) -> tuple[Requirement, ...]:
     """Every clause of 7.8 that speaks of calibration certificates, in the standard's order."""
-    facts, machine = job.facts, job.facts.machine
+    facts, machine, replaced = job.facts, job.facts.machine, job.facts.job.replaces
     named = (machine.manufacturer, machine.model, machine.name)
     item = f"{_lines(named)}, serial number {machine.serial}" if machine.serial else ""
     serial = asked("7.8.2.1 g", say("serial number of the machine"), item, "[machine] serial")
@@ -80,20 +73,16 @@ def clauses(job: Job) -> tuple[Requirement, ...]:
         asked("7.8.1.2", "results and all that their interpretation needs, in a report", facts.job.number or facts.job.id),
         _done("7.8.1.3", "a simplified report only as agreed with the customer"),
         *of_every_report(facts.job, facts.laboratory, CERTIFICATE, serial),
-        *_of_a_calibration(job), *_statements(facts), *_replacing(facts),
+        *_of_a_calibration(job), *_statements(facts),
+        _where("7.8.8.1", "what was changed, and why", replaced and f"{replaced.changed} ({replaced.reason})",
+               "[job.replaces] changed"),
+        _where("7.8.8.2", "amendments as a further document that says so", ""),
+        _where("7.8.8.3", "a number of its own, and which certificate it replaces",
+               replaced and replaced_certificate(replaced), "[job.replaces] number"),
     )  # fmt: skip
 
 
-def _traceable(job: Job) -> tuple[Requirement, ...]:
-    """How the results are traceable; where that is not shown, all that each certificate which they rest on lacks."""
-    chain = claimed(job)
-    if chain.claim != "not shown":
-        return (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
-    return tuple(Requirement("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
-
-
 def missing(job: Job) -> tuple[Requirement, ...]:
-    """What every certificate must state and this one does not."""
     return tuple(one for one in clauses(job) if one.status == "missing")
 
 
@@ -117,24 +106,19 @@ def draft(job: Job) -> bool:
 
 
 def replaced_certificate(replaced: ReplacedCertificate) -> Text:
-    """Number and date of a certificate that is replaced."""
     return say("{number} of {date}", number=Verbatim(replaced.number), date=day(replaced.date))
 
 
-def asked(clause: str, asks: str, stated: object, key: str = "") -> Requirement:
-    return Requirement(clause, asks, "stated" if stated else "missing", _plain(stated), key)
+def asked(clause: str, asks: str, stated: object, key: str = "", otherwise: Status = "missing") -> Requirement:
+    text = str.__str__(stated) if isinstance(stated, str) else "" if stated is None else str(stated)
+    return Requirement(clause, asks, "stated" if stated else otherwise, text, key)
 
 
-def _where(clause: str, asks: str, stated: object, key: str = "") -> Requirement:
-    return Requirement(clause, asks, "stated" if stated else "not applicable", _plain(stated), key)
+_where = partial(asked, otherwise="not applicable")  # what is asked for where there is any
 
 
 def _done(clause: str, asks: str, key: str = "") -> Requirement:
     return Requirement(clause, asks, "laboratory", "", key)
-
-
-def _plain(stated: object) -> str:
-    return str.__str__(stated) if isinstance(stated, str) else "" if stated is None else str(stated)
 
 
 def _lines(parts: Iterable[str]) -> str:
@@ -144,10 +128,7 @@ def _lines(parts: Iterable[str]) -> str:
 def of_every_report(
     job: Identification, laboratory: Laboratory, title: str, item: Requirement
 ) -> tuple[Requirement, ...]:
-    """7.8.2.1 of any report.
-
-    ``item``: what names the item (7.8.2.1 g).
-    """
+    """7.8.2.1 of any report; ``item``: what names the item (7.8.2.1 g)."""
     return (
         asked("7.8.2.1 a", "title", title),
         asked("7.8.2.1 b", say("name of the laboratory"), laboratory.name, "[laboratory] name"),
@@ -176,12 +157,16 @@ def of_every_report(
 
 
 def _of_a_calibration(of: Job) -> tuple[Requirement, ...]:
-    facts, job = of.facts, of.facts.job
+    facts, job, chain = of.facts, of.facts.job, claimed(of)
+    # where it is not shown how results are traceable, all that each certificate which they rest on lacks
+    traceable: tuple[Requirement, ...] = (asked("7.8.4.1 c", "how the results are traceable", chain.statement),)
+    if chain.claim == "not shown":
+        traceable = tuple(Requirement("7.8.4.1 c", what, "missing", "", key) for what, key in chain.lacks)
     return (
         asked("7.8.4.1 a", "measurement uncertainty in the unit of the result",
                "U, k and 95 % with every result", "[laboratory] cmc"),
         asked("7.8.4.1 b", say("conditions"), job.conditions, "[job] conditions"),
-        *_traceable(of),
+        *traceable,
         _where("7.8.4.1 d", "results before and after an adjustment", job.as_found, "[job] as_found"),
         _where("7.8.4.1 e", "statement of conformity", _standards(facts), "[[conformity]]"),
         _where("7.8.4.1 f", "opinions and interpretations", "annex of opinions and interpretations",
@@ -210,17 +195,6 @@ def _statements(facts: JobFile) -> tuple[Requirement, ...]:
         _done("7.8.7.1", "opinions by authorised people, on a documented basis"),
         _where("7.8.7.2", "opinions rest on the results and are marked as such", "in the annex, under its own heading"),
         _done("7.8.7.3", "what was said of them to the customer is recorded"),
-    )  # fmt: skip
-
-
-def _replacing(facts: JobFile) -> tuple[Requirement, ...]:
-    replaced = facts.job.replaces
-    return (
-        _where("7.8.8.1", "what was changed, and why", replaced and f"{replaced.changed} ({replaced.reason})",
-               "[job.replaces] changed"),
-        _where("7.8.8.2", "amendments as a further document that says so", ""),
-        _where("7.8.8.3", "a number of its own, and which certificate it replaces",
-               replaced and replaced_certificate(replaced), "[job.replaces] number"),
     )  # fmt: skip
 
 

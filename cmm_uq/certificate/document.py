@@ -159,16 +159,12 @@ Block = Paragraph | Facts | Table | Plot | DecisionBlock | Overview
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of the document.
-
-    ``opinion`` marks what interprets the results and belongs in the annex, ``first`` what stands on the first page of a
-    document that decides there.
-    """
+    """A titled part of the document."""
 
     title: Text
     blocks: tuple[Block, ...]
-    opinion: bool = False
-    first: bool = False
+    opinion: bool = False  # interprets the results and belongs in the annex
+    first: bool = False  # stands on the first page of a document that decides there
 
 
 @dataclass(frozen=True)
@@ -181,50 +177,27 @@ class Signature:
 
 @dataclass(frozen=True, kw_only=True)
 class Document:
-    """A certificate or report.
+    """A certificate or report."""
 
-    Parameters
-    ----------
-    title : what it is, such as "Calibration certificate".
-    number : unique identification, shown on every page.
-    subject : one line under the title: the machine and the date.
-    issuer : the laboratory that answers for it; lines of name and address. Empty when the job does not say.
-    particulars : facts that identify customer, item, dates, method; the first thing after the title.
-    warnings : what the reader must know before using a figure; shown on the first page.
-    sections : the results; those of opinion last, which make up the annex.
-    statements : sentences on scope, reproduction and the like, before the signatures.
-    signatures : who authorises.
-    attachments : names of the files that travel with the document.
-    produced_by : program and version, seed and whatever else is needed to run it again.
-    date : date of issue, which is also the PDF's date; the clock is never read.
-    language : of the text, as BCP 47 tag, for screen readers and hyphenation.
-    end : the mark after the last line.
-    banner : what every page must say at its head, such as that nothing was measured.
-    overview : what comes before everything else.
-    draft : whether the banner says only that something is still to be stated.
-    logo : of the issuer.
-    decides : whether all that is decided, stated and signed stands on the first page, and the figures behind it.
-    """
-
-    title: Text
-    number: Text
-    subject: Text
-    issuer: tuple[Text, ...] = ()
-    particulars: tuple[Facts, ...] = ()
-    warnings: tuple[Text, ...] = ()
-    sections: tuple[Section, ...] = ()
-    statements: tuple[Text, ...] = ()
+    title: Text  # what it is, such as "Calibration certificate"
+    number: Text  # unique identification, shown on every page
+    subject: Text  # one line under the title: the machine and the date
+    issuer: tuple[Text, ...] = ()  # the laboratory that answers for it; lines of name and address
+    particulars: tuple[Facts, ...] = ()  # customer, item, dates, method: the first thing after the title
+    warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure; shown on the first page
+    sections: tuple[Section, ...] = ()  # the results; those of opinion last, which make up the annex
+    statements: tuple[Text, ...] = ()  # on scope, reproduction and the like, before the signatures
     signatures: tuple[Signature, ...] = ()
-    attachments: tuple[Text, ...] = ()
-    produced_by: Text
-    date: dt.date | None = None
-    language: str = "en"
-    end: Text = say("End of certificate")
-    banner: Text = NOTHING
-    overview: Overview | None = None
-    draft: bool = False
+    attachments: tuple[Text, ...] = ()  # names of the files that travel with the document
+    produced_by: Text  # program and version, seed and whatever else is needed to run it again
+    date: dt.date | None = None  # of issue, which is also the PDF's date; the clock is never read
+    language: str = "en"  # BCP 47 tag, for screen readers and hyphenation
+    end: Text = say("End of certificate")  # the mark after the last line
+    banner: Text = NOTHING  # what every page must say at its head, such as that nothing was measured
+    overview: Overview | None = None  # what comes before everything else
+    draft: bool = False  # the banner says only that something is still to be stated
     logo: Logo | None = None
-    decides: bool = False
+    decides: bool = False  # all that is decided, stated and signed stands on the first page, and the figures behind it
 
     def as_data(self) -> dict[str, Any]:
         """The document as plain dicts and lists of printable text, ready for JSON.
@@ -276,7 +249,7 @@ def _measure(table: dict[str, Any], *, english: bool) -> None:
 
 
 def letters(line: str) -> int:
-    """Of a line, in letters; a Chinese or Japanese character has the room of two."""
+    """Of a line; a Chinese or Japanese character has the room of two."""
     return len(line) + _wide(line)
 
 
@@ -293,7 +266,7 @@ def _width(line: str) -> float:
 
 
 def _wide(line: str) -> int:
-    """How many characters of a line are Chinese, Japanese or Korean."""
+    """How many characters are Chinese, Japanese or Korean."""
     return len(_patterns()[0].findall(line)) if max(line, default="") >= _CHARACTERS[0] else 0
 
 

@@ -39,10 +39,7 @@ def parameter_title(owner: str, name: str, own: Iterable[Effect] = ()) -> Text:
 
 
 def size_of(effect: Effect | None, parameters: Mapping[str, Quantity], *, factors: bool = True) -> Text:
-    """How large an effect is, and what that means at the machine: ``the angle between X and Y is 90° minus 36 ± 4 ″``.
-
-    ``effect``: whose parameters they are; of an unknown one the figures alone are told.
-    """
+    """How large an effect is, and what that means: ``the angle between X and Y is 90° minus 36 ± 4 ″``."""
     quantities = {
         name: quantity.times(1e6, unit("10⁻⁶/K")) if quantity.unit == "1/K" else quantity
         for name, quantity in parameters.items()

@@ -38,10 +38,7 @@ def file_name(name: str, origin: str) -> str:
 
 
 def marked(document: Document, job: Job) -> Document:
-    """The document with its origin on every page; as it is where the recording was measured.
-
-    Nobody signs for such a recording, it has no certificate's number, and its first warning says what it is.
-    """
+    """Its origin on every page, without signature and number of a certificate; unchanged where the recording was measured."""
     return marked_as(document, job.origin, job.facts.job.id, origin_warnings(job))
 
 
@@ -100,11 +97,7 @@ NAME = "cmm-uq"
 
 
 def software(job: Job, *, effects: bool = True) -> dict[str, Any]:
-    """For results.json: name and version, and those of other packages that took part, if there are any.
-
-    These are the packages whose effects were candidates, where ``effects`` says that there were candidates, and those of the
-    job's kind and standards.
-    """
+    """For results.json: name and version, also of packages of kind and standards, and, with ``effects``, of candidates."""
     taking_part = (plugins() if effects else {}) | _of_the_job(job)
     return {"name": NAME, "version": __version__, **({"plugins": taking_part} if taking_part else {})}
 

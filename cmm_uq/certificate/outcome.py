@@ -28,34 +28,20 @@ class AnalysisResult(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What there is to write of an analysis.
+    """What there is to write of an analysis."""
 
-    Parameters
-    ----------
-    found : in the kind's own terms.
-    composed : makes the certificate, or the page of a diagnosis; its pictures take longer than all other figures of it.
-    results : contents of results.json.
-    summary : for the end of a command.
-    warnings : what the reader must know before using a figure.
-    files : further ones, by name.
-    verdicts : every statement of conformity.
-    in_order : whether all else is: the recording agrees with the model that the job names, a plan meets its conditions.
-    draws : of the posterior of all that is reported, where the kind's analysis draws from one.
-    """
-
-    found: AnalysisResult
-    composed: Callable[[], Document]
-    results: Mapping[str, Any]
-    summary: Summary
-    warnings: tuple[Text, ...] = ()
-    files: Mapping[str, bytes] = field(default_factory=dict)
-    verdicts: Verdicts = NO_VERDICTS
-    in_order: bool = True
-    draws: Draws | None = None
+    found: AnalysisResult  # in the kind's own terms
+    composed: Callable[[], Document]  # makes the certificate or page; its pictures take longer than its figures
+    results: Mapping[str, Any]  # contents of results.json
+    summary: Summary  # for the end of a command
+    warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure
+    files: Mapping[str, bytes] = field(default_factory=dict)  # further ones, by name
+    verdicts: Verdicts = NO_VERDICTS  # every statement of conformity
+    in_order: bool = True  # the recording agrees with the model that the job names, a plan meets its conditions
+    draws: Draws | None = None  # of the posterior of all that is reported, where the kind's analysis draws from one
 
     @property
     def conforming(self) -> bool:
-        """Whether every statement of conformity is a pass, and all else is in order."""
         return self.verdicts.conforming and self.in_order
 
     @cached_property
@@ -70,11 +56,7 @@ class Outcome:
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """What it was made from and by what.
-
-        ``software`` with the plugins that took part, ``job`` with the hashes of its inputs and where its recording comes from,
-        and ``seed`` where a posterior was sampled.
-        """
+        """``software`` with plugins, ``job`` with the hashes of its inputs, and ``seed`` where a posterior was sampled."""
         sampling = self.results.get("sampling", {})
         return {key: self.results[key] for key in ("software", "job") if key in self.results} | (
             {"seed": sampling["seed"]} if "seed" in sampling else {}
@@ -83,16 +65,10 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Page:
-    """What a kind adds to a certificate.
+    """What a kind adds to a certificate."""
 
-    Parameters
-    ----------
-    sections : after those that every certificate has.
-    results : further keys of results.json.
-    """
-
-    sections: Callable[[Result], list[Section]]
-    results: Callable[[Result], Mapping[str, Any]] | None = None
+    sections: Callable[[Result], list[Section]]  # after those that every certificate has
+    results: Callable[[Result], Mapping[str, Any]] | None = None  # further keys of results.json
 
     def with_further(self, result: Result, data: Mapping[str, Any]) -> dict[str, Any]:
         """Contents of results.json that every result has, and the kind's further keys."""
@@ -105,14 +81,10 @@ class Page:
 
 @dataclass(frozen=True)
 class Recipe:
-    """A kind's own way from a job to its outcome.
+    """A kind's own way from a job to its outcome."""
 
-    ``analyse``: ``(job, *, seed, progress)``, of a diagnosis also ``alpha``: what it finds; ``outcome``: of that, and
-    of the seed.
-    """
-
-    analyse: Callable[..., AnalysisResult]
-    outcome: Callable[[Any, int], Outcome]
+    analyse: Callable[..., AnalysisResult]  # ``(job, *, seed, progress)``, of a diagnosis also ``alpha``
+    outcome: Callable[[Any, int], Outcome]  # of what was found and the seed
 
 
 @dataclass(frozen=True)

@@ -40,26 +40,20 @@ from cmm_uq.maths.uncertainty.type_a import factor_of_noise
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTwin:
-    """The simulation that a recording was compared with.
+    """The simulation that a recording was compared with."""
 
-    ``files``: with their SHA-256; ``u_um, u_common_um``: of a predicted coordinate, root mean square, and of the artefact's
-    size; ``u_turned_um``: what there is besides because the artefact was taken to lie in another direction; ``contains``,
-    ``refitted``: its effects, and those that were estimated anew; ``shift_mm, turn_deg``: of its frame against the
-    recording's; ``farthest_mm``: from a recorded point to the predicted one; ``rms_predicted_um``: in the observations.
-    """
-
-    files: Mapping[str, str]
+    files: Mapping[str, str]  # SHA-256 by name
     program: str
     maps: bool
-    u_um: float
-    u_common_um: float
-    u_turned_um: float
-    contains: tuple[str, ...]
-    refitted: tuple[str, ...]
-    shift_mm: tuple[float, ...]
+    u_um: float  # of a predicted coordinate, root mean square
+    u_common_um: float  # of the artefact's size
+    u_turned_um: float  # besides, because the artefact was taken to lie in another direction
+    contains: tuple[str, ...]  # its effects
+    refitted: tuple[str, ...]  # those that were estimated anew
+    shift_mm: tuple[float, ...]  # of its frame against the recording's
     turn_deg: float
-    farthest_mm: float
-    rms_predicted_um: float
+    farthest_mm: float  # from a recorded point to the predicted one
+    rms_predicted_um: float  # in the observations
 
     @classmethod
     def of(
@@ -105,18 +99,15 @@ CAPABILITY_FACTOR = 2.0  # coverage factor of a calibration and measurement capa
 
 @dataclass(frozen=True)
 class StatedUncertainty:
-    """Quantities of a certificate with U not below the laboratory's capability, that of lengths taken at ``length_mm``.
-
-    ``raised``: by name as in results.json, U as evaluated and as stated.
-    """
+    """Quantities with U not below the laboratory's capability, that of lengths taken at ``length_mm``."""
 
     capability: Capability | None
     length_mm: float
-    raised: dict[str, dict[str, float]] = field(default_factory=dict)
+    raised: dict[str, dict[str, float]] = field(default_factory=dict)  # U as evaluated and as stated, by name
 
     @classmethod
     def of(cls, job: Job, length_mm: float = 0.0) -> StatedUncertainty:
-        """For a job; without a length at the longest travel of the machine."""
+        """Without a length at the longest travel of the machine."""
         spans = np.ptp(job.points.machine.travel_mm, axis=1)
         longest = float(np.nanmax(spans)) if np.isfinite(spans).any() else 0.0
         return cls(job.facts.laboratory.cmc, length_mm or longest)
@@ -141,7 +132,6 @@ class StatedUncertainty:
         return least, CAPABILITY_FACTOR
 
     def all(self, group: str, quantities: Mapping[str, Quantity]) -> dict[str, Quantity]:
-        """Quantities of one group, each under ``group.name``."""
         return {name: self.stated(f"{group}.{name}", one) for name, one in quantities.items()}
 
     def warnings(self) -> list[Text]:
@@ -168,23 +158,15 @@ class NoiseComponent:
 
 @dataclass(frozen=True, eq=False)
 class RecordingNoise:
-    """The noise of a recording, and what it does to the uncertainties.
+    """The noise of a recording, and what it does to the uncertainties."""
 
-    ``coordinate``: standard deviation of one reading of one coordinate, root mean square of the axes, µm;
-    ``components``: its parts that the recording could show: readings along ``x``, ``y``, ``z``; ``placing``,;
-    ``growth``, ``slow``.; ``axes_apart``: probability that the axes differ; ``wider``: largest ratio of a parameter's
-    standard uncertainty to what white noise would leave it; ``stated_um``: what the job states, if anything;
-    ``p_value``: of the residuals' sum of squares under the stated noise (χ² test), if it is stated; ``display_um``:
-    step in which coordinates are displayed, 0 where it is too fine to matter.
-    """
-
-    coordinate: Quantity
-    components: Mapping[str, NoiseComponent]
-    axes_apart: float
-    wider: float
-    stated_um: float | None
-    p_value: float | None
-    display_um: float = 0.0
+    coordinate: Quantity  # standard deviation of a reading of one coordinate, root mean square of the axes, µm
+    components: Mapping[str, NoiseComponent]  # that could show: ``x``, ``y``, ``z``, ``placing``, ``growth``, ``slow``
+    axes_apart: float  # probability that the axes differ
+    wider: float  # largest ratio of a parameter's u to what white noise would leave it
+    stated_um: float | None  # what the job states, if anything
+    p_value: float | None  # of the residuals' sum of squares under the stated noise (χ² test)
+    display_um: float = 0.0  # step in which coordinates are displayed, 0 where it is too fine to matter
 
     @property
     def coverage_factor(self) -> float:
@@ -204,22 +186,17 @@ class RecordingNoise:
 
 @dataclass(frozen=True, eq=False)
 class JobDiagnosis:
-    """A job with its diagnosis: what is missing, what to measure next, and what follows.
-
-    ``consequences``: of a correction, ``None`` where nothing depends on one; ``unseen``: smallest amplitude of each effect
-    that the recording would have shown; ``next_plan``: the fewest set-ups that part or show more, ``None`` without any;
-    ``costs``: what each explanation that remains makes of figures and decisions, ``None`` where one alone does.
-    """
+    """A job with its diagnosis: what is missing, what to measure next, and what follows."""
 
     job: Job
     findings: tuple[Finding, ...]
     diagnosis: Diagnosis
     suggestions: tuple[Suggestion, ...]
-    consequences: Consequences | None = None
+    consequences: Consequences | None = None  # of a correction, if anything depends on one
     simulated: SimulatedTwin | None = None
-    unseen: tuple[SmallestEffect, ...] = ()
-    next_plan: NextPlan | None = None
-    costs: Costs | None = None
+    unseen: tuple[SmallestEffect, ...] = ()  # smallest amplitude of each effect that would have shown
+    next_plan: NextPlan | None = None  # the fewest set-ups that part or show more
+    costs: Costs | None = None  # what each explanation that remains makes of figures and decisions
 
 
 @dataclass(frozen=True)
@@ -233,59 +210,35 @@ class ParameterDifference:
 
 @dataclass(frozen=True)
 class Contradiction:
-    """A line along a machine axis that says something else of the axis than an average over explanations does.
+    """A line along a machine axis that says something else of the axis than an average over explanations does."""
 
-    ``key``: of the parameter, effect and name; ``measurement``: number of the line; ``alone``: the parameter by this
-    line alone, all others as they are on average.
-    """
-
-    key: tuple[str, str]
-    measurement: int
-    alone: Quantity
+    key: tuple[str, str]  # of the parameter: effect and name
+    measurement: int  # number of the line
+    alone: Quantity  # by this line alone, all others as they are on average
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """All that is known of a job after its analysis.
-
-    Parameters
-    ----------
-    job, model : what was analysed.
-    findings : of the screening.
-    estimate : least squares.
-    posterior : of the model's own parameters and of its noise.
-    values : (N, k) draws of the model's unknowns that all estimates are taken from, and all that is computed from these: those
-        of the posterior; where several explanations remain, those of the mixture of all.
-    draws : of all that is reported, by name and chain.
-    parameters : reported parameters of each effect, by effect and name.
-    sizes : of the artefact, by name.
-    noise : of a coordinate, about the named model.
-    accuracy : figures of the lengths as recorded, by name; empty for artefacts without lengths.
-    statements : of conformity, in the job's order.
-    diagnosed : what the job's model leaves out, if anything.
-    stating : how a certificate states it; ``None`` of a result as evaluated.
-    causes : of what is stated to be in doubt about all observations together.
-    doubt : what they make of the model's unknowns; it is in ``values``.
-    contradictions : what denies averaged estimates, which are then not given.
-    """
+    """All that is known of a job after its analysis."""
 
     job: Job
     model: RecordingModel
-    findings: tuple[Finding, ...]
-    estimate: Estimate
-    posterior: NoisyPosterior
-    values: Floats
-    draws: Draws
-    parameters: Mapping[str, Mapping[str, Quantity]]
-    sizes: Mapping[str, Quantity]
-    noise: RecordingNoise
-    accuracy: Mapping[str, Quantity]
-    statements: tuple[Statement, ...]
-    diagnosed: JobDiagnosis
-    stating: StatedUncertainty | None = None
-    causes: tuple[Cause, ...] = ()
+    findings: tuple[Finding, ...]  # of the screening
+    estimate: Estimate  # least squares
+    posterior: NoisyPosterior  # of the model's own parameters and of its noise
+    values: Floats  # (N, k) draws of the model's unknowns, of the mixture where several explanations remain
+    draws: Draws  # of all that is reported, by name and chain
+    parameters: Mapping[str, Mapping[str, Quantity]]  # reported, by effect and name
+    sizes: Mapping[str, Quantity]  # of the artefact, by name
+    noise: RecordingNoise  # of a coordinate, about the named model
+    accuracy: Mapping[str, Quantity]  # figures of the lengths as recorded, by name; empty without lengths
+    statements: tuple[Statement, ...]  # of conformity, in the job's order
+    diagnosed: JobDiagnosis  # what the job's model leaves out, if anything
+    stating: StatedUncertainty | None = None  # how a certificate states it; ``None`` of a result as evaluated
+    causes: tuple[Cause, ...] = ()  # of what is stated to be in doubt about all observations together
+    # what the causes make of the model's unknowns; it is in ``values``
     doubt: Doubt = field(default_factory=lambda: Doubt(()))
-    contradictions: tuple[Contradiction, ...] = ()
+    contradictions: tuple[Contradiction, ...] = ()  # what denies averaged estimates, which are then not given
 
     def at_least(
         self, name: str, expanded: float, factor: float, unit: str, length_mm: float | None = None
@@ -348,10 +301,7 @@ class Result:
         return frozenset((*free, *(one.key for one in self.contradictions)))
 
     def differences(self, combination: tuple[tuple[str, str], ...]) -> tuple[ParameterDifference, ...]:
-        """Differences, within a combination that the recording leaves free, of parameters in one unit.
-
-        None with an uncertainty below the laboratory's capability.
-        """
+        """Of parameters in one unit that the recording leaves free together; U not below the laboratory's capability."""
         columns = {unknown.key: i for i, unknown in enumerate(self.posterior.unknowns)}
         units = {unknown.key: unknown.unit for unknown in self.posterior.unknowns}
         alike = [key for key in combination if units[key] == units[combination[0]]]
@@ -366,7 +316,6 @@ class Result:
 
     @cached_property
     def covariance(self) -> Covariance:
-        """Of all reported parameters and the artefact's sizes."""
         reported = self.model.reported(self.values)
         return Covariance.of_draws({".".join(key): values for key, values in reported.items()})
 

@@ -31,11 +31,7 @@ _ONE_HILL = 1.6
 
 
 def expanded(quantity: Quantity) -> tuple[Text, Text, Text]:
-    """Value, expanded uncertainty and coverage factor, as text.
-
-    The expanded uncertainty is given to two significant digits; the factor where U/u is one. What has one side, as a range
-    near zero, is its interval, without the other two.
-    """
+    """Value, U to two significant digits, and k where U/u is one; what has one side is its interval, without the other two."""
     if quantity.one_sided:
         return (interval_of(quantity), NO_FACTOR, NO_FACTOR)
     value, uncertainty = rounded(quantity.value, quantity.expanded)
@@ -146,34 +142,25 @@ Figure = tuple[Text, Text, Text]  # name of a quantity, its value with U and uni
 
 @dataclass(frozen=True)
 class Headline:
-    """A decision, or what a diagnosis comes to.
+    """A decision, or what a diagnosis comes to."""
 
-    ``word``: the outcome in capitals; ``standing``: what that means for the machine; ``subject``: what was decided;
-    ``remarks``: the figures it rests on, and what is missing.
-    """
-
-    word: str
-    standing: Standing
-    subject: Text
-    remarks: tuple[Text, ...]
+    word: str  # the outcome in capitals
+    standing: Standing  # what that means for the machine
+    subject: Text  # what was decided
+    remarks: tuple[Text, ...]  # the figures it rests on, and what is missing
 
 
 @dataclass(frozen=True)
 class Summary:
-    """An outcome for the end of a command.
+    """An outcome for the end of a command."""
 
-    ``subject, date``: what was measured, and when; ``verdicts``: what it comes to; ``figures``: quantities with their
-    uncertainty; ``remarks``: further sentences; ``details``: rows of a table that only who asks for everything wants to
-    see; ``warnings``: what the reader must know before using a figure.
-    """
-
-    subject: Text = NOTHING
+    subject: Text = NOTHING  # what was measured
     date: Text = NOTHING
-    verdicts: tuple[Headline, ...] = ()
+    verdicts: tuple[Headline, ...] = ()  # what it comes to
     figures: tuple[Figure, ...] = ()
     remarks: tuple[Text, ...] = ()
-    details: tuple[tuple[Text, ...], ...] = ()
-    warnings: tuple[Text, ...] = ()
+    details: tuple[tuple[Text, ...], ...] = ()  # rows of a table that only who asks for everything wants to see
+    warnings: tuple[Text, ...] = ()  # what the reader must know before using a figure
 
     @property
     def rows(self) -> tuple[tuple[str, ...], ...]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons, sentences
 from cmm_uq.certificate.document import Column, Document, Overview, Paragraph, Section, Standing, Table, text_columns
+from cmm_uq.certificate.pages.fleet_summary import counted
 from cmm_uq.laboratory.due.due import DueItem, State
 
 STATE_WORDS: Mapping[State, Text] = {
@@ -36,13 +37,12 @@ def due_document(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) ->
 def counts(items: Iterable[DueItem], on: dt.date, within: dt.timedelta) -> tuple[Text, Standing]:
     """How many are overdue, due soon and without a date, in words; and what that means."""
     found = Counter(one.state(on, within) for one in items)
-    parts: list[Text] = []
-    if found["overdue"]:
-        parts.append(say("{count} overdue", count=found["overdue"]))
-    if found["due"]:
-        parts.append(say("{count} due within {days} days", count=found["due"], days=within.days))
-    if found["unknown"]:
-        parts.append(say("{count} without a date", count=found["unknown"]))
+    words: tuple[tuple[State, Text], ...] = (
+        ("overdue", say("{count} overdue", count=found["overdue"])),
+        ("due", say("{count} due within {days} days", count=found["due"], days=within.days)),
+        ("unknown", say("{count} without a date", count=found["unknown"])),
+    )
+    parts = [text for state, text in words if found[state]]
     standing: Standing = "bad" if found["overdue"] else "open" if parts else "good"
     return (commas(parts) if parts else say("Nothing due within {days} days", days=within.days)), standing
 
@@ -50,16 +50,11 @@ def counts(items: Iterable[DueItem], on: dt.date, within: dt.timedelta) -> tuple
 def _overview(items: Sequence[DueItem], on: dt.date, within: dt.timedelta) -> Overview:
     verdict, standing = counts(items, on, within)
     found, blocked = Counter(one.item for one in items), sum(one.blocked is not None for one in items)
-    machines, artefacts, out_of_date = (
-        plural(found["machine"], one=say("one machine"), many=say("{count} machines", count=found["machine"])),
-        plural(found["artefact"], one=say("one artefact"), many=say("{count} artefacts", count=found["artefact"])),
-        plural(blocked, one=say("one machine"), many=say("{count} machines", count=blocked)),
-    )
-    looked_at = say("{machines} and {artefacts}", machines=machines, artefacts=artefacts)
-    rows: list[tuple[Text, Text]] = [(say("Looked at"), looked_at)]
-    if blocked:
-        rows.append((say("Artefact out of date"), out_of_date))
-    return Overview(verdict, standing, tuple(rows))
+    count = found["artefact"]
+    artefacts = plural(count, one=say("one artefact"), many=say("{count} artefacts", count=count))
+    looked_at = say("{machines} and {artefacts}", machines=counted(found["machine"]), artefacts=artefacts)
+    out_of_date = ((say("Artefact out of date"), counted(blocked)),) if blocked else ()
+    return Overview(verdict, standing, ((say("Looked at"), looked_at), *out_of_date))
 
 
 def _table(rows: Sequence[DueItem], on: dt.date, within: dt.timedelta, title: Text) -> Table:
@@ -80,9 +75,8 @@ def _table(rows: Sequence[DueItem], on: dt.date, within: dt.timedelta, title: Te
 
 def reason(one: DueItem) -> Text:
     """Why an item is due then, with all that is remarked of it."""
-    parts = [one.why, *((one.blocked,) if one.blocked else ())]
-    told = say("{parts:capital}.", parts=semicolons(parts))
-    return sentences((told, *one.remarks))
+    parts = semicolons([one.why, *((one.blocked,) if one.blocked else ())])
+    return sentences((say("{parts:capital}.", parts=parts), *one.remarks))
 
 
 def due_row(one: DueItem, on: dt.date, within: dt.timedelta) -> tuple[Text, ...]:

@@ -10,30 +10,9 @@ from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, day, number, plural, say
 from cmm_uq.base.points import Ints
 from cmm_uq.base.units import unit_as_written
-from cmm_uq.certificate.document import (
-    Block,
-    Column,
-    Document,
-    Paragraph,
-    Plot,
-    Section,
-    Table,
-    figure_columns,
-    text_columns,
-)
-from cmm_uq.certificate.pages.fleet_summary import (
-    called,
-    counted,
-    date_of,
-    digits,
-    fleet_overview,
-    fleet_warnings,
-    group_words,
-    machines_of,
-    per_year,
-    signed_rate,
-    usual_rate,
-)
+from cmm_uq.certificate import document as doc
+from cmm_uq.certificate.document import Column, Table, figure_columns, text_columns
+from cmm_uq.certificate.pages import fleet_summary as words
 from cmm_uq.certificate.plots.style import ACCENT, INK, dots, drawn, picture, strokes
 from cmm_uq.laboratory.due.drift import PARTS
 from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetValue, UsualRate
@@ -41,7 +20,7 @@ from cmm_uq.laboratory.due.fleet import FALSE_DISCOVERIES, FleetResult, FleetVal
 
 def fleet_plot(
     rows: Sequence[UsualRate], names: Sequence[Text], *, axis: Text, caption: Text, alternative: Text
-) -> Plot:
+) -> doc.Plot:
     rate, low, high = (np.array([getattr(row, name) for row in rows]) for name in ("rate", "lower", "upper"))
     at, height = np.arange(len(rows), dtype=np.float64), 14 + 5.5 * len(rows)
     with picture(height, left=0.3, right=0.985, bottom=9 / height, top=1 - 2 / height) as (figure, ax):
@@ -80,14 +59,14 @@ def all_values(found: FleetResult) -> Table:
         due: tuple[Text, Text] = DASH, DASH
         if of.fleet.estimates.crossing is not None:
             due = number(int(of.beyond.sum())), number(int(of.crosses_by(until).sum()))
-        rows.append((called(of), number(len(of.members)), usual_rate(of), unlike, *due))
+        rows.append((words.called(of), number(len(of.members)), words.usual_rate(of), unlike, *due))
     columns = (
         *text_columns(say("Value")), Column(say("Machines")), *text_columns(say("Average drift, U (95 %)")),
         *figure_columns(say("Unlike the fleet"), say("Beyond the limit"), say("Beyond within a year")),
     )  # fmt: skip
     note = say(
         "Beyond: at a machine's last certificate, and by {day}, a year after the newest of all, each with a probability of "
-        "50 % or more.", day=date_of(until),
+        "50 % or more.", day=words.date_of(until),
     )  # fmt: skip
     return Table(say("What is usual, and how many machines matter"), columns, tuple(rows), (note,))
 
@@ -100,13 +79,18 @@ def groups_shown(of: FleetValue) -> tuple[UsualRate, ...]:
 
 
 def usual_table(of: FleetValue) -> Table:
-    spec, shown = digits(of), groups_shown(of)
+    spec, shown = words.digits(of), groups_shown(of)
     columns = (
-        Column(say("Machines"), numeric=False), Column(say("Number")), Column(say("Rate"), per_year(of)),
-        Column(say("U (95 %)"), per_year(of)),
+        Column(say("Machines"), numeric=False), Column(say("Number")), Column(say("Rate"), words.per_year(of)),
+        Column(say("U (95 %)"), words.per_year(of)),
     )  # fmt: skip
     rows = tuple(
-        (group_words(each), number(each.machines), signed_rate(each.rate, spec), number(1.96 * each.u, spec))
+        (
+            words.group_words(each),
+            number(each.machines),
+            words.signed_rate(each.rate, spec),
+            number(1.96 * each.u, spec),
+        )
         for each in shown
     )
     notes: list[Text] = [say("A model at the fleet's average place; a place for the fleet's average machine.")]
@@ -119,17 +103,19 @@ def usual_table(of: FleetValue) -> Table:
     return Table(say("Usual drift"), columns, rows, tuple(notes))
 
 
-def outsiders(of: FleetValue) -> Block:
+def outsiders(of: FleetValue) -> doc.Block:
     """Machines that do not belong, the clearest first; or that there are none, or that nobody can know."""
     if not of.compared:
-        return Paragraph(say("Not enough history to compare machines: two at least need certificates of two days."))
+        return doc.Paragraph(say("Not enough history to compare machines: two at least need certificates of two days."))
     which = np.flatnonzero(~of.belongs)
     if not len(which):
-        return Paragraph(say("No machine drifts unlike the others."))
-    e, spec = of.fleet.estimates, digits(of)
+        return doc.Paragraph(say("No machine drifts unlike the others."))
+    e, spec = of.fleet.estimates, words.digits(of)
     shown = which[np.argsort(e.p[which], kind="stable")][:MOST_MACHINES]
-    columns = (*_own(of), Column(say("Expected"), per_year(of)), Column(say("p")))
-    rows = tuple((*_own_row(of, i), signed_rate(e.expected[i], spec), number(e.p[i], ".2g")) for i in map(int, shown))
+    columns = (*_own(of), Column(say("Expected"), words.per_year(of)), Column(say("p")))
+    rows = tuple(
+        (*_own_row(of, i), words.signed_rate(e.expected[i], spec), number(e.p[i], ".2g")) for i in map(int, shown)
+    )
     note = say(
         "Compared with what all other machines let expect, before its own certificates; of all machines and values named so, "
         "about {part:.0f} % are by chance (Benjamini and Hochberg).", part=100 * FALSE_DISCOVERIES,
@@ -172,21 +158,20 @@ def _left_out(shown: int, total: int) -> Text:
 
 
 def _own(of: FleetValue) -> tuple[Column, ...]:
-    rate = Column(say("Rate, U (95 %)"), per_year(of))
+    rate = Column(say("Rate, U (95 %)"), words.per_year(of))
     return *text_columns(say("Machine"), say("Model"), say("Place")), Column(say("Certificates")), rate
 
 
 def _own_row(of: FleetValue, i: int) -> tuple[Text, ...]:
-    e, member, spec = of.fleet.estimates, of.members[i], digits(of)
+    e, member, spec = of.fleet.estimates, of.members[i], words.digits(of)
     return (
         Verbatim(member.machine), Verbatim(member.model) if member.model else DASH,
         Verbatim(member.place) if member.place else DASH, number(len(member.history.day)),
-        say("{rate} ± {U}", rate=signed_rate(e.rate[i], spec), U=number(1.96 * e.u_rate[i], spec)),
+        say("{rate} ± {U}", rate=words.signed_rate(e.rate[i], spec), U=number(1.96 * e.u_rate[i], spec)),
     )  # fmt: skip
 
 
 def _crossed(of: FleetValue, i: int) -> tuple[Text, Text, Text]:
-    """Median day, and the ends of the interval."""
     crossing = of.fleet.estimates.crossing
     if crossing is None or of.members[i].limit is None:
         return DASH, DASH, DASH
@@ -198,7 +183,8 @@ def _crossed(of: FleetValue, i: int) -> tuple[Text, Text, Text]:
 
 
 def spreads_table(of: FleetValue) -> Table:
-    yearly = {"rate_sd": per_year(of), "model_sd": per_year(of), "place_sd": per_year(of), "steps_per_year": NOTHING}
+    rate = words.per_year(of)
+    yearly = {"rate_sd": rate, "model_sd": rate, "place_sd": rate, "steps_per_year": NOTHING}
     rows = tuple(
         (SPREADS[each.name], number(each.median, ".2g"),
          say("{low} to {high}", low=number(each.lower, ".2g"), high=number(each.upper, ".2g")),
@@ -209,35 +195,35 @@ def spreads_table(of: FleetValue) -> Table:
     return Table(say("How machines differ"), columns, rows)
 
 
-def fleet_document(found: FleetResult) -> Document:
-    """The page of a fleet, as of its newest certificate."""
+def fleet_document(found: FleetResult) -> doc.Document:
     values = plural(len(found.values), one=say("one value"), many=say("{count} values", count=len(found.values)))
-    return Document(
+    return doc.Document(
         title=say("Drift of a fleet"),
-        number=date_of(found.newest),
-        subject=say("{machines}, {values}", machines=counted(len(machines_of(found))), values=values),
-        warnings=fleet_warnings(found),
+        number=words.date_of(found.newest),
+        subject=say("{machines}, {values}", machines=words.counted(len(words.machines_of(found))), values=values),
+        warnings=words.fleet_warnings(found),
         sections=(
-            Section(say("All values"), (all_values(found),)),
-            *(Section(called(of), _blocks(of)) for of in found.values),
+            doc.Section(say("All values"), (all_values(found),)),
+            *(doc.Section(words.called(of), _blocks(of)) for of in found.values),
         ),
         attachments=(Verbatim("fleet.json"), Verbatim("fleet.csv")),
         produced_by=say("cmm-uq {version}, seed {seed}", version=Verbatim(__version__), seed=found.seed),
         end=say("End of page"),
-        overview=fleet_overview(found),
+        overview=words.fleet_overview(found),
     )
 
 
-def _blocks(of: FleetValue) -> tuple[Block, ...]:
+def _blocks(of: FleetValue) -> tuple[doc.Block, ...]:
     shown, chains = groups_shown(of), of.fleet.chains
     plot = fleet_plot(
-        shown, [group_words(each) for each in shown], axis=say("Rate in {unit}, with 95 % interval", unit=per_year(of)),
+        shown, [words.group_words(each) for each in shown],
+        axis=say("Rate in {unit}, with 95 % interval", unit=words.per_year(of)),
         caption=say("Usual drift of models and places."),
-        alternative=say("Average machine: {rate}.", rate=usual_rate(of)),
+        alternative=say("Average machine: {rate}.", rate=words.usual_rate(of)),
     )  # fmt: skip
     sampled = say(
         "Hyper-parameters sampled by {sampler} from {machines}: R-hat at most {rhat}, at least {ess} effective samples, "
-        "{steps} steps.", sampler=Verbatim(chains.sampler), machines=counted(of.fleet.learnt_from),
+        "{steps} steps.", sampler=Verbatim(chains.sampler), machines=words.counted(of.fleet.learnt_from),
         rhat=number(chains.rhat_max, ".3f"), ess=number(chains.ess_min, ".0f"), steps=chains.steps,
     )  # fmt: skip
-    return usual_table(of), plot, outsiders(of), soonest(of), spreads_table(of), Paragraph(sampled, tone="note")
+    return usual_table(of), plot, outsiders(of), soonest(of), spreads_table(of), doc.Paragraph(sampled, tone="note")

@@ -10,6 +10,7 @@ import csv
 import datetime as dt
 import io
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,6 @@ def serials(machines: Iterable[str]) -> Text:
 
 
 def date_of(ordinal: float) -> Text:
-    """A day."""
     return day(dt.date.fromordinal(int(ordinal)))
 
 
@@ -82,29 +82,54 @@ def usual_rate(of: FleetValue) -> Text:
 MOST_VERDICTS = 6  # machines and values that a terminal names as unlike their fleet
 
 
+@dataclass(frozen=True)
+class _Standings:
+    """Machines that matter: unlike their fleet, beyond a limit, and beyond one within a year."""
+
+    unlike: set[str]
+    beyond: set[str]
+    soon: set[str]
+
+
+def _standings(found: FleetResult) -> _Standings:
+    def named(which: Callable[[FleetValue], NDArray[np.bool_]]) -> set[str]:
+        return {of.members[i].machine for of in found.values for i in np.flatnonzero(which(of))}
+
+    beyond = named(lambda of: of.beyond)
+    return _Standings(named(lambda of: ~of.belongs), beyond, named(lambda of: of.crosses_by(found.in_a_year)) - beyond)
+
+
 def fleet_overview(found: FleetResult) -> Overview:
     """What comes before everything else on the page."""
-    word, standing = _verdict(found)
+    machines = _standings(found)
+    word, standing = _verdict(found, machines)
     rows = (
         (say("Compared"), _compared(found)),
-        (say("Unlike the fleet"), serials(_unlike(found))),
-        (say("Beyond a limit"), serials(_beyond(found))),
-        (say("Beyond by {day}", day=date_of(found.in_a_year)), serials(_soon(found))),
+        (say("Unlike the fleet"), serials(machines.unlike)),
+        (say("Beyond a limit"), serials(machines.beyond)),
+        (say("Beyond by {day}", day=date_of(found.in_a_year)), serials(machines.soon)),
     )
     return Overview(word, standing, tuple(row for row in rows if row[1]))
 
 
 def fleet_summary(found: FleetResult) -> Summary:
     """The same for a terminal; models and places are its details."""
-    word, standing = _verdict(found)
+    machines = _standings(found)
+    word, standing = _verdict(found, machines)
     outsiders = sorted(found.outsiders, key=lambda each: float(each[0].fleet.estimates.p[each[1]]))
     verdicts = tuple(
         Headline("DIFFERS", "open", say("machine {serial}", serial=Verbatim(of.members[i].machine)), (_differs(of, i),))
         for of, i in outsiders[:MOST_VERDICTS]
     )
     none = Headline("ALIKE" if found.compared else "UNKNOWN", standing, word, (_compared(found),))
-    left = len(outsiders) - MOST_VERDICTS
-    more = say("{count} more values of machines differ, less clearly: fleet.json has all", count=left)
+    left, beyond = len(outsiders) - MOST_VERDICTS, len(machines.beyond)
+    are = say("{count} machines are beyond a limit", count=beyond)
+    remarks = (
+        (left > 0, say("{count} more values of machines differ, less clearly: fleet.json has all", count=left)),
+        (beyond, plural(beyond, one=say("One machine is beyond a limit"), many=are)),
+        (machines.soon, say("{machines:capital} will probably be beyond a limit by {day}",
+                            machines=counted(len(machines.soon)), day=date_of(found.in_a_year))),
+    )  # fmt: skip
     return Summary(
         subject=counted(len(machines_of(found))), verdicts=verdicts or (none,),
         figures=tuple(
@@ -112,7 +137,7 @@ def fleet_summary(found: FleetResult) -> Summary:
              usual_rate(of), _counts(of, found.in_a_year))
             for of in found.values
         ),
-        remarks=(*((more,) if left > 0 else ()), *_due(found)),
+        remarks=tuple(text for holds, text in remarks if holds),
         details=tuple(
             (say("{quantity}: {group:small}", quantity=Verbatim(of.quantity), group=group_words(each)),
              rate_words(each.rate, 1.96 * each.u, of), counted(each.machines))
@@ -126,54 +151,24 @@ def machines_of(found: FleetResult) -> set[str]:
     return {member.machine for of in found.values for member in of.members}
 
 
-def _named(found: FleetResult, which: Callable[[FleetValue], NDArray[np.bool_]]) -> set[str]:
-    return {of.members[i].machine for of in found.values for i in np.flatnonzero(which(of))}
-
-
-def _unlike(found: FleetResult) -> set[str]:
-    return _named(found, lambda of: ~of.belongs)
-
-
-def _beyond(found: FleetResult) -> set[str]:
-    return _named(found, lambda of: of.beyond)
-
-
-def _soon(found: FleetResult) -> set[str]:
-    """That are not beyond a limit yet, and will be beyond one within a year."""
-    return _named(found, lambda of: of.crosses_by(found.in_a_year)) - _beyond(found)
-
-
-def _verdict(found: FleetResult) -> tuple[Text, Standing]:
+def _verdict(found: FleetResult, machines: _Standings) -> tuple[Text, Standing]:
     """Good only where nothing is left to do: a machine that drifts as all do may be beyond its limit with all."""
     if not found.compared:
         return say("Not enough history to compare machines"), "unknown"
-    unlike = len(_unlike(found))
-    if not unlike:
-        due = _beyond(found) or _soon(found)
-        return say("No machine drifts unlike its fleet"), "open" if due else "good"
-    told = plural(
-        unlike, one=say("One machine drifts unlike its fleet"),
-        many=say("{count} machines drift unlike their fleet", count=unlike),
-    )  # fmt: skip
-    return told, "open"
+    if not machines.unlike:
+        return say("No machine drifts unlike its fleet"), "open" if machines.beyond or machines.soon else "good"
+    count = len(machines.unlike)
+    many = say("{count} machines drift unlike their fleet", count=count)
+    return plural(count, one=say("One machine drifts unlike its fleet"), many=many), "open"
 
 
 def _compared(found: FleetResult) -> Text:
-    again = {member.machine for of in found.values for member in of.members if seen_again(member)}
+    count = len({member.machine for of in found.values for member in of.members if seen_again(member)})
+    total = len(machines_of(found))
     return plural(
-        len(again), one=say("one machine of {total} has certificates of two days", total=len(machines_of(found))),
-        many=say("{count} machines of {total} have certificates of two days", count=len(again),
-                 total=len(machines_of(found))),
+        count, one=say("one machine of {total} has certificates of two days", total=total),
+        many=say("{count} machines of {total} have certificates of two days", count=count, total=total),
     )  # fmt: skip
-
-
-def _due(found: FleetResult) -> tuple[Text, ...]:
-    beyond, soon = len(_beyond(found)), len(_soon(found))
-    many = say("{count} machines are beyond a limit", count=beyond)
-    are = plural(beyond, one=say("One machine is beyond a limit"), many=many)
-    will = say("{machines:capital} will probably be beyond a limit by {day}", machines=counted(soon),
-               day=date_of(found.in_a_year))  # fmt: skip
-    return (*((are,) if beyond else ()), *((will,) if soon else ()))
 
 
 def _counts(of: FleetValue, until: float) -> Text:
@@ -193,33 +188,26 @@ def _differs(of: FleetValue, i: int) -> Text:
 
 
 def fleet_warnings(found: FleetResult) -> tuple[Text, ...]:
-    """What the reader must know before using a figure."""
     return tuple(text for of in found.values for text in _warnings(of))
 
 
 def _warnings(of: FleetValue) -> list[Text]:
-    told: list[Text] = []
-    if not of.fleet.chains.converged:
-        told.append(say("{value}: the sampling did not converge (R-hat {rhat}); take its figures as rough",
-                        value=called(of), rhat=number(of.fleet.chains.rhat_max, ".3f")))  # fmt: skip
-    if of.left_out:
-        told.append(plural(
-            of.left_out,
-            one=say("{value}: one certificate states no uncertainty and cannot be weighed", value=called(of)),
-            many=say("{value}: {count} certificates state no uncertainty and cannot be weighed", value=called(of),
-                     count=of.left_out),
-        ))  # fmt: skip
-    if len(of.members) == 1:
-        told.append(say("{value}: one machine is no fleet; what machines have in common is assumed, not learnt",
-                        value=called(of)))  # fmt: skip
-    again = sum(seen_again(member) for member in of.members)
-    if not again:
-        told.append(say("{value}: no machine has certificates of two days; drift is assumed, not learnt",
-                        value=called(of)))  # fmt: skip
-    elif again == 1 < len(of.members):
-        told.append(say("{value}: only one machine has certificates of two days; no other shows a drift to compare it with",
-                        value=called(of)))  # fmt: skip
-    return told
+    value, chains, again = called(of), of.fleet.chains, sum(seen_again(member) for member in of.members)
+    rough = say("{value}: the sampling did not converge (R-hat {rhat}); take its figures as rough", value=value,
+                rhat=number(chains.rhat_max, ".3f"))  # fmt: skip
+    left_out = plural(
+        of.left_out, one=say("{value}: one certificate states no uncertainty and cannot be weighed", value=value),
+        many=say("{value}: {count} certificates state no uncertainty and cannot be weighed", value=value, count=of.left_out),
+    )  # fmt: skip
+    alone = say("{value}: one machine is no fleet; what machines have in common is assumed, not learnt", value=value)
+    assumed = say("{value}: no machine has certificates of two days; drift is assumed, not learnt", value=value)
+    single = say("{value}: only one machine has certificates of two days; no other shows a drift to compare it with",
+                 value=value)  # fmt: skip
+    warnings = (
+        (not chains.converged, rough), (of.left_out, left_out), (len(of.members) == 1, alone), (not again, assumed),
+        (again == 1 < len(of.members), single),
+    )  # fmt: skip
+    return [text for holds, text in warnings if holds]
 
 
 SCHEMA = "cmm-uq/fleet/1"
@@ -269,10 +257,7 @@ def _machines(of: FleetValue) -> list[dict[str, Any]]:
 
 
 def fleet_csv(data: Mapping[str, Any]) -> bytes:
-    """A row a machine and value, of what :func:`fleet_data` gave; rates per year in the unit of the row.
-
-    A name that a spreadsheet would compute has an apostrophe before it, as a spreadsheet marks text.
-    """
+    """A row a machine and value of :func:`fleet_data`; a name that a spreadsheet would compute has an apostrophe."""
     rows = [
         {"value": of["name"], "quantity": of["quantity"], "unit": of["unit"], **one} | (one["crossing"] or {})
         for of in data["values"] for one in of["machines"]

@@ -13,19 +13,7 @@ from cmm_uq import __version__
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, commas, day, number, plural, say, semicolons
 from cmm_uq.base.points import Floats, Ints
 from cmm_uq.base.units import unit_as_written
-from cmm_uq.certificate.document import (
-    Block,
-    Column,
-    Document,
-    Facts,
-    Overview,
-    Paragraph,
-    Plot,
-    Section,
-    Standing,
-    Table,
-    text_columns,
-)
+from cmm_uq.certificate import document as doc
 from cmm_uq.certificate.plots.style import ACCENT, BAD, BAND, INK, MUTED, bars, dots, drawn, note, picture
 from cmm_uq.certificate.wording import OUTCOME_WORDS
 from cmm_uq.jobs.verdicts import BEYOND, NONE
@@ -52,22 +40,19 @@ STATE_WORDS: Mapping[str, Text] = {
 
 def value_row(history: MachineHistory, one: ValueHistory) -> tuple[Text, ...]:
     series = one.series
-    value, expanded = rounded(float(series.value[-1]), COVERAGE * float(series.u[-1]))
     limit = DASH if series.limit is None else limit_in_full(series.limit)
     trend = (DASH, DASH) if one.line is None else rounded(one.line.slope, COVERAGE * one.line.u_slope)
+    change: tuple[Text, Text] = (DASH, DASH)
+    if one.change is not None:
+        value, expanded = rounded(one.change.value, COVERAGE * one.change.u)
+        if one.adjusted:
+            change = say("{value} adjusted", value=value), expanded
+        else:
+            change = say("{value} significant", value=value) if history.significant(one) else value, expanded
     return (
-        Verbatim(series.quantity), value, expanded, unit_as_written(series.unit), *_change(history, one), *trend, limit,
-        meets(one, history.on),
+        Verbatim(series.quantity), *rounded(float(series.value[-1]), COVERAGE * float(series.u[-1])),
+        unit_as_written(series.unit), *change, *trend, limit, meets(one, history.on),
     )  # fmt: skip
-
-
-def _change(history: MachineHistory, one: ValueHistory) -> tuple[Text, Text]:
-    if one.change is None:
-        return DASH, DASH
-    value, expanded = rounded(one.change.value, COVERAGE * one.change.u)
-    if one.adjusted:
-        return say("{value} adjusted", value=value), expanded
-    return (say("{value} significant", value=value) if history.significant(one) else value), expanded
 
 
 def meets(one: ValueHistory, on: dt.date) -> Text:
@@ -93,7 +78,6 @@ def meets(one: ValueHistory, on: dt.date) -> Text:
 
 
 def model_note(history: MachineHistory) -> Text:
-    """Which model the days of crossing are of."""
     learnt = {one.prior is not None for one in history.values if one.series.limit is not None}
     model = say("the drift model without a fleet")
     if True in learnt:
@@ -164,7 +148,8 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
     rows = zip(
         dates, series.value, series.u, series.u_artefact, series.artefact, series.entry, series.interim, strict=True
     )
-    found: dict[str, Any] = {
+    change, line, crossing = one.change, one.line, one.crossing
+    return {
         "quantity": series.quantity, "unit": series.unit, "limit": series.limit, "beyond_limit": one.beyond,
         "outcome": one.outcome or None,
         "recorded": [
@@ -172,27 +157,22 @@ def _value_data(history: MachineHistory, one: ValueHistory) -> dict[str, Any]:
              "entry": int(entry), "interim": bool(interim)}
             for date, value, u, common, artefact, entry, interim in rows
         ],
-        "change": None, "trend": None, "crosses_limit": None,
-    }  # fmt: skip
-    if one.change is not None:
-        found["change"] = {
-            "value": one.change.value, "u": one.change.u, "p": one.change.chance, "adjusted_between": one.adjusted,
+        "change": None if change is None else {
+            "value": change.value, "u": change.u, "p": change.chance, "adjusted_between": one.adjusted,
             "significant": history.significant(one),
-        }  # fmt: skip
-    if one.line is not None:
-        found["trend"] = {
-            "date": dt.date.fromordinal(one.line.day).isoformat(), "value": one.line.value, "per_year": one.line.slope,
-            "u_per_year": one.line.u_slope, "count": one.line.count, "birge_ratio": one.line.excess,
-        }  # fmt: skip
-    if one.crossing is not None:
-        found["crosses_limit"] = {"model": "drift", "fleet": one.prior is not None, **one.crossing.data()}
-    return found
+        },
+        "trend": None if line is None else {
+            "date": dt.date.fromordinal(line.day).isoformat(), "value": line.value, "per_year": line.slope,
+            "u_per_year": line.u_slope, "count": line.count, "birge_ratio": line.excess,
+        },
+        "crosses_limit": crossing and {"model": "drift", "fleet": one.prior is not None, **crossing.data()},
+    }  # fmt: skip
 
 
 _AHEAD = 2.0  # years after the last recording that are shown at least, where there is a trend
 
 
-def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:
+def trend_plot(history: MachineHistory, one: ValueHistory) -> doc.Plot:
     from matplotlib.ticker import MaxNLocator
 
     series = one.series
@@ -211,12 +191,23 @@ def trend_plot(history: MachineHistory, one: ValueHistory) -> Plot:
         adjusted = [when for when in _years(np.unique(since[since > 0])) if when > left]
         for when in adjusted:
             ax.axvline(when, color=MUTED, lw=0.9, ls=(0, (1, 2)), zorder=1)
-        _limit(ax, series.limit, float(np.abs(np.concatenate([y - U, y + U])).max()))
+        if series.limit is None:
+            ax.margins(y=0.1)
+        else:
+            for side in (1.0, -1.0):
+                ax.axhline(side * series.limit, color=BAD, lw=1.0, ls=(0, (4, 3)), zorder=2)
+            top = 1.12 * max(series.limit, float(np.abs(np.concatenate([y - U, y + U])).max()))
+            ax.set_ylim(-top, top)
         ax.set(xlabel=say("Year"), ylabel=Verbatim(series.unit), xlim=(left, right))
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         ax.ticklabel_format(axis="x", useOffset=False, style="plain")
         ax.grid(axis="y")
-        note(figure, _legend(one, adjusted=bool(adjusted), checked=bool(check.any())))
+        parts = (
+            (True, say("bars: U (k = 2)")), (series.limit is not None, say("dashed: limits")),
+            (one.line is not None, say("line: straight trend with its U")), (adjusted, say("dotted: adjusted")),
+            (check.any(), say("hollow: interim checks")),
+        )  # fmt: skip
+        note(figure, semicolons([text for is_drawn, text in parts if is_drawn]))
         return drawn(figure, say("{name} over time.", name=Verbatim(series.quantity)), _told(history, one))
 
 
@@ -242,28 +233,6 @@ def _line(ax: Axes, one: ValueHistory, last: float) -> float:
     return float(x[-1])
 
 
-def _limit(ax: Axes, limit: float | None, largest: float) -> None:
-    """Limits as lines, the lower one only where values are near it; without any the values fill the picture."""
-    if limit is None:
-        ax.margins(y=0.1)
-        return
-    for side in (1.0, -1.0):
-        ax.axhline(side * limit, color=BAD, lw=1.0, ls=(0, (4, 3)), zorder=2)
-    top = 1.12 * max(limit, largest)
-    ax.set_ylim(-top, top)
-
-
-def _legend(one: ValueHistory, *, adjusted: bool, checked: bool) -> Text:
-    parts = [
-        say("bars: U (k = 2)"),
-        say("dashed: limits") if one.series.limit is not None else NOTHING,
-        say("line: straight trend with its U") if one.line is not None else NOTHING,
-        say("dotted: adjusted") if adjusted else NOTHING,
-        say("hollow: interim checks") if checked else NOTHING,
-    ]
-    return semicolons([part for part in parts if part])
-
-
 def _told(history: MachineHistory, one: ValueHistory) -> Text:
     series = one.series
     first, last = (rounded(float(series.value[i]), COVERAGE * float(series.u[i]))[0] for i in (0, -1))
@@ -277,18 +246,26 @@ def _told(history: MachineHistory, one: ValueHistory) -> Text:
     return say("{what}; limit {limit}: {meets}.", what=what, limit=limit, meets=meets(one, history.on))
 
 
-def history_document(history: MachineHistory) -> Document:
+def history_document(history: MachineHistory) -> doc.Document:
     machine = history.machine
+    given = (
+        (say("Machine"), machine.name), (say("Serial number"), "" if machine.by_name else machine.serial),
+        (say("Manufacturer"), machine.manufacturer), (say("Model"), machine.model), (say("Place"), machine.place),
+    )  # fmt: skip
+    particulars: list[tuple[Text, Text]] = [(label, Verbatim(text)) for label, text in given if text]
+    particulars.append((say("Recordings"), _counted(history)))
+    if machine.adjusted:
+        particulars.append((say("Adjusted"), commas([day(when) for when in machine.adjusted])))
     sections = (
-        Section(say("Values and trends"), _values(history)),
-        Section(say("Over time"), tuple(trend_plot(history, one) for one in history.values)),
-        Section(say("Certificates and interim checks"), _certificates(history)),
+        doc.Section(say("Values and trends"), _values(history)),
+        doc.Section(say("Over time"), tuple(trend_plot(history, one) for one in history.values)),
+        doc.Section(say("Certificates and interim checks"), _certificates(history)),
     )
-    return Document(
+    return doc.Document(
         title=say("History of a machine"),
         number=Verbatim(machine.serial),
         subject=say("{name}, up to {on}", name=Verbatim(machine.name), on=day(history.on)),
-        particulars=(Facts(_particulars(history)),),
+        particulars=(doc.Facts(tuple(particulars)),),
         warnings=history.remarks,
         sections=tuple(section for section in sections if section.blocks),
         attachments=(Verbatim("history.json"),),
@@ -298,52 +275,37 @@ def history_document(history: MachineHistory) -> Document:
     )
 
 
-def overview_of(history: MachineHistory) -> Overview:
+def overview_of(history: MachineHistory) -> doc.Overview:
     """Whether anything is beyond its limit, and what changed."""
-    beyond = [Verbatim(one.series.quantity) for one in history.values if one.beyond]
-    probable = [Verbatim(one.series.quantity) for one in history.values if one.probably_beyond(history.on)]
-    changed = [Verbatim(one.series.quantity) for one in history.values if history.significant(one)]
+    beyond, probable, changed = (
+        [Verbatim(one.series.quantity) for one in history.values if holds(one)]
+        for holds in (lambda one: one.beyond, lambda one: one.probably_beyond(history.on), history.significant)
+    )
     last = history.decision
     fails, open_ = bool(beyond) or last in BEYOND, last not in (*BEYOND, "pass", NONE)
-    standing: Standing = "bad" if fails else "open" if open_ or probable or changed or not history.values else "good"
+    standing: doc.Standing = (
+        "bad" if fails else "open" if open_ or probable or changed or not history.values else "good"
+    )
     verdicts = (
         (not history.values, say("Nothing is recorded yet")), (fails, say("Beyond its limits")),
         (open_, say("Its last certificate does not state that it conforms")),
-        (bool(probable), say("Probably beyond a limit by now")), (bool(changed), say("Changed since the last time")),
+        (probable, say("Probably beyond a limit by now")), (changed, say("Changed since the last time")),
+        (True, say("No change that stands out")),
     )  # fmt: skip
-    verdict = next((text for holds, text in verdicts if holds), say("No change that stands out"))
     rows: list[tuple[Text, Text]] = []
     if last != NONE:
         rows.append((say("Last decision"), OUTCOME_WORDS.get(last, Verbatim(last))))
-    if beyond:
-        rows.append((say("Beyond a limit"), commas(beyond)))
-    if changed:
-        rows.append((say("Changed significantly"), commas(changed)))
-    nearest = min(
-        (
-            (day, i) for i, one in enumerate(history.values)
-            if one.crossing is not None and not one.beyond and (day := one.crossing.quantile(0.5)) is not None
-        ), default=None,
-    )  # fmt: skip
-    if nearest is not None:
-        first = history.values[nearest[1]]
-        rows.append((say("First to cross its limit"), say(
-            "{name}: {when}", name=Verbatim(first.series.quantity), when=meets(first, history.on),
-        )))  # fmt: skip
-    return Overview(verdict, standing, tuple(rows))
-
-
-def _particulars(history: MachineHistory) -> tuple[tuple[Text, Text], ...]:
-    machine = history.machine
-    said = (
-        (say("Machine"), machine.name), (say("Serial number"), "" if machine.by_name else machine.serial),
-        (say("Manufacturer"), machine.manufacturer), (say("Model"), machine.model), (say("Place"), machine.place),
-    )  # fmt: skip
-    rows: list[tuple[Text, Text]] = [(label, Verbatim(text)) for label, text in said if text]
-    rows.append((say("Recordings"), _counted(history)))
-    if machine.adjusted:
-        rows.append((say("Adjusted"), commas([day(one) for one in machine.adjusted])))
-    return tuple(rows)
+    rows += [(label, commas(names)) for label, names in (
+        (say("Beyond a limit"), beyond), (say("Changed significantly"), changed),
+    ) if names]  # fmt: skip
+    medians = (
+        (one.crossing.quantile(0.5), one) for one in history.values if one.crossing is not None and not one.beyond
+    )
+    first = min(((when, one) for when, one in medians if when is not None), key=lambda pair: pair[0], default=None)
+    if first is not None:
+        name, when = Verbatim(first[1].series.quantity), meets(first[1], history.on)
+        rows.append((say("First to cross its limit"), say("{name}: {when}", name=name, when=when)))
+    return doc.Overview(next(text for holds, text in verdicts if holds), standing, tuple(rows))
 
 
 def _counted(history: MachineHistory) -> Text:
@@ -356,18 +318,18 @@ def _counted(history: MachineHistory) -> Text:
     return say("{certificates}, {checks}", certificates=told, checks=more)
 
 
-def _values(history: MachineHistory) -> tuple[Block, ...]:
+def _values(history: MachineHistory) -> tuple[doc.Block, ...]:
     if not history.values:
-        return (Paragraph(say("No value of this machine is recorded.")),)
-    columns = tuple(Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
+        return (doc.Paragraph(say("No value of this machine is recorded.")),)
+    columns = tuple(doc.Column(heading, numeric=heading not in WORDS) for heading in HEADINGS)
     rows = tuple(value_row(history, one) for one in history.values)
-    return (Table(say("Error factors and figures of performance"), columns, rows, notes(history)),)
+    return (doc.Table(say("Error factors and figures of performance"), columns, rows, notes(history)),)
 
 
-def _certificates(history: MachineHistory) -> tuple[Block, ...]:
+def _certificates(history: MachineHistory) -> tuple[doc.Block, ...]:
     if not history.certificates:
         return ()
-    columns = text_columns(say("Date"), say("Number"), say("What"), say("State"), say("Artefact"), say("Decision"),
+    columns = doc.text_columns(say("Date"), say("Number"), say("What"), say("State"), say("Artefact"), say("Decision"),
                            say("Adjusted before"))  # fmt: skip
     rows = tuple(
         (
@@ -377,4 +339,4 @@ def _certificates(history: MachineHistory) -> tuple[Block, ...]:
         )
         for one in reversed(history.certificates)
     )  # fmt: skip
-    return (Table(say("Newest first"), columns, rows),)
+    return (doc.Table(say("Newest first"), columns, rows),)

@@ -22,11 +22,7 @@ def trumpet(
     length_mm: ArrayLike, error_um: ArrayLike, *, limit_um: ArrayLike, acceptance_um: Sequence[float | None],
     expanded_um: ArrayLike, outside: ArrayLike, quantity: Text, caption: Text, alternative: Text,
 ) -> Plot:  # fmt: skip
-    """Errors against their limits on both sides of zero.
-
-    All (m,) in µm but the lengths: errors, their limits, largest size that is accepted (``None`` where none is), expanded
-    uncertainty (k = 2), and which errors are marked as not accepted.
-    """
+    """Errors against limits on both sides of zero, all (m,), µm; U with k = 2; ``acceptance_um`` None: none is accepted."""
     x = style.finite("length_mm", length_mm, (None,))
     y, top, U = (style.finite(name, values, x.shape) for name, values in
                  (("error_um", error_um), ("limit_um", limit_um), ("expanded_um", expanded_um)))  # fmt: skip
@@ -72,11 +68,7 @@ _MANY = 8  # rows beyond which they stand closer together
 def tolerance_plot(
     names: Sequence[Text], ratio: ArrayLike, low: ArrayLike, high: ArrayLike, *, caption: Text, alternative: Text
 ) -> Plot:
-    """Parameters over their tolerances, one row each: inside the band is inside the tolerance.
-
-    ``ratio``: (n,) estimate over tolerance, signed; ``low, high``: (n,) ends of its coverage interval over the
-    tolerance.
-    """
+    """Parameters over their tolerances, (n,), a row each: the estimate, signed, and the ends of its coverage interval."""
     value = style.finite("ratio", ratio, (len(names),))
     ends = style.finite("low", low, value.shape), style.finite("high", high, value.shape)
     rows = np.arange(len(value), dtype=np.float64)

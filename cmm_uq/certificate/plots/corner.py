@@ -1,8 +1,4 @@
-"""The posterior distribution of several parameters: each density, and each pair.
-
-All panels live in one set of axes and every line style is one path: an eight-parameter corner is a few dozen vector
-objects, where a grid of axes with points would be thousands.
-"""
+"""The posterior distribution of several parameters: each density, and each pair, on one set of axes as few paths."""
 
 from __future__ import annotations
 

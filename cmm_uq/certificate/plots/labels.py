@@ -54,10 +54,7 @@ def narrowed(text: Text, room_mm: float) -> Text:
 
 
 def folded(text: Text, room_mm: float, size: float = SMALL, weight: str = "normal") -> list[Text]:
-    """A name as it is lettered, in two lines where one has no room for it, the first as long as it goes; the second is cut.
-
-    They are for texts of their own: the ends of several lines of one would not stand below each other in other fonts.
-    """
+    """A name as it is lettered, in two texts where one line lacks room: lines of one text would not align in other fonts."""
     whole = str.__str__(lettered(text))
     if width_mm(whole, size, weight) <= room_mm:
         return [text]
@@ -106,10 +103,7 @@ _LARGEST = 300
 
 
 def shown(sizes: Sequence[Floats], flagged: NDArray[np.bool_] | None = None, most: int = MOST) -> Ints:
-    """Rows to draw, ascending: all where there are no more than ``most``.
-
-    ``sizes``: (n,) each; the largest of every one are drawn; ``flagged``: (n,) what is drawn before anything else.
-    """
+    """Rows to draw, ascending: of more than ``most`` those flagged, the largest of each size (n,), and some others."""
     count = len(sizes[0])
     if count <= most:
         return np.arange(count)

@@ -30,10 +30,7 @@ _TEXT_MM = 15.0
 
 
 def placing_pictures(placings: Sequence[SetUp], box: Floats, first: int) -> list[Plot]:
-    """Placings in the machine's volume seen from the front, three in a row.
-
-    ``box``: (3, 2) volume, scale readings, mm.
-    """
+    """Set-ups in the machine's volume, (3, 2) scale readings in mm, seen from the front, three in a row."""
     rows = [placings[i : i + A_ROW] for i in range(0, len(placings), A_ROW)]
     return [_row(row, box, first + A_ROW * i) for i, row in enumerate(rows)]
 
@@ -133,10 +130,7 @@ def gain_plot(
     labels: Sequence[Text], before: Sequence[float | None], after: Sequence[float | None], *, names: tuple[Text, Text],
     quantity: Text,
 ) -> Plot:  # fmt: skip
-    """Before and after for each effect, over the larger of the two; what has no finite value stands at the right edge.
-
-    ``before, after``: smaller is better; ``None`` for infinitely large.
-    """
+    """Before and after, smaller is better, over the larger of the two; ``None``, infinite, stands at the right edge."""
     pairs = np.array(
         [[np.inf if v is None or not np.isfinite(v) else v for v in series] for series in (before, after)]
     ).T

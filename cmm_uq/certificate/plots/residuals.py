@@ -1,8 +1,4 @@
-"""Lengths, residuals, error fields, curves and budgets as pictures.
-
-Each function takes plain arrays and words and gives back a :class:`~cmm_uq.certificate.document.Plot`. Nothing is
-computed here but where the ink goes. The posterior's picture is in :mod:`cmm_uq.certificate.plots.corner`.
-"""
+"""Lengths, residuals, error fields, curves and budgets as pictures; nothing is computed but where the ink goes."""
 
 from __future__ import annotations
 
@@ -205,10 +201,7 @@ def curve_with_band(
     x: ArrayLike, y: ArrayLike, expanded: ArrayLike, *, x_label: Text, y_label: Text,
     points: tuple[ArrayLike, ArrayLike] | None = None, caption: Text, alternative: Text,
 ) -> Plot:  # fmt: skip
-    """A curve (n,) with the band of its expanded uncertainty (n,), and optional points that it was drawn through.
-
-    Labels carry their units, such as "Error / µm".
-    """
+    """A curve (n,) with the band of its expanded uncertainty (n,), and optional points that it was drawn through."""
     across = style.finite("x", x, (None,))
     values, half = style.finite("y", y, across.shape), style.finite("expanded uncertainty", expanded, across.shape)
     # room for ticks of six characters
@@ -257,10 +250,7 @@ def budget_bars(sources: Sequence[Text], shares: ArrayLike, *, caption: Text, al
 
 
 def residual_volume(result: Result, what: Text) -> Plot:
-    """Residuals of observations of one point each, or of pairs of points (drawn as bars), over the scale readings.
-
-    ``what``: the points in words, as ``faces``.
-    """
+    """Residuals of points, or of pairs (bars), over the scale readings; ``what``: the points in words, ``faces``."""
     artefact, residuals = result.artefact, result.residuals / MICROMETRE
     readings, travel = artefact.points.machine_xyz, artefact.points.machine.travel_mm
     ends = readings[artefact.rows]

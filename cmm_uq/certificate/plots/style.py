@@ -168,10 +168,7 @@ _SETTINGS = {
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Settings under which a figure is both built and written.
-
-    Characters that the measuring font lacks are no matter: the viewer's font draws them.
-    """
+    """Settings under which a figure is built and written; the viewer's font draws what the measuring font lacks."""
     import matplotlib as mpl
 
     with mpl.rc_context({**_SETTINGS, "font.family": measuring_fonts()}), warnings.catch_warnings():

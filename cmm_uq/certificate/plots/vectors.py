@@ -32,10 +32,7 @@ def vector_plot(
     position_mm: ArrayLike, series: Sequence[tuple[Text, ArrayLike]], *,
     axis_labels: tuple[Text, Text] = (say("x / mm"), say("y / mm")), caption: Text, alternative: Text,
 ) -> Plot:  # fmt: skip
-    """Vectors in a plane, one panel a series, all magnified alike, with a scale arrow of a round length.
-
-    ``position_mm``: (n, 2) where each vector stands; ``series``: title and (n, 2) vectors in µm; one to three of them.
-    """
+    """(n, 2) vectors in µm at (n, 2) places in mm, one to three series, a panel each, magnified alike, with a scale."""
     place = style.finite("position_mm", position_mm, (None, 2))
     vectors = [style.finite("vectors", values, place.shape) for _, values in series]
     rows = shown([np.linalg.norm(values, axis=1) for values in vectors])

@@ -28,10 +28,7 @@ _REMARKS = ("Remarks", "Deviations from the method", "Results of external provid
 
 
 def fitted(document: Document) -> Document:
-    """The document with what its first page has no room for behind it: first of remarks, then of warnings.
-
-    All warnings are named on the page; of those that differ in their figures alone the first, with how many there are.
-    """
+    """Remarks, then warnings, without room go behind the first page; of warnings that differ in figures the first stays."""
     if not document.decides or _height(document) <= _PAGE:
         return document
     for shorter in (_remarks_behind, _warnings_behind):
@@ -58,13 +55,11 @@ def _remarks_behind(document: Document) -> Document:
     long = [row for facts in document.particulars for row in facts.rows if _may_continue(row)]
     if not long:
         return document
-
-    def begun(row: tuple[Text, Text]) -> tuple[Text, Text]:
-        if not _may_continue(row):
-            return row
-        return row[0], sentences((_beginning(row[1]), _said(document, _IN_FULL)))
-
-    shown = tuple(Facts(tuple(map(begun, facts.rows))) for facts in document.particulars)
+    in_full = _said(document, _IN_FULL)
+    shown = tuple(
+        Facts(tuple((row[0], sentences((_beginning(row[1]), in_full))) if row in long else row for row in facts.rows))
+        for facts in document.particulars
+    )
     behind = Section(_said(document, WORDS["particulars"]), (Facts(tuple(long)),))
     *others, annex = _around(document)
     return replace(document, particulars=shown, sections=(*chain(*others), behind, *annex))
@@ -123,17 +118,14 @@ def _around(document: Document) -> tuple[list[Section], ...]:
 
 
 def _height(document: Document) -> float:
-    return sum(_parts(document))
-
-
-def _parts(document: Document) -> Iterator[float]:
     address = 5 + 3.7 * max(0, len(document.issuer) - 1) if document.issuer else 0
     head = max(19.0 if document.logo else 0.0, address)
-    yield 17 + head + (8 if head else 0) + 4.1 * _lines(document.subject, 170, 10)
-    yield _MEASURED * sum(_middle(document))
+    height = 17 + head + (8 if head else 0) + 4.1 * _lines(document.subject, 170, 10)
+    height += _MEASURED * sum(_middle(document))
     if document.statements or document.signatures:
-        said = sum(3 + 3.7 * _lines(text, 170, 9) for text in document.statements)
-        yield 9 + said + 23 * -(-len(document.signatures) // 3)
+        statements = sum(3 + 3.7 * _lines(text, 170, 9) for text in document.statements)
+        height += 9 + statements + 23 * -(-len(document.signatures) // 3)
+    return height
 
 
 def _middle(document: Document) -> Iterator[float]:

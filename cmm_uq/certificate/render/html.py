@@ -1,7 +1,4 @@
-"""A document as one self-contained HTML page.
-
-It opens anywhere, prints to A4, needs nothing else; what it looks like is in ``templates/document.html`` and ``.css``.
-"""
+"""A document as one self-contained HTML page, by ``templates/document.html`` and ``.css``."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.languages.translation import code_of
 from cmm_uq.certificate.document import Document, view_words
-from cmm_uq.certificate.plots import style as plot_style
+from cmm_uq.certificate.plots.style import COLOURS
 from cmm_uq.certificate.render.fitting import fitted, picture_share, tightness
 
 if TYPE_CHECKING:
@@ -31,15 +28,9 @@ def template_folder() -> Path:
 
 
 def render_html(document: Document) -> str:
-    """The document as one self-contained page, plots inline."""
-    shown = fitted(document)
-    return (
-        _environment()
-        .get_template("document.html")
-        .render(
-            document=shown.as_data(), words=view_words(code_of(document.language)), colour=plot_style.COLOURS,
-            picture=picture_share(shown), tight=tightness(shown),
-        )
+    shown, words = fitted(document), view_words(code_of(document.language))
+    return _environment().get_template("document.html").render(
+        document=shown.as_data(), words=words, colour=COLOURS, picture=picture_share(shown), tight=tightness(shown)
     )  # fmt: skip
 
 
@@ -48,7 +39,7 @@ def style_sheet(heading: str, banner: str, language: str) -> str:
     title, _, number = heading.partition(" ")
     document = {"title": title, "number": number, "banner": banner, "language": language}
     words = view_words(code_of(language))
-    return _environment().get_template("document.css").render(document=document, words=words, colour=plot_style.COLOURS)
+    return _environment().get_template("document.css").render(document=document, words=words, colour=COLOURS)
 
 
 @cache

@@ -30,15 +30,9 @@ EPOCH = "1970-01-01"
 """Date of a PDF whose document has none: the clock is never read, so the same document gives the same bytes."""
 
 _TYPES = {
-    ".csv": "text/csv",
-    ".html": "text/html",
-    ".json": "application/json",
-    ".npz": "application/zip",
-    ".pdf": "application/pdf",
-    ".toml": "application/toml",
-    ".txt": "text/plain",
-    ".xml": "application/xml",
-}
+    ".csv": "text/csv", ".html": "text/html", ".json": "application/json", ".npz": "application/zip",
+    ".pdf": "application/pdf", ".toml": "application/toml", ".txt": "text/plain", ".xml": "application/xml",
+}  # fmt: skip
 
 
 def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
@@ -63,10 +57,7 @@ def render_pdf(document: Document, attachments: Mapping[str, bytes]) -> bytes:
 
 
 def picture(template: str, content: Mapping[str, Any], language: Code = "en") -> bytes:
-    """A template alone as a PDF page without tags, to be shown inside another.
-
-    ``content``: what it shows, as ``document``; characters that no font has become □.
-    """
+    """A template alone as a PDF page without tags, to be shown inside another; characters that no font has become □."""
     compiled = partial(_compile, template=template, standards=("a-3b",), tagged=False)
     shown = {"document": content, "colour": COLOURS, "fonts": [FACE, JAPANESE] if language == "ja" else [FACE]}
     return _with_fallback(shown, [str(file.parent) for file in fonts_of(language)], compiled)
@@ -99,7 +90,9 @@ def _with_fallback(content: dict[str, Any], folders: list[str], compiled: Callab
         except TypstError as error:
             lacking = _missing(error)
             if not lacking or missing:
-                raise _refused(error) from error
+                hints = f" ({'; '.join(error.hints)})" if error.hints else ""
+                fix = "The HTML view has the same content; please report this with the job that caused it"
+                raise CmmUqError(f"the PDF could not be made: {error.message}{hints}", fix=fix) from error
             missing = lacking if system_fonts else []
     raise AssertionError("unreachable")
 
@@ -143,14 +136,6 @@ def _without(content: dict[str, Any], missing: list[str]) -> dict[str, Any]:
     return {**content, "document": shown(content["document"]), "missing": codes}
 
 
-def _refused(error: Any) -> CmmUqError:
-    hints = "; ".join(error.hints)
-    return CmmUqError(
-        f"the PDF could not be made: {error.message}{f' ({hints})' if hints else ''}",
-        fix="The HTML view has the same content; please report this with the job that caused it",
-    )
-
-
 WIDTH_MM, HEIGHT_MM = 84.0, 8.0
 LEFT_MM, BOTTOM_MM, GAP_MM = 20.0, 3.5, 2.0
 """Of the first seal on a page A4; a second stands beside it. The text of a page ends 22 mm, its foot 10 mm above the edge."""
@@ -177,9 +162,7 @@ def seal(
         "mark": str.__str__(said(say("TEST"))) if signer.test_key else "",
     }, code_of(language))  # fmt: skip
     says = said(sentences([*mark, say("{head}: {facts}.", head=head, facts=facts)]))
-    return Seal(shown, tuple(_place(i) for i in range(SEALS)), str.__str__(says))
-
-
-def _place(number: int) -> tuple[float, float, float, float]:
-    left = LEFT_MM + number * (WIDTH_MM + GAP_MM)
-    return (left * _POINTS, BOTTOM_MM * _POINTS, (left + WIDTH_MM) * _POINTS, (BOTTOM_MM + HEIGHT_MM) * _POINTS)
+    lefts = [LEFT_MM + number * (WIDTH_MM + GAP_MM) for number in range(SEALS)]
+    low, high = BOTTOM_MM * _POINTS, (BOTTOM_MM + HEIGHT_MM) * _POINTS
+    places = tuple((left * _POINTS, low, (left + WIDTH_MM) * _POINTS, high) for left in lefts)
+    return Seal(shown, places, str.__str__(says))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cmm_uq.analysis.conformity.decision import rule_name
-from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Decided, Statement
+from cmm_uq.analysis.conformity.statement import TOLERANCE_WORDS, Statement
 from cmm_uq.analysis.diagnosis.diagnosis import FALSE_ALARMS, OmittedEffect
 from cmm_uq.analysis.diagnosis.held_out import Improvement
 from cmm_uq.analysis.screening.finding import Finding
@@ -56,6 +56,7 @@ def head(job: Job, schema: str = SCHEMA, *, effects: bool = True) -> dict[str, A
 
 def results(result: Result) -> dict[str, Any]:
     """A result as plain data, in the layout of the schema ``cmm-uq/results/1``."""
+    posterior = result.posterior
     return {
         **head(result.job),
         "estimates": {effect: _quantities(values) for effect, values in result.parameters.items()},
@@ -84,7 +85,11 @@ def results(result: Result) -> dict[str, Any]:
             "p_value": result.noise.p_value,
             "contradicts_stated": result.noise.contradicts_stated,
         },
-        "sampling": _sampling(result),
+        "sampling": {
+            "sampler": posterior.sampler, "seed": posterior.seed, "draws": len(posterior.draws),
+            "ess_min": posterior.ess_min, "rhat_max": posterior.rhat_max, "steps": posterior.steps,
+            "autocorrelation_time": posterior.autocorrelation_time, "converged": posterior.converged,
+        },
         "least_squares": _least_squares(result),
         **contradictions_data(result),
         "identifiability": _identifiability(result),
@@ -94,7 +99,7 @@ def results(result: Result) -> dict[str, Any]:
         "verdicts": result.verdicts.data(),
         "diagnosis": diagnosis_data(result.diagnosed),
         "screening": [finding_data(finding, result.job.facts.recording.file) for finding in result.findings],
-    }
+    }  # fmt: skip
 
 
 def diagnosis_data(found: JobDiagnosis) -> dict[str, Any]:
@@ -194,15 +199,6 @@ def _quantities(quantities: Mapping[str, Quantity]) -> dict[str, Any]:
     return {name: quantity_data(quantity) for name, quantity in quantities.items()}
 
 
-def _sampling(result: Result) -> dict[str, Any]:
-    posterior = result.posterior
-    return {
-        "sampler": posterior.sampler, "seed": posterior.seed, "draws": len(posterior.draws),
-        "ess_min": posterior.ess_min, "rhat_max": posterior.rhat_max, "steps": posterior.steps,
-        "autocorrelation_time": posterior.autocorrelation_time, "converged": posterior.converged,
-    }  # fmt: skip
-
-
 def _least_squares(result: Result) -> dict[str, Any]:
     ls = result.least_squares
     estimates: dict[str, dict[str, Any]] = {}
@@ -251,17 +247,15 @@ def _statement(statement: Statement) -> dict[str, Any]:
             "consumer": statement.risks.consumer, "producer": statement.risks.producer,
         },
         "test_uncertainty": None if statement.budget is None else budget_data(statement.budget),
-        "outside": list(statement.outside), "errors": [_decided(item) for item in statement.errors],
-    }  # fmt: skip
-
-
-def _decided(item: Decided) -> dict[str, Any]:
-    return {
-        "measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
-        "u_um": item.u_um, "U_um": 2 * item.u_um, "limit_um": item.limit_um,
-        "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
-        "guard_band_um": item.decision.guard_band, "position": item.position or None, "standing": item.standing,
-        "set_aside": item.set_aside,
+        "outside": list(statement.outside),
+        "errors": [
+            {"measurement": item.measurement, "repeat": item.repeat, "length_mm": item.length_mm, "error_um": item.error_um,
+             "u_um": item.u_um, "U_um": 2 * item.u_um, "limit_um": item.limit_um,
+             "probability_conforming": item.decision.probability_conforming, "outcome": item.decision.outcome,
+             "guard_band_um": item.decision.guard_band, "position": item.position or None, "standing": item.standing,
+             "set_aside": item.set_aside}
+            for item in statement.errors
+        ],
     }  # fmt: skip
 
 

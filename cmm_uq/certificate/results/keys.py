@@ -1,7 +1,4 @@
-"""What the keys of results.json mean.
-
-A part in capitals stands for any name, ``[]`` for each entry of a list; what a kind adds of its own stands with the kind.
-"""
+"""What the keys of results.json mean: capitals stand for any name, ``[]`` for each entry of a list; kinds have their own."""
 
 from __future__ import annotations
 
@@ -226,16 +223,13 @@ RESULTS: Mapping[str, str] = MappingProxyType(
 
 def described(path: str) -> bool:
     """Whether a key of results.json has a sentence here, itself or as part of a quantity or of what stands above it."""
-    return any(_covers(pattern.split("."), path.split(".")) for pattern in RESULTS)
-
-
-def _covers(pattern: list[str], path: list[str]) -> bool:
-    head = path[: len(pattern)]
-    alike = len(head) == len(pattern) and all(_same(one, other) for one, other in zip(pattern, head, strict=True))
-    rest = path[len(pattern) :]
-    quantity = RESULTS[".".join(pattern)].startswith("Quantity:")
-    return alike and (not rest or pattern[-1] == "KEY" or (quantity and rest[0] in QUANTITY))
-
-
-def _same(pattern: str, part: str) -> bool:
-    return pattern.removesuffix("[]").isupper() or pattern == part
+    keys = path.split(".")
+    for pattern, text in RESULTS.items():
+        parts = pattern.split(".")
+        head, rest = keys[: len(parts)], keys[len(parts) :]
+        alike = len(head) == len(parts) and all(
+            part.removesuffix("[]").isupper() or part == key for part, key in zip(parts, head, strict=True)
+        )
+        if alike and (not rest or parts[-1] == "KEY" or (text.startswith("Quantity:") and rest[0] in QUANTITY)):
+            return True
+    return False

@@ -58,19 +58,13 @@ def posterior_name(origin: str) -> str:
 
 
 def posterior_file(draws: Draws, origin: str) -> PosteriorFile:
-    """Draws as a file, thinned to a size that a certificate can carry.
-
-    ``rhat_max`` and ``ess_bulk_min`` are those of all draws, each walker a chain, as ArviZ computes them.
-    """
+    """Draws thinned to what a certificate can carry; ``rhat_max``, ``ess_bulk_min`` of all, each walker a chain (ArviZ)."""
     kept = draws.thinned(MOST_NUMBERS)
     content, name = kept.as_npz(), posterior_name(origin)
     chains, count, _ = kept.array.shape
     return PosteriorFile(name, content, {
         "file": name, "sha256": hashlib.sha256(content).hexdigest(), "parameters": kept.names, "units": dict(kept.units),
         "chains": chains, "draws": count, "every": kept.every,
-        "rhat_max": _finite(draws.rhat_max), "ess_bulk_min": _finite(draws.ess_bulk_min),
+        "rhat_max": draws.rhat_max if isfinite(draws.rhat_max) else None,
+        "ess_bulk_min": draws.ess_bulk_min if isfinite(draws.ess_bulk_min) else None,
     })  # fmt: skip
-
-
-def _finite(figure: float) -> float | None:
-    return figure if isfinite(figure) else None

@@ -1,9 +1,6 @@
 """`provenance.json`: from what a certificate was made, by what, and on what, in the words of W3C PROV (PROV-JSON).
 
 Files are entities with their SHA-256, the recording and the report are activities, the program and the laboratory agents.
-PROV was chosen, and not RO-Crate, because it says how a result came about, which is what is asked here, and because its
-file may have any name and lie in a PDF; an RO-Crate is a folder.
-
 No clock is read: dates are those of the job. The platform stands here and nowhere else, so the PDF that carries this file is
 the same to the byte on the same installation only, and on any with this very file in it; ``results.json`` is the same on all.
 The provenance cannot have the hash of the PDF that it lies in; the manifest beside both has it.
@@ -11,10 +8,11 @@ The provenance cannot have the hash of the PDF that it lies in; the manifest bes
 
 from __future__ import annotations
 
+import datetime as dt
 import hashlib
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -87,20 +85,15 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True)
 class Behind:
-    """What is behind a certificate, of whatever.
+    """What is behind a certificate, of whatever."""
 
-    ``command``: of ``cmm-uq`` that made it; ``said, laboratory``: as its job has them; ``origin``: of the recording;
-    ``inputs``: of the job, by name; ``recording``: its file; empty where there is none; ``rests_on``: number and
-    laboratory of the certificate that it goes by, of the artefact or of the machine; empty for none.
-    """
-
-    command: str
-    said: Identification
+    command: str  # of ``cmm-uq`` that made it
+    said: Identification  # as its job has it
     laboratory: Laboratory
-    origin: str
-    inputs: Mapping[str, bytes]
-    recording: str
-    rests_on: tuple[str, str] = ("", "")
+    origin: str  # of the recording
+    inputs: Mapping[str, bytes]  # of the job, by name
+    recording: str  # its file; empty where there is none
+    rests_on: tuple[str, str] = ("", "")  # number and laboratory of the certificate that it goes by; empty for none
 
     @classmethod
     def of(cls, job: Job) -> Behind:
@@ -114,98 +107,89 @@ def provenance(job: Job, results: Mapping[str, Any], outputs: Mapping[str, bytes
 
 
 def provenance_of(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> bytes:
-    """The file of any certificate; see :func:`provenance`."""
+    entities = _entities(job, results, outputs)
+    sampling = results.get("sampling") or results.get("simulation") or {}
+    seed = {"cmm-uq:seed": sampling["seed"]} if "seed" in sampling else {}
+    program, laboratory = results["software"], job.laboratory.name
+    organisation = {"prov:type": _name("prov:Organization"), "prov:label": laboratory}
     graph = {
         "prefix": {"cmm-uq": _PREFIX, "file": f"{_PREFIX}file:", "package": f"{_PREFIX}package:"},
-        "entity": _entities(job, results, outputs),
-        "activity": _activities(job, results),
-        "agent": _agents(job, results),
-        **_relations(job, results, outputs),
-    }
+        "entity": entities,
+        "activity": {
+            _RECORDING: {"cmm-uq:origin": job.origin, "cmm-uq:date": _day(job.said.date)},
+            _REPORT: {"prov:label": f"cmm-uq {job.command}", **seed},
+        },
+        "agent": {
+            _PROGRAM: {
+                "prov:type": _name("prov:SoftwareAgent"), "prov:label": program["name"], "cmm-uq:version": program["version"],
+            },
+            **({_LABORATORY: organisation} if laboratory else {}),
+        },
+        **_relations(job, entities, outputs),
+    }  # fmt: skip
     return (json.dumps(graph, indent=2, ensure_ascii=False) + "\n").encode()
 
 
 def same_but_for_the_platform(one: bytes, other: bytes) -> bool:
-    """Whether two provenances differ in the platform and the versions of other packages only."""
     return _without_platform(one) == _without_platform(other)
 
 
 def _without_platform(data: bytes) -> object:
     graph = json.loads(data)
-    entities = _entities_of(graph)
-    kept = {name: one for name, one in entities.items() if name != PLATFORM and not name.startswith("package:")}
-    used = graph.get("used", {}) if isinstance(graph, dict) else {}
-    return (
-        {key: value for key, value in graph.items() if key not in ("entity", "used")} if isinstance(graph, dict) else graph,
-        kept, sorted(str(one.get("prov:entity")) for one in used.values() if one.get("prov:entity") in kept),
-    )  # fmt: skip
-
-
-def _entities_of(graph: Any) -> dict[str, Record]:
-    found = graph.get("entity", {}) if isinstance(graph, dict) else {}
-    return {str(name): one for name, one in found.items() if isinstance(one, dict)} if isinstance(found, dict) else {}
+    if not isinstance(graph, dict):
+        return graph, {}, []
+    entities, used = graph.get("entity", {}), graph.get("used", {})
+    kept = {
+        str(name): entity for name, entity in (entities.items() if isinstance(entities, dict) else ())
+        if isinstance(entity, dict) and str(name) != PLATFORM and not str(name).startswith("package:")
+    }  # fmt: skip
+    others = {key: value for key, value in graph.items() if key not in ("entity", "used")}
+    return others, kept, sorted(str(each["prov:entity"]) for each in used.values() if each.get("prov:entity") in kept)
 
 
 def _entities(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, Record]:
-    said = job.said
-    found = {_file(name): _told(name, content, "input") for name, content in job.inputs.items()}
-    found |= {_file(name): _told(name, content, "output") for name, content in outputs.items()}
+    said, (number, laboratory) = job.said, job.rests_on
+    found: dict[str, Record] = {
+        _file(name): {
+            "prov:type": sort, "prov:label": name, "cmm-uq:bytes": len(content),
+            "cmm-uq:sha256": hashlib.sha256(content).hexdigest(),
+        }
+        for sort, files in (("input", job.inputs), ("output", outputs)) for name, content in files.items()
+    }  # fmt: skip
     found |= {
         f"package:{name}": {"prov:type": "package", "prov:label": name, "cmm-uq:version": version}
         for name, version in {**packages(), **results["software"].get("plugins", {})}.items()
     }
-    found[PLATFORM] = {"prov:type": "platform"} | {f"cmm-uq:{name}": told for name, told in machine().items()}
-    issued = {"cmm-uq:issued": _day(said.issued.isoformat())} if said.issued else {}
+    found[PLATFORM] = {"prov:type": "platform"} | {f"cmm-uq:{name}": text for name, text in machine().items()}
+    issued = {"cmm-uq:issued": _day(said.issued)} if said.issued else {}
     found[_CERTIFICATE] = {"prov:type": _name("prov:Collection"), "prov:label": said.number or said.id, **issued}
     if replaced := said.replaces:
-        found[_REPLACED] = {"prov:label": replaced.number, "cmm-uq:issued": _day(replaced.date.isoformat())}
-    number, laboratory = job.rests_on
+        found[_REPLACED] = {"prov:label": replaced.number, "cmm-uq:issued": _day(replaced.date)}
     if number:
         found[_ARTEFACT] = {"prov:label": number, "cmm-uq:laboratory": laboratory}
     return found
 
 
-def _activities(job: Behind, results: Mapping[str, Any]) -> dict[str, Record]:
-    sampling = results.get("sampling") or results.get("simulation") or {}
-    seed = {"cmm-uq:seed": sampling["seed"]} if "seed" in sampling else {}
-    return {
-        _RECORDING: {"cmm-uq:origin": job.origin, "cmm-uq:date": _day(job.said.date.isoformat())},
-        _REPORT: {"prov:label": f"cmm-uq {job.command}", **seed},
-    }
+def _relations(
+    job: Behind, entities: Mapping[str, Record], outputs: Mapping[str, bytes]
+) -> dict[str, dict[str, Record]]:
+    def numbered(letter: str, key: str, other: str, pairs: Iterable[tuple[str, str]]) -> dict[str, Record]:
+        return {f"_:{letter}{i}": {f"prov:{key}": a, f"prov:{other}": b} for i, (a, b) in enumerate(pairs, 1)}
 
-
-def _agents(job: Behind, results: Mapping[str, Any]) -> dict[str, Record]:
-    own = results["software"]
-    program = {"prov:type": _name("prov:SoftwareAgent"), "prov:label": own["name"], "cmm-uq:version": own["version"]}
-    laboratory = job.laboratory.name
-    organisation = {"prov:type": _name("prov:Organization"), "prov:label": laboratory}
-    return {_PROGRAM: program, **({_LABORATORY: organisation} if laboratory else {})}
-
-
-def _relations(job: Behind, results: Mapping[str, Any], outputs: Mapping[str, bytes]) -> dict[str, dict[str, Record]]:
-    entities = _entities(job, results, outputs)
     behind = [name for name in entities if name.startswith("package:") or name in (PLATFORM, _ARTEFACT)]
-    measured = [_linked("entity", _file(name), "activity", _RECORDING) for name in job.inputs if name == job.recording]
-    made = [_linked("entity", name, "activity", _REPORT) for name in (*map(_file, outputs), _CERTIFICATE)]
-    agents = [_linked("activity", _REPORT, "agent", _PROGRAM)]
-    if job.laboratory.name:
-        agents.append(_linked("activity", _RECORDING, "agent", _LABORATORY))
-    revised = _linked("generatedEntity", _CERTIFICATE, "usedEntity", _REPLACED) | {"prov:type": _name("prov:Revision")}
-    used = [_linked("activity", _REPORT, "entity", name) for name in (*map(_file, job.inputs), *behind)]
+    measured = [(_file(name), _RECORDING) for name in job.inputs if name == job.recording]
+    made = [(name, _REPORT) for name in (*map(_file, outputs), _CERTIFICATE)]
+    agents = [(_REPORT, _PROGRAM), *([(_RECORDING, _LABORATORY)] if job.laboratory.name else [])]
+    derived = numbered("d", "generatedEntity", "usedEntity", [(_CERTIFICATE, _REPLACED)])
+    derived["_:d1"]["prov:type"] = _name("prov:Revision")
+    used = [(_REPORT, name) for name in (*map(_file, job.inputs), *behind)]
     return {
-        "used": _numbered("u", used),
-        "wasGeneratedBy": _numbered("g", measured + made),
-        "wasAssociatedWith": _numbered("a", agents),
-        "hadMember": _numbered("m", [_linked("collection", _CERTIFICATE, "entity", _file(name)) for name in outputs]),
-        **({"wasDerivedFrom": _numbered("d", [revised])} if job.said.replaces else {}),
+        "used": numbered("u", "activity", "entity", used),
+        "wasGeneratedBy": numbered("g", "entity", "activity", measured + made),
+        "wasAssociatedWith": numbered("a", "activity", "agent", agents),
+        "hadMember": numbered("m", "collection", "entity", [(_CERTIFICATE, _file(name)) for name in outputs]),
+        **({"wasDerivedFrom": derived} if job.said.replaces else {}),
     }
-
-
-def _told(name: str, content: bytes, sort: str) -> Record:
-    return {
-        "prov:type": sort, "prov:label": name, "cmm-uq:bytes": len(content),
-        "cmm-uq:sha256": hashlib.sha256(content).hexdigest(),
-    }  # fmt: skip
 
 
 def _file(name: str) -> str:
@@ -216,13 +200,5 @@ def _name(name: str) -> Record:
     return {"$": name, "type": "prov:QUALIFIED_NAME"}
 
 
-def _day(date: str) -> Record:
-    return {"$": date, "type": "xsd:date"}
-
-
-def _linked(one: str, name: str, other: str, named: str) -> Record:
-    return {f"prov:{one}": name, f"prov:{other}": named}
-
-
-def _numbered(letter: str, records: list[Record]) -> dict[str, Record]:
-    return {f"_:{letter}{number}": record for number, record in enumerate(records, 1)}
+def _day(date: dt.date) -> Record:
+    return {"$": date.isoformat(), "type": "xsd:date"}

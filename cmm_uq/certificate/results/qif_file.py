@@ -27,20 +27,15 @@ _DOCUMENTS = uuid.UUID("6f1a7c60-3f0e-5e1b-9f7d-0b1c5d2f4a10")
 
 @dataclass(frozen=True)
 class QifValue:
-    """A value with its limits.
+    """A value with its limits, of both signs."""
 
-    ``definition``: what is decided: standard and characteristic, or an effect's parameter; ``item``: where it was
-    measured; ``value, u, limit``: in ``unit``; both signs are within the limit. ``None`` where there is none;
-    ``outcome``: of the decision.
-    """
-
-    definition: str
-    item: str
+    definition: str  # standard and characteristic, or an effect's parameter
+    item: str  # where it was measured
     value: float
     u: float | None
     limit: float | None
     unit: Unit
-    outcome: str
+    outcome: str  # of the decision
 
 
 @dataclass
@@ -61,18 +56,27 @@ class _Numbered:
 def qif(results: ReportResults) -> bytes:
     values, numbered = (*_tested(results), *_factors(results)), _Numbered()
     limited = [one for one in values if one.limit is not None]
-    for kind, alike in _alike(limited).items():
-        _characteristic(numbered, *kind, alike)
+    alike: dict[tuple[str, float, Unit], list[QifValue]] = {}
+    for one in limited:
+        alike.setdefault((one.definition, one.limit or 0.0, one.unit), []).append(one)
+    for kind, of_kind in alike.items():
+        _characteristic(numbered, *kind, of_kind)
     root = Element("QIFDocument", {"xmlns": SPACE, "versionQIF": VERSION, "idMax": str(numbered.last + 2)})
     job, version = results.job, results.software.version
     _text(root, "QPId", str(uuid.uuid5(_DOCUMENTS, f"{job.id} {sorted(job.inputs_sha256.items())} {version}")))
     described = f"{job.machine}, job {job.id} of {job.date}, recording {job.origin}, by cmm-uq {version}"
     _text(SubElement(root, "Header"), "Description", described)
-    standard = _standards(root, numbered)
+    # its own standard, which the names of characteristics are by
+    standard = SubElement(
+        SubElement(root, "StandardsDefinitions", {"n": "1"}), "Standard", {"id": str(numbered.last + 1)}
+    )
+    _text(SubElement(standard, "Organization"), "StandardsOrganizationEnum", "ISO")
+    _text(standard, "Designator", "ISO 23952")
+    _text(standard, "Year", "2020")
     _units(SubElement(root, "FileUnits"), {one.unit for one in limited})
     if limited:
         aspects = SubElement(root, "Characteristics")
-        _text(aspects, "FormalStandardId", standard)
+        _text(aspects, "FormalStandardId", standard.attrib["id"])
         for aspect in ("Definition", "Nominal", "Item"):
             _listed(aspects, f"Characteristic{aspect}s", numbered.lists[aspect])
     sets = SubElement(SubElement(root, "Results"), "MeasurementResultsSet", {"n": "1"})
@@ -87,13 +91,6 @@ def qif(results: ReportResults) -> bytes:
     indent(root)
     content = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{content}\n'.encode()
-
-
-def _alike(values: Sequence[QifValue]) -> dict[tuple[str, float, Unit], list[QifValue]]:
-    found: dict[tuple[str, float, Unit], list[QifValue]] = {}
-    for one in values:
-        found.setdefault((one.definition, one.limit or 0.0, one.unit), []).append(one)
-    return found
 
 
 def _tested(results: ReportResults) -> Iterator[QifValue]:
@@ -136,26 +133,12 @@ def _characteristic(numbered: _Numbered, named: str, limit: float, unit: Unit, v
         _text(item, "Name", one.item or named)
         _text(item, "CharacteristicNominalId", nominal.attrib["id"])
         measured = numbered.add("Measurement")
-        _status(SubElement(measured, "Status"), "Characteristic", one.outcome)
+        known = one.outcome in _STATUS
+        _text(SubElement(measured, "Status"), "CharacteristicStatusEnum" if known else "OtherCharacteristicStatus",
+              _STATUS.get(one.outcome, one.outcome or "not decided"))  # fmt: skip
         _text(measured, "CharacteristicItemId", item.attrib["id"])
         u = {} if one.u is None else {"combinedUncertainty": _number(one.u)}
         _text(measured, "Value", _number(one.value), {**u, "unitName": unit.qif})
-
-
-def _standards(root: Element, numbered: _Numbered) -> str:
-    """QIF's own standard, which the names of characteristics are by; its identifier."""
-    own = SubElement(SubElement(root, "StandardsDefinitions", {"n": "1"}), "Standard", {"id": str(numbered.last + 1)})
-    _text(SubElement(own, "Organization"), "StandardsOrganizationEnum", "ISO")
-    _text(own, "Designator", "ISO 23952")
-    _text(own, "Year", "2020")
-    return own.attrib["id"]
-
-
-def _status(parent: Element, what: str, outcome: str) -> None:
-    if outcome in _STATUS:
-        _text(parent, f"{what}StatusEnum", _STATUS[outcome])
-    else:
-        _text(parent, f"Other{what}Status", outcome or "not decided")
 
 
 def _units(parent: Element, units: set[Unit]) -> None:

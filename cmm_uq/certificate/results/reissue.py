@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cmm_uq.base.messages import DASH, NOTHING, Text, Verbatim, foreign, plural, say, semicolons
-from cmm_uq.certificate.document import Column, Document, Facts, Section, Table
+from cmm_uq.certificate.document import Document, Facts, Section, Table, figure_columns, text_columns
 
 KEY = "replaced"  # of results.json.
 COMPARED = say("Results compared")  # on the first page
@@ -17,10 +17,7 @@ _NAMED = 6  # differences that the first page names one by one
 
 @dataclass(frozen=True)
 class ChangedFigure:
-    """A decision or a figure that is not printed alike on both certificates.
-
-    ``what``: it is; ``before, after``: as printed; empty where a certificate does not have it; ``unit``: as printed.
-    """
+    """A decision or a figure that is not printed alike on both certificates, as printed; empty where one does not have it."""
 
     what: Text
     before: Text
@@ -29,13 +26,12 @@ class ChangedFigure:
 
     @property
     def sentence(self) -> Text:
-        before, after = self._shown(self.before), self._shown(self.after)
+        before, after = (
+            say("none") if not printed
+            else say("{printed} {unit}", printed=printed, unit=self.unit) if self.unit else printed
+            for printed in (self.before, self.after)
+        )  # fmt: skip
         return say("{what}: {before} → {after}", what=self.what, before=before, after=after)
-
-    def _shown(self, printed: Text) -> Text:
-        if not printed:
-            return say("none")
-        return say("{printed} {unit}", printed=printed, unit=self.unit) if self.unit else printed
 
     @property
     def data(self) -> dict[str, str | None]:
@@ -44,17 +40,12 @@ class ChangedFigure:
 
 @dataclass(frozen=True)
 class Reissue:
-    """The results of a certificate beside those of the one that it replaces.
+    """The results of a certificate beside those of the one that it replaces."""
 
-    ``number``: of the one that is replaced; ``compared``: how many decisions and figures both have, or the replaced one
-    alone; ``None`` where its results are not at hand; ``differences``: decisions first, then figures; ``added``:
-    figures that the replaced one does not state: no difference of the two results.
-    """
-
-    number: str
-    compared: int | None = None
-    differences: tuple[ChangedFigure, ...] = ()
-    added: tuple[ChangedFigure, ...] = ()
+    number: str  # of the one that is replaced
+    compared: int | None = None  # figures that both have or it alone; ``None`` where its results are not at hand
+    differences: tuple[ChangedFigure, ...] = ()  # decisions first, then figures
+    added: tuple[ChangedFigure, ...] = ()  # figures that the replaced one does not state: no difference
 
     @property
     def sentence(self) -> Text:
@@ -78,12 +69,11 @@ class Reissue:
     @property
     def section(self) -> Section:
         """The table of all differences; without blocks where there are none."""
-        rows = tuple(
-            (one.what, one.before or DASH, one.after or DASH, one.unit) for one in (*self.differences, *self.added)
-        )
+        figures = (*self.differences, *self.added)
+        rows = tuple((each.what, each.before or DASH, each.after or DASH, each.unit) for each in figures)
         heads = (
-            Column(say("Decision or figure"), numeric=False), Column(say("Before")), Column(say("After")),
-            Column(say("Unit"), numeric=False),
+            *text_columns(say("Decision or figure")), *figure_columns(say("Before"), say("After")),
+            *text_columns(say("Unit")),
         )  # fmt: skip
         caption = say("Differences from certificate {number}", number=Verbatim(self.number))
         note = say(

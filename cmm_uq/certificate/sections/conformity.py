@@ -17,10 +17,7 @@ from cmm_uq.maths.uncertainty.quantity import figure, limit_in_full, nominal, si
 
 
 def budget_table(measurand: Text, budget: Budget) -> Table:
-    """What contributes and how much; a column, or a line, of which nothing is to be said is left out.
-
-    ``budget``: in mm or µm, of quantities alone.
-    """
+    """What contributes, in mm or µm, and how much; a column, or a line, of which nothing is to be said is left out."""
     scale = 1 / MICROMETRE if budget.unit == unit("mm") else 1.0
     there = [(line, share) for line, share in zip(budget.lines, budget.shares, strict=True) if line.part]
     turned = any(line.unit != budget.unit or line.sensitivity != 1.0 for line, _ in there)
@@ -93,7 +90,6 @@ def decision_block(statement: Statement) -> DecisionBlock:
 
 
 def named(statement: Statement) -> Text:
-    """By what a statement is known: its standard and characteristic."""
     standard = Verbatim(statement.facts.standard)
     if not statement.characteristic:
         return standard
@@ -159,7 +155,6 @@ def has_picture(statement: Statement) -> bool:
 
 
 def picture(statement: Statement) -> Plot:
-    """Every error over its length, between the limits."""
     items = [item for item in statement.errors if not item.set_aside]
     far = len(statement.errors) - len(items)
     beyond = say("Not drawn: the values that the screening set aside, {count}, which lie far outside.", count=far)

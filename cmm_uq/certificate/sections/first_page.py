@@ -18,7 +18,6 @@ from cmm_uq.maths.uncertainty.quantity import limit_in_full, rounded, significan
 
 
 def summary(result: Result, warnings: Iterable[Text]) -> wording.Summary:
-    """What was measured, the decisions, the figures, the warnings."""
     facts, artefact = result.job.facts, result.artefact
     machine = Verbatim(facts.machine.name)
     subject = say("{machine}, {artefact:small}, {count} observations",
@@ -153,11 +152,7 @@ def _rules(result: Result) -> list[tuple[Text, Text]]:
 
 
 def with_first(result: Result, sections: Sequence[Section]) -> list[Section]:
-    """Sections with what of them the first page shows marked, and a picture taken there from where it stood.
-
-    That is the picture of the gravest statement that has one, else that of the tolerances; without any the main figures, where
-    the page has room for them.
-    """
+    """Sections, with the first page's: the picture of the gravest statement, else of the tolerances, else the main figures."""
     shown = min((s for s in result.statements if has_picture(s)), key=lambda s: _gravity(s.outcome), default=None)
     plot: Plot | None = None
     if shown is not None:

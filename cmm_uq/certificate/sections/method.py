@@ -17,10 +17,7 @@ _WIDER = 1.05
 
 
 def noise_found(noise: RecordingNoise, *, heavy_tails: bool) -> Text:
-    """What was found, what could not show, and what it does to the uncertainties.
-
-    ``heavy_tails``: whether the diagnosis found heavy tails, which are no component of the estimate.
-    """
+    """What was found, could not show, and does to the uncertainties; ``heavy_tails`` by the diagnosis, not the estimate."""
     there = _components(noise)
     if heavy_tails:
         there.append(say("heavier tails than those of the normal distribution that the estimate assumes"))
@@ -145,7 +142,6 @@ def _stated(result: Result) -> Text:
 
 
 def _calibration(result: Result) -> Text:
-    """How errors of several calibrated lengths are taken together."""
     found = next((cause for cause in result.causes if cause.name == CALIBRATION), None)
     if found is None:
         return NOTHING

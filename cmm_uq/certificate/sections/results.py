@@ -100,10 +100,7 @@ Left = tuple[str, str, Text, Quantity]  # group and name of a quantity in result
 
 
 def as_found_section(job: Job, left: Iterable[Left], verdicts: Iterable[Verdict] = ()) -> Section:
-    """Every quantity and every decision of both, side by side; without blocks where the job names nothing as found.
-
-    ``left``: quantities as left; the group of the figures of the lengths is ``accuracy``.
-    """
+    """Quantities and decisions as found beside those ``left`` (lengths: ``accuracy``); no blocks where nothing is as found."""
     title, found = say("As found and as left"), job.as_found
     if found is None:
         return Section(title, ())

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 
 def traceability_section(job: Job, rows: tuple[tuple[Text, Text], ...], *further: Block) -> Section:
-    """The artefact and the statement of traceability."""
     facts = Facts(tuple((label, text) for label, text in (*rows, *_instruments(job)) if text))
     said = (Paragraph(claimed(job).statement),) if job.origin == MEASURED else ()
     return Section(say("Artefact and traceability"), (facts, *said, *further))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from asn1crypto import crl, ocsp, x509
 from cryptography import x509 as certificates
@@ -28,34 +27,26 @@ SPOILT = say("a certificate that comes with the signature was changed")
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a file brings along for its signatures.
+    """What a file brings along for its signatures."""
 
-    ``certificates`` above the signers'; ``revocations`` lists; ``answers`` of OCSP responders.
-    """
-
-    certificates: tuple[x509.Certificate, ...] = ()
+    certificates: tuple[x509.Certificate, ...] = ()  # above the signers'
     revocations: tuple[crl.CertificateList, ...] = ()
     answers: tuple[ocsp.OCSPResponse, ...] = ()
 
 
 @dataclass(frozen=True)
 class Standing:
-    """What holds of a signer.
+    """What holds of a signer."""
 
-    ``trusted`` whether somebody trusted vouches for them; ``revocation`` of their certificate; ``test_key`` whether the
-    key is one for trying; ``problems`` why it does not count.
-    """
-
-    trusted: bool
-    revocation: Revocation
-    test_key: bool
-    problems: tuple[Text, ...]
+    trusted: bool  # somebody trusted vouches for them
+    revocation: Revocation  # of their certificate
+    test_key: bool  # for trying
+    problems: tuple[Text, ...]  # why it does not count
 
 
 def standing(
     certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime | None, *, proven: bool
 ) -> Standing:
-    """What holds of a signer."""
     try:
         signer = certificates.load_der_x509_certificate(certificate.dump())
         reasons, test = unfit(signer), is_test(signer)
@@ -67,9 +58,9 @@ def standing(
     if at is None:
         return Standing(trusted=False, revocation="not known", test_key=test, problems=(*found, NO_TIME))
     if not signer.not_valid_before_utc <= at <= signer.not_valid_after_utc:
+        first, last = day(signer.not_valid_before_utc.date()), day(signer.not_valid_after_utc.date())
         found.append(say("the certificate was not valid on {day}: it is from {first} to {last}", day=day(at.date()),
-                         first=day(signer.not_valid_before_utc.date()),
-                         last=day(signer.not_valid_after_utc.date())))  # fmt: skip
+                         first=first, last=last))  # fmt: skip
     trusted, revocation, why = _path(certificate, evidence, trust, at)
     if revocation != "revoked" and not proven and _listed(certificate, evidence, trust):
         revocation = "revoked"
@@ -81,30 +72,25 @@ def standing(
 
 
 def _spoilt(evidence: Evidence, trust: Trust) -> bool:
-    """Whether a certificate of the file is not as its issuer, who is known here too, has signed it.
+    """Whether a certificate that no signature covers is not as its issuer, who is known here too, has signed it."""
 
-    The signature does not cover them; one that no chain needs could be altered unseen.
-    """
-    brought = [one.dump() for one in evidence.certificates]
-    try:
-        all_known = [certificates.load_der_x509_certificate(data) for data in {*brought, *trust.anchors}]
-        return not all(map(partial(_as_issued, all_known), map(certificates.load_der_x509_certificate, brought)))
-    except ValueError:
+    def signed(certificate: certificates.Certificate, issuer: certificates.Certificate) -> bool:
+        try:
+            certificate.verify_directly_issued_by(issuer)
+        except (ValueError, TypeError, InvalidSignature):
+            return False
         return True
 
-
-def _as_issued(known: Sequence[certificates.Certificate], one: certificates.Certificate) -> bool:
-    """Whether one of the issuers of its name has signed it, as far as any is known."""
-    issuers = [other for other in known if other.subject == one.issuer]
-    return not issuers or any(map(partial(_signed, one), issuers))
-
-
-def _signed(one: certificates.Certificate, issuer: certificates.Certificate) -> bool:
+    encoded = [certificate.dump() for certificate in evidence.certificates]
     try:
-        one.verify_directly_issued_by(issuer)
-    except (ValueError, TypeError, InvalidSignature):
-        return False
-    return True
+        known = [certificates.load_der_x509_certificate(data) for data in {*encoded, *trust.anchors}]
+        for certificate in map(certificates.load_der_x509_certificate, encoded):
+            issuers = [issuer for issuer in known if issuer.subject == certificate.issuer]
+            if issuers and not any(signed(certificate, issuer) for issuer in issuers):
+                return True
+    except ValueError:
+        return True
+    return False
 
 
 def _path(
@@ -113,8 +99,13 @@ def _path(
     """Whether a chain holds at a time, what is known of revocation, and why it does not hold."""
     if not trust.anchors:
         return False, "not known", NOBODY
+
+    def validate(mode: str) -> None:
+        validator = CertificateValidator(certificate, validation_context=context(evidence, trust, at, mode))
+        ran(validator.async_validate_path())
+
     try:
-        _validate(certificate, evidence, trust, at, "require")
+        validate("require")
     except RevokedError:
         return False, "revoked", REVOKED
     except (PathBuildingError, PathValidationError):
@@ -122,22 +113,15 @@ def _path(
     else:  # a certificate that is trusted itself has nobody above it who could revoke it
         return True, "not known" if certificate.dump() in trust.anchors else "good", UNTRUSTED
     try:
-        _validate(certificate, evidence, trust, at, "soft-fail")
+        validate("soft-fail")
     except RevokedError:
         return False, "revoked", REVOKED
     except PathBuildingError:
         return False, "not known", UNTRUSTED
     except PathValidationError as error:
-        return False, "not known", say("the chain of certificates does not hold: {why}",
-                                       why=Verbatim(str(error).rstrip(".")))  # fmt: skip
+        why = Verbatim(str(error).rstrip("."))
+        return False, "not known", say("the chain of certificates does not hold: {why}", why=why)
     return True, "not known", UNTRUSTED
-
-
-def _validate(
-    certificate: x509.Certificate, evidence: Evidence, trust: Trust, at: dt.datetime, mode: str
-) -> None:  # fmt: skip
-    found = context(evidence, trust, at, mode)
-    ran(CertificateValidator(certificate, validation_context=found).async_validate_path())
 
 
 def context(evidence: Evidence, trust: Trust, at: dt.datetime, mode: str = "soft-fail") -> ValidationContext:

@@ -6,7 +6,7 @@ import datetime as dt
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.files.content import content_of
@@ -22,13 +22,10 @@ _FILES = (".pem", ".crt", ".cer", ".der", ".crl")
 
 @dataclass(frozen=True)
 class Trust:
-    """Whom one trusts: nobody by default, and never those of the system.
+    """Whom one trusts: nobody by default, and never those of the system."""
 
-    ``anchors`` certificates, DER; ``revocations`` revocation lists, DER, besides those in the file.
-    """
-
-    anchors: tuple[bytes, ...] = ()
-    revocations: tuple[bytes, ...] = ()
+    anchors: tuple[bytes, ...] = ()  # certificates, DER
+    revocations: tuple[bytes, ...] = ()  # lists, DER, besides those in the file
 
 
 NOBODY = Trust()
@@ -36,32 +33,27 @@ NOBODY = Trust()
 
 @dataclass(frozen=True)
 class FileSignature:
-    """One signature, and what holds of it.
+    """One signature, and what holds of it."""
 
-    ``subject`` whom the certificate names, whole; ``name`` the same, its common name; ``issuer`` who issued the
-    certificate; ``level`` of the signature: ``PAdES B-B``, ``XAdES B-B``, …; ``time`` of signing; ``time_proven``
-    whether a time stamp that is trusted says so; else it is what the signer says; ``intact`` whether what was signed is
-    what is there, and the key of the certificate signed it; ``covers_whole_file`` whether nothing stands in the file
-    that it does not cover, but for time stamps, what proves certificates, and further signatures; ``trusted`` whether a
-    chain leads to somebody trusted, in date when it was signed; ``revocation`` of the certificate; ``test_key`` whether
-    the key is one for trying; what is to be said then is :data:`~cmm_uq.certificate.sign.signer.TEST_NOTE`;
-    ``problems`` why it does not count; ``content`` what was verified: of a PDF the signed revision, of XML the
-    canonical form of the root without the signature.
-    """
-
-    subject: str
-    name: str
+    subject: str  # whom the certificate names, whole
+    name: str  # its common name
     issuer: str
-    level: str
-    time: dt.datetime | None
-    time_proven: bool
-    intact: bool
-    covers_whole_file: bool
-    trusted: bool
-    revocation: Revocation
-    test_key: bool
-    problems: tuple[Text, ...]
-    content: bytes = field(default=b"", repr=False)
+    level: str  # ``PAdES B-B``, ``XAdES B-B``, …
+    time: dt.datetime | None  # of signing
+    time_proven: bool  # by a time stamp that is trusted; else the signer says so
+    intact: bool  # what was signed is there, and the key of the certificate signed it
+    covers_whole_file: bool  # but for time stamps, proofs of certificates, and further signatures
+    trusted: bool  # a chain leads to somebody trusted, in date when it was signed
+    revocation: Revocation  # of the certificate
+    test_key: bool  # for trying: TEST_NOTE is to be said
+    problems: tuple[Text, ...]  # why it does not count
+    content: bytes = field(default=b"", repr=False)  # verified: the signed revision of a PDF, or the XML without it
+
+    @classmethod
+    def of_nobody(cls, level: str, problems: Sequence[Text]) -> FileSignature:
+        """One that counts for nothing."""
+        return cls("", "", "", level, None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
+                   revocation="not known", test_key=False, problems=tuple(problems))  # fmt: skip
 
     @property
     def good(self) -> bool:
@@ -91,12 +83,8 @@ def _read(path: Path) -> tuple[list[bytes], list[bytes]]:
     content = content_of(path, KEY_BYTES, "Name a PEM file of the certificates that you trust")
     found: dict[str, list[bytes]] = {"CERTIFICATE": [], "X509 CRL": []}
     try:
-        parts = (
-            [(kind, data) for kind, _, data in pem.unarmor(content, multiple=True)]
-            if pem.detect(content)
-            else [("X509 CRL" if path.suffix == ".crl" else "CERTIFICATE", content)]
-        )
-        for kind, data in parts:
+        whole: list[tuple[str, Any, bytes]] = [("X509 CRL" if path.suffix == ".crl" else "CERTIFICATE", {}, content)]
+        for kind, _, data in pem.unarmor(content, multiple=True) if pem.detect(content) else whole:
             if kind == "PRIVATE KEY" or kind.endswith(" PRIVATE KEY"):
                 raise CmmUqError("holds a private key", where=str(path), fix="Name a file of certificates only")
             (crl.CertificateList if kind == "X509 CRL" else x509.Certificate).load(data, strict=True).native  # noqa: B018

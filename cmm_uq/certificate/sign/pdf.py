@@ -1,6 +1,4 @@
-"""PDF signed by PAdES: a revision appended that leaves every byte before it as it is.
-
-PDF signed by PAdES: a revision appended, that leaves every byte before it as it is, tagged and fit for the archive.
+"""PDF signed by PAdES: a revision appended that leaves every byte before it as it is, tagged and fit for the archive.
 
 The date of the metadata stays that of the document. The same document, key and time give the same bytes at level B-B.
 """
@@ -27,16 +25,11 @@ FIELD = "Signature"  # names of the fields: Signature1, Signature2, …
 
 @dataclass(frozen=True)
 class Seal:
-    """What is seen of a signature on the first page.
+    """What is seen of a signature on the first page."""
 
-    ``picture`` a PDF of one page, shown in the seal's place; ``places`` left, bottom, right and top of the place of the
-    first signature and of those after it, in points from the page's lower left corner; a signature for which no place
-    is left is not seen; ``says`` the picture in words, for those who cannot see it.
-    """
-
-    picture: bytes
-    places: tuple[tuple[float, float, float, float], ...]
-    says: str
+    picture: bytes  # a PDF of one page
+    places: tuple[tuple[float, float, float, float], ...]  # left, bottom, right, top of each, pt; unseen without
+    says: str  # the picture in words, for those who cannot see it
 
 
 Level = Literal["B-B", "B-T", "B-LT", "B-LTA"]
@@ -47,15 +40,11 @@ LEVELS: tuple[Level, ...] = get_args(Level)
 
 @dataclass(frozen=True)
 class Stamping:
-    """What a level above B-B needs.
+    """What a level above B-B needs."""
 
-    ``server`` address of a time stamp server; ``level`` B-T, B-LT or B-LTA; ``trust`` whom the chains of signer and
-    server must lead to, for B-LT and B-LTA.
-    """
-
-    server: str
-    level: Level = "B-T"
-    trust: Trust = NOBODY
+    server: str  # address of a time stamp server
+    level: Level = "B-T"  # B-T, B-LT or B-LTA
+    trust: Trust = NOBODY  # whom the chains of signer and server must lead to, for B-LT and B-LTA
 
     def __post_init__(self) -> None:
         if not self.server.startswith(("http://", "https://")):
@@ -66,24 +55,20 @@ class Stamping:
 def sign_pdf(
     pdf: bytes, signer: Signer, *, seal: Seal | None, at: dt.datetime, stamping: Stamping | None = None, reason: str = ""
 ) -> bytes:  # fmt: skip
-    """A PDF with a signature.
-
-    ``seal`` what is seen of it; ``None`` for nothing; ``stamping`` level above B-B; ``None`` for B-B.
-    """
+    """``seal``: what is seen of the signature, if anything; ``stamping``: of a level above B-B."""
     signer.check(at)
     with installed():
         from pyhanko.sign import fields, signers
         from pyhanko.stamp.noop import NoOpStampStyle
 
-        from cmm_uq.certificate.sign.pdf_library import Adapted, show, tag
+        from cmm_uq.certificate.sign.pdf_library import Adapted, Server, free_name, show, tag
     writer = appending(pdf)
-    name, count = _field(writer)
+    name, count = free_name(writer, FIELD)
     if seal is not None and count >= len(seal.places):
         seal = None
     said = seal.says if seal else signer.name
-    fields.append_signature_field(
-        writer, fields.SigFieldSpec(name, box=seal.places[count] if seal else None, readable_field_name=said)
-    )
+    box = seal.places[count] if seal else None
+    fields.append_signature_field(writer, fields.SigFieldSpec(name, box=box, readable_field_name=said))
     field = next(reference for _, _, reference in fields.enumerate_sig_fields(writer, with_name=name))
     if seal is not None:
         show(writer, field.get_object(), seal.picture)
@@ -95,23 +80,11 @@ def sign_pdf(
     adapted, style = Adapted(signer), NoOpStampStyle()
     if stamping is None or stamping.level == "B-B":
         return ran(_signed(signers.PdfSigner(metadata, adapted, stamp_style=style), writer, at))
-    from cmm_uq.certificate.sign.pdf_library import Server
-
-    server = Server(stamping.server)
-    pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=server, stamp_style=style)
+    pdf_signer = signers.PdfSigner(metadata, adapted, timestamper=Server(stamping.server), stamp_style=style)
     return ran(_stamped(pdf_signer, writer, signer, stamping, at))
 
 
-def _field(writer: IncrementalPdfFileWriter) -> tuple[str, int]:
-    """A name that no field has, and how many there are."""
-    from pyhanko.sign.fields import enumerate_sig_fields
-
-    taken = {name for name, _, _ in enumerate_sig_fields(writer)}
-    return next(name for name in (f"{FIELD}{i}" for i in range(1, len(taken) + 2)) if name not in taken), len(taken)
-
-
 async def _signed(pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, at: dt.datetime) -> bytes:
-    """Signed at a time that is given."""
     from pyhanko.sign.signers.pdf_cms import PdfCMSSignedAttributes
 
     session = pdf_signer.init_signing_session(writer)
@@ -128,11 +101,11 @@ async def _stamped(
     pdf_signer: PdfSigner, writer: IncrementalPdfFileWriter, signer: Signer, stamping: Stamping, at: dt.datetime
 ) -> bytes:  # fmt: skip
     """Signed with a time stamp, and what else the level asks for."""
+    from cmm_uq.certificate.sign.pdf_library import Proof, stamped
+
     server = pdf_signer.default_timestamper
     if stamping.level == "B-T":
         return await _signed(pdf_signer, writer, at)
-    from cmm_uq.certificate.sign.pdf_library import Proof, stamped
-
     proof = Proof(signer, server, stamping.trust, at)
     await proof.gather()
     kept = proof.kept(await _signed(pdf_signer, writer, at))

@@ -45,7 +45,14 @@ def signatures_of_pdf(data: bytes, trust: Trust, *, where: str = "the PDF") -> t
     except Exception as error:  # whatever a hostile file makes the library raise
         raise CmmUqError(f"cannot be read as a PDF: {error}", where=where, fix="Name a PDF that is whole") from None
     file = _File(data, reader, tuple(embedded), evidence, trust)
-    return tuple(_found(file, one) for one in embedded if one.sig_object.get("/Type") != "/DocTimeStamp")
+    found = []
+    for signature in embedded:
+        if signature.sig_object.get("/Type") != "/DocTimeStamp":
+            try:
+                found.append(_judged(file, signature))
+            except Exception:  # whatever a hostile file makes the library raise
+                found.append(FileSignature.of_nobody("PDF", [UNREADABLE]))
+    return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -56,18 +63,6 @@ class _File:
     evidence: Evidence
     trust: Trust
 
-    def later(self, embedded: EmbeddedPdfSignature) -> bool:
-        """Whether another signature covers what was appended after this one."""
-        return any(one.signed_revision > embedded.signed_revision for one in self.embedded)
-
-
-def _found(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
-    try:
-        return _judged(file, embedded)
-    except Exception:  # whatever a hostile file makes the library raise
-        return FileSignature("", "", "", "PDF", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
-                         revocation="not known", test_key=False, problems=(UNREADABLE,))  # fmt: skip
-
 
 def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
     from cmm_uq.certificate.sign.chain import Evidence, standing
@@ -77,7 +72,10 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
         (*file.evidence.certificates, *embedded.other_embedded_certs), file.evidence.revocations, file.evidence.answers
     )
     stamped, proven = _stamped(embedded, evidence, file.trust)
-    at = stamped if proven else _claimed(embedded)
+    at = stamped
+    if not proven:  # what the signer says; a time without its zone is none
+        claimed = embedded.self_reported_timestamp
+        at = claimed.astimezone(dt.UTC) if claimed is not None and claimed.tzinfo is not None else None
     intact, problems = _intact(file, embedded)
     if stamped is None and _token(embedded) is not None:
         problems.append(STAMP_BROKEN)
@@ -95,12 +93,6 @@ def _judged(file: _File, embedded: EmbeddedPdfSignature) -> FileSignature:
         test_key=judged.test_key, problems=(*problems, *appended, *judged.problems),
         content=file.data[: int(signed[2]) + int(signed[3])] if intact else b"",
     )  # fmt: skip
-
-
-def _claimed(embedded: EmbeddedPdfSignature) -> dt.datetime | None:
-    """When the signer says that it was signed; a time without its zone is none."""
-    time = embedded.self_reported_timestamp
-    return None if time is None or time.tzinfo is None else time.astimezone(dt.UTC)
 
 
 def _intact(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text]]:
@@ -138,11 +130,8 @@ def _fits(data: bytes, embedded: EmbeddedPdfSignature) -> bool:
     except ValueError:
         return False
     signature = embedded.signed_data
-    return (
-        held.rstrip(b"\0") == embedded.pkcs7_content.rstrip(b"\0")
-        and not any(held[_length(held) :])
-        and bool(signature)
-    )
+    alone = held.rstrip(b"\0") == embedded.pkcs7_content.rstrip(b"\0") and not any(held[_length(held) :])
+    return alone and bool(signature)
 
 
 def _length(der: bytes) -> int:
@@ -162,7 +151,9 @@ def _whole(file: _File, embedded: EmbeddedPdfSignature) -> tuple[bool, list[Text
 
     embedded.compute_integrity_info(diff_policy=POLICY)
     result = embedded.diff_result
-    most = ModificationLevel.FORM_FILLING if file.later(embedded) else ModificationLevel.LTA_UPDATES
+    # whether another signature covers what was appended after this one
+    later = any(other.signed_revision > embedded.signed_revision for other in file.embedded)
+    most = ModificationLevel.FORM_FILLING if later else ModificationLevel.LTA_UPDATES
     if isinstance(result, DiffResult) and result.modification_level <= most:
         return True, []
     count = file.reader.total_revisions - 1 - embedded.signed_revision
@@ -200,11 +191,9 @@ def _stamped(embedded: EmbeddedPdfSignature, evidence: Evidence, trust: Trust) -
     from pyhanko.sign.validation.generic_cms import message_imprint_checker
 
     token = _token(embedded)
-    return (
-        (None, False)
-        if token is None
-        else _stamp(token, message_imprint_checker(embedded.signer_info), evidence, trust)
-    )
+    if token is None:
+        return None, False
+    return _stamp(token, message_imprint_checker(embedded.signer_info), evidence, trust)
 
 
 def _stamp(

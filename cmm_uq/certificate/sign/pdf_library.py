@@ -1,9 +1,7 @@
 """What the library of PDF signatures is given: a signer, a field, revisions appended, time stamps and evidence for years.
 
-What may be appended to a signed PDF: time stamps, evidence, and further signatures with their place in the structure.
-
-The library's policy knows all but the last: it takes a further signature of a tagged PDF for a change of its structure. The
-rule here lets the structure grow by form controls of signatures, at its end, and by nothing else.
+Its policy takes a further signature of a tagged PDF for a change of its structure. The rule here lets the structure grow by
+form controls of signatures, at its end, and by nothing else.
 """
 
 from __future__ import annotations
@@ -25,6 +23,7 @@ from pyhanko.pdf_utils.reader import PdfFileReader
 from pyhanko.sign import signers
 from pyhanko.sign.diff_analysis import DEFAULT_DIFF_POLICY, ModificationLevel, StandardDiffPolicy
 from pyhanko.sign.diff_analysis.rules_api import ReferenceUpdate, WhitelistRule
+from pyhanko.sign.fields import enumerate_sig_fields
 from pyhanko.sign.signers import PdfTimeStamper
 from pyhanko.sign.timestamps import TimeStamper, TimestampRequestError
 from pyhanko.sign.validation.dss import DocumentSecurityStore
@@ -65,6 +64,12 @@ def translated(certificate: Any) -> x509.Certificate:
     return x509.Certificate.load(certificate.public_bytes(Encoding.DER))
 
 
+def free_name(writer: IncrementalPdfFileWriter, stem: str) -> tuple[str, int]:
+    """A name that no field has, and how many fields of signatures there are."""
+    taken = {name for name, _, _ in enumerate_sig_fields(writer)}
+    return next(name for name in (f"{stem}{i}" for i in range(1, len(taken) + 2)) if name not in taken), len(taken)
+
+
 def show(writer: IncrementalPdfFileWriter, field: generic.DictionaryObject, picture: bytes) -> None:
     """The page of a PDF in the place of a field, with the fonts that it has embedded."""
     seen = writer.import_page_as_xobject(PdfFileReader(io.BytesIO(picture)))
@@ -78,12 +83,12 @@ def tag(writer: IncrementalPdfFileWriter, reference: generic.IndirectObject, say
     root = writer.root["/StructTreeRoot"] if "/StructTreeRoot" in writer.root else generic.DictionaryObject()
     if "/ParentTree" not in root or "/Nums" not in root["/ParentTree"]:
         return  # not tagged, or by a program that lays its tree out in another way
-    top = root["/K"][0] if isinstance(root["/K"], generic.ArrayObject) else root["/K"]
-    key = generic.NumberObject(int(root["/ParentTreeNextKey"]))
+    top = _top(root)
+    key, place = generic.NumberObject(int(root["/ParentTreeNextKey"])), top.container_ref
     element = writer.add_object(generic.DictionaryObject({
         generic.NameObject("/Type"): generic.NameObject("/StructElem"),
         generic.NameObject("/S"): generic.NameObject("/Form"),
-        generic.NameObject("/P"): _to(top),
+        generic.NameObject("/P"): generic.IndirectObject(place.idnum, place.generation, place.get_pdf_handler()),
         generic.NameObject("/Alt"): generic.pdf_string(says),
         generic.NameObject("/Pg"): field.raw_get("/P"),
         generic.NameObject("/K"): generic.DictionaryObject({
@@ -109,12 +114,6 @@ def _append(
     held.extend(values)
     writer.update_container(held)
     writer.update_container(owner)
-
-
-def _to(held: generic.PdfObject) -> generic.IndirectObject:
-    """To an object that has a number of its own."""
-    place = held.container_ref
-    return generic.IndirectObject(place.idnum, place.generation, place.get_pdf_handler())
 
 
 _ELEMENT = {"/Type", "/S", "/P", "/Alt", "/Pg", "/K"}
@@ -215,7 +214,6 @@ class Server(TimeStamper):  # type: ignore[misc]
         self.url = url
 
     async def async_request_tsa_response(self, req: tsp.TimeStampReq) -> tsp.TimeStampResp:
-        """What the server answers."""
         headers = {"Content-Type": "application/timestamp-query", "Accept": "application/timestamp-reply"}
         request = urllib.request.Request(self.url, req.dump(), headers)  # noqa: S310 - the scheme was looked at
         try:
@@ -231,12 +229,10 @@ class Server(TimeStamper):  # type: ignore[misc]
         return tsp.TimeStampResp.load(data)
 
     async def async_timestamp(self, message_digest: bytes, md_algorithm: str) -> Any:
-        """A time stamp of a digest."""
         try:
             token = await super().async_timestamp(message_digest, md_algorithm)
-            stamped = (
-                token["content"]["encap_content_info"]["content"].parsed["message_imprint"]["hashed_message"].native
-            )
+            stated = token["content"]["encap_content_info"]["content"].parsed
+            stamped = stated["message_imprint"]["hashed_message"].native
         except TimestampRequestError as error:
             raise CmmUqError(f"the time stamp server refuses: {error}", where=self.url, fix=_FIX) from None
         except (ValueError, KeyError, TypeError, AttributeError):
@@ -250,10 +246,7 @@ STAMP = "TimeStamp"  # name of the field of a document's time stamp, before its 
 
 
 class Proof:
-    """What proves the certificates of a signature at a time, fetched from those who issued them.
-
-    ``signer`` who signs; ``server`` of time stamps; ``trust`` whom a chain of either must lead to; ``at`` the time.
-    """
+    """What proves the certificates of a signature at a time, fetched from those who issued them."""
 
     def __init__(self, signer: Signer, server: Server, trust: Trust, at: dt.datetime) -> None:
         self._signer, self._server = signer, server
@@ -286,10 +279,7 @@ class Proof:
 
 async def stamped(writer: Any, server: Server) -> bytes:
     """The whole document stamped, with what its revision holds."""
-    from pyhanko.sign.fields import enumerate_sig_fields
-
-    taken = {name for name, _, _ in enumerate_sig_fields(writer)}
-    name = next(name for name in (f"{STAMP}{i}" for i in range(1, len(taken) + 2)) if name not in taken)
+    name, _ = free_name(writer, STAMP)
     output = await PdfTimeStamper(server, field_name=name).async_timestamp_pdf(writer, ONE_DIGEST)
     output.seek(0)
     return bytes(output.read())

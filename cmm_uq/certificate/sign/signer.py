@@ -28,18 +28,14 @@ ONE_DIGEST = "sha256"  # digest of whatever is signed here
 
 @dataclass(frozen=True)
 class Signer:
-    """A key and its certificate.
-
-    ``certificate`` of the key; ``chain`` certificates above it, nearest first; without the root where nobody gave it;
-    ``algorithm`` of the key; ``signed`` signature of data with SHA-256: RSASSA-PKCS1-v1_5, or ECDSA as DER; ``where``
-    the key is kept, for messages.
-    """
+    """A key and its certificate."""
 
     certificate: Certificate
-    chain: tuple[Certificate, ...]
+    chain: tuple[Certificate, ...]  # certificates above it, nearest first; without the root where nobody gave it
     algorithm: Literal["rsa", "ecdsa"]
+    # signature of data with SHA-256: RSASSA-PKCS1-v1_5, or ECDSA as DER
     signed: Callable[[bytes], bytes] = field(repr=False)
-    where: str = ""
+    where: str = ""  # the key is kept, for messages
 
     @property
     def name(self) -> str:
@@ -58,14 +54,14 @@ class Signer:
 
     def check(self, at: dt.datetime) -> None:
         """Refuse to sign with what no one could accept."""
-        certificate = self.certificate
-        if at < certificate.not_valid_before_utc:
-            raise CmmUqError(f"its certificate is valid only from {_day(certificate.not_valid_before_utc)}",
-                             where=self.where, fix="Wait, or sign with another key")  # fmt: skip
-        if at > certificate.not_valid_after_utc:
-            raise CmmUqError(f"its certificate expired on {_day(certificate.not_valid_after_utc)}", where=self.where,
+        first, last = self.certificate.not_valid_before_utc, self.certificate.not_valid_after_utc
+        if at < first:
+            raise CmmUqError(f"its certificate is valid only from {first.date().isoformat()}", where=self.where,
+                             fix="Wait, or sign with another key")  # fmt: skip
+        if at > last:
+            raise CmmUqError(f"its certificate expired on {last.date().isoformat()}", where=self.where,
                              fix="Renew it, or sign with another key")  # fmt: skip
-        for why in unfit(certificate):
+        for why in unfit(self.certificate):
             raise CmmUqError(why, where=self.where, fix="Ask for a certificate for electronic signatures or seals")
 
 
@@ -120,10 +116,6 @@ def called(name: Name) -> str:
     return str(common[0].value) if common else name.rfc4514_string()
 
 
-def _day(time: dt.datetime) -> str:
-    return time.date().isoformat()
-
-
 TEST_DAYS = 365  # how long a test key is valid
 LONGEST_NAME = 64 - len(f"{TEST_WORDS} – ")  # characters of a name (X.520, ub-common-name)
 
@@ -150,22 +142,18 @@ def signer_of_file(path: Path, passphrase: str) -> Signer:
 
 @dataclass(frozen=True)
 class TrialKey:
-    """A key for trying.
+    """A key for trying."""
 
-    ``key`` with its certificate, as a PKCS#12 file; ``certificate`` alone, PEM; ``until`` last day that it is valid.
-    """
-
-    key: bytes
-    certificate: bytes
-    until: dt.date
+    key: bytes  # with its certificate, PKCS#12
+    certificate: bytes  # PEM
+    until: dt.date  # last day that it is valid
 
 
 def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
     """A new key for trying, with a certificate that it signs itself and that says so."""
     if not 0 < len(name.strip()) <= LONGEST_NAME:
-        raise CmmUqError(
-            f"a name has 1 to {LONGEST_NAME} characters", where="--name", fix="Name the laboratory or person"
-        )
+        problem = f"a name has 1 to {LONGEST_NAME} characters"
+        raise CmmUqError(problem, where="--name", fix="Name the laboratory or person")
     if not passphrase:
         raise CmmUqError("a key is not kept without a passphrase", fix="Choose one")
     with installed():
@@ -183,6 +171,8 @@ def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
         digital_signature=True, content_commitment=True, key_encipherment=False, data_encipherment=False, key_agreement=False,
         key_cert_sign=False, crl_sign=False, encipher_only=False, decipher_only=False,
     )  # fmt: skip
+    note = str(TEST_NOTE).encode()
+    marked = bytes((0x0C, len(note))) + note  # a UTF8String of DER with fewer than 128 bytes
     builder = (
         x509.CertificateBuilder()
         .subject_name(subject).issuer_name(subject).public_key(key.public_key())
@@ -191,7 +181,7 @@ def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(usage, critical=True)
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
-        .add_extension(x509.UnrecognizedExtension(ObjectIdentifier(TEST_OID), _utf8(str(TEST_NOTE).encode())), critical=False)
+        .add_extension(x509.UnrecognizedExtension(ObjectIdentifier(TEST_OID), marked), critical=False)
     )  # fmt: skip
     certificate = builder.sign(key, hashes.SHA256())
     key_file = pkcs12.serialize_key_and_certificates(
@@ -199,8 +189,3 @@ def trial_key(name: str, passphrase: str, at: dt.datetime) -> TrialKey:
     )
     pem = certificate.public_bytes(serialization.Encoding.PEM)
     return TrialKey(key_file, pem, certificate.not_valid_after_utc.date())
-
-
-def _utf8(text: bytes) -> bytes:
-    """A UTF8String of DER with fewer than 128 bytes."""
-    return bytes((0x0C, len(text))) + text

@@ -23,18 +23,14 @@ _EXAMPLE = f"{SCHEME}token=LABORATORY;object=KEY?module-path=/usr/lib/libsofthsm
 
 @dataclass(frozen=True)
 class TokenPlace:
-    """Where a key is.
+    """Where a key is."""
 
-    ``module`` library of the token's maker; ``token`` label of the token; ``key`` label of the key and its certificate.
-    """
-
-    module: str
-    token: str
-    key: str
+    module: str  # library of the token's maker
+    token: str  # label
+    key: str  # label of the key and its certificate
 
 
 def place_of(uri: str) -> TokenPlace:
-    """Where a URI leads."""
     path, _, query = uri.removeprefix(SCHEME).partition("?")
     pairs = [*parse_qsl(path.replace(";", "&")), *parse_qsl(query)]
     parts = {name: unquote(value) for name, value in pairs}
@@ -51,7 +47,6 @@ def place_of(uri: str) -> TokenPlace:
 
 
 def signer_of_token(uri: str, pin: str) -> Signer:
-    """The key on a token."""
     with installed():
         from cryptography.x509 import load_der_x509_certificate
         from pkcs11 import Attribute, KeyType, ObjectClass
@@ -96,11 +91,8 @@ class _Token:
         from pkcs11 import exceptions
 
         try:
-            with (
-                pkcs11.lib(self.place.module)
-                .get_token(token_label=self.place.token)
-                .open(user_pin=self._pin) as session
-            ):
+            token = pkcs11.lib(self.place.module).get_token(token_label=self.place.token)
+            with token.open(user_pin=self._pin) as session:
                 yield session
         except exceptions.PinIncorrect:
             raise self._refused("the PIN does not open the token", "Mind how often it may be wrong") from None
@@ -110,9 +102,8 @@ class _Token:
             raise self._refused(f"the token has no key {self.place.key!r}", "Name the label of its key") from None
         except (exceptions.PKCS11Error, OSError, RuntimeError, ValueError) as error:
             why = str(error) or type(error).__name__
-            raise self._refused(
-                f"the token cannot be used: {why}", "Check module, token and the use of its key"
-            ) from None
+            fix = "Check module, token and the use of its key"
+            raise self._refused(f"the token cannot be used: {why}", fix) from None
 
     def _refused(self, problem: str, fix: str) -> CmmUqError:
         return CmmUqError(problem, where=self._uri, fix=fix)
@@ -124,7 +115,6 @@ class _Token:
         return session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=self.place.key)
 
     def by_rsa(self, data: bytes) -> bytes:
-        """Signature of an RSA key."""
         from pkcs11 import Mechanism
 
         with self.opened() as session:
@@ -136,6 +126,5 @@ class _Token:
         from pkcs11.util.ec import encode_ecdsa_signature
 
         with self.opened() as session:
-            return bytes(
-                encode_ecdsa_signature(self.key(session).sign(sha256(data).digest(), mechanism=Mechanism.ECDSA))
-            )
+            raw = self.key(session).sign(sha256(data).digest(), mechanism=Mechanism.ECDSA)
+            return bytes(encode_ecdsa_signature(raw))

@@ -1,6 +1,4 @@
-"""XML signed by XAdES B-B, and the signatures that are found in an XML file.
-
-XML signed by XAdES B-B: one signature over the whole root, enveloped, in the place where a DCC has it, its last element.
+"""XML signed by XAdES B-B, over the whole root, enveloped, as a DCC's last element, and the signatures in an XML file.
 
 The same file, key and time give the same bytes.
 """
@@ -29,7 +27,6 @@ SIGNATURE = f"{DS}Signature"
 
 
 def root_of(data: bytes, where: str) -> _Element:
-    """The root of an XML file."""
     with installed():
         from lxml import etree
     if len(data) > SIGNED_BYTES.most:
@@ -58,7 +55,6 @@ _LETTERS = 16  # of a name that is taken from the file's hash, so that no other 
 
 
 def sign_xml(xml: bytes, signer: Signer, *, at: dt.datetime, where: str = "the XML file") -> bytes:
-    """An XML file with a signature."""
     signer.check(at)
     root = root_of(xml, where)
     if next(root.iter(SIGNATURE), None) is not None:
@@ -160,12 +156,10 @@ def _found(data: bytes, element: _Element, *, several: bool, trust: Trust) -> Fi
     if not certificates:
         problems.append(NO_CERTIFICATE)
     if problems:  # nothing is computed of what could not count
-        return FileSignature("", "", "", "XML", None, time_proven=False, intact=False, covers_whole_file=False, trusted=False,
-                         revocation="not known", test_key=False, problems=tuple(problems))  # fmt: skip
+        return FileSignature.of_nobody("XML", problems)
     signer = certificates[0]
-    content = _verified(
-        data, signer, [str(one.get("URI")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference")]
-    )
+    references = [str(one.get("URI")) for one in element.iterfind(f"{DS}SignedInfo/{DS}Reference")]
+    content = _verified(data, signer, references)
     at = _time(element)
     judged = standing(signer, Evidence(tuple(certificates[1:])), trust, at, proven=False)
     return FileSignature(
@@ -208,11 +202,15 @@ def _plain(reference: _Element, *further: str) -> bool:
 
 def _own(element: _Element, references: list[_Element]) -> bool:
     """Whether all but the root that is referred to are parts of the signature, each by a name that nothing else has."""
-    parts = {
-        part.get("Id"): part for part in (element.find(f"{DS}KeyInfo"), element.find(PROPERTIES)) if part is not None
-    }
+    inner = (element.find(f"{DS}KeyInfo"), element.find(PROPERTIES))
+    parts = {part.get("Id") for part in inner if part is not None}
     root = element.getroottree().getroot()
-    names = [str(value) for one in root.iter() for key, value in one.attrib.items() if _local(key) == "id"]
+    names = [
+        str(value)
+        for one in root.iter()
+        for key, value in one.attrib.items()
+        if str(key).rpartition("}")[2].lower() == "id"
+    ]
     named = [str(one.get("URI"))[1:] for one in references if one.get("URI") != ""]
     by_name = all(one.get("URI") is not None for one in references) and len(set(named)) == len(named)
     covered = element.find(PROPERTIES)
@@ -221,11 +219,6 @@ def _own(element: _Element, references: list[_Element]) -> bool:
         by_name and plain and all(name in parts and names.count(name) == 1 for name in named)
         and (covered is None or covered.get("Id") in named)
     )  # fmt: skip
-
-
-def _local(key: Any) -> str:
-    """An attribute's name without its namespace, in small letters."""
-    return str(key).rpartition("}")[2].lower()
 
 
 def _certificates(element: _Element) -> list[x509.Certificate]:

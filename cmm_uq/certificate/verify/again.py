@@ -32,19 +32,15 @@ _ERRORS = 6.0  # standard errors of a Monte Carlo that two of it may differ by, 
 
 @dataclass(frozen=True)
 class Again:
-    """What was computed again.
+    """What was computed again."""
 
-    ``files`` whatever the command writes, by name, with ``results.json``; without the PDF; ``pdf`` the PDF, with the
-    files attached that the given one has; ``None`` where it cannot be set by the same program; ``why_no_pdf`` that is
-    so; ``kept`` files that say on what platform they were made, and are otherwise what the inputs give; ``beside``
-    names of files that lie beside the documents and are not inside the PDF.
-    """
-
-    files: Mapping[str, bytes]
-    pdf: bytes | None = None
+    files: Mapping[str, bytes]  # all that the command writes, by name, without the PDF
+    pdf: bytes | None = (
+        None  # with the files attached that the given one has; ``None`` where the same program cannot set it
+    )
     why_no_pdf: str = ""
-    kept: tuple[str, ...] = ()
-    beside: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()  # files that say on what platform they were made, and are otherwise what the inputs give
+    beside: tuple[str, ...] = ()  # names of files that lie beside the documents and are not inside the PDF
 
 
 Difference = tuple[str, Any, Any]  # JSON path, what stands there, and what it should be

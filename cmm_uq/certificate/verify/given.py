@@ -151,10 +151,7 @@ def _given(read: Mapping[str, tuple[bytes, str]]) -> Given:
 
 
 def _files(paths: Iterable[Path]) -> list[tuple[str, Path]]:
-    """Files with their names, those of a folder in the order of these; links lead elsewhere and are refused.
-
-    Of folders inside a folder those files are read that its manifest names.
-    """
+    """Those of a folder in order, also of folders inside it those that its manifest names; links lead elsewhere: refused."""
     files: list[tuple[str, Path]] = []
     for path in paths:
         if path.is_symlink():

@@ -57,28 +57,21 @@ class HtmlDecision:
 
 @dataclass
 class HtmlPage:
-    """What a page shows.
-
-    ``text`` all of it, in order; ``title`` of the window: title and number of the document; ``banner`` at the head of
-    every page, if any; ``language`` of the text; ``style`` its style sheet; ``tables``, ``decisions`` in order;
-    ``pictures`` contents of pictures that are no drawings: the logo; ``problems`` what does not belong there, each with
-    its place.
-    """
+    """What a page shows, in order."""
 
     text: str = ""
-    title: str = ""
-    banner: str = ""
+    title: str = ""  # of the window: title and number of the document
+    banner: str = ""  # at the head of every page, if any
     language: str = ""
-    style: str = ""
-    pictures: list[bytes] = field(default_factory=list)
+    style: str = ""  # sheet
+    pictures: list[bytes] = field(default_factory=list)  # that are no drawings: the logo
     metas: dict[str, str] = field(default_factory=dict)
     tables: list[HtmlTable] = field(default_factory=list)
     decisions: list[HtmlDecision] = field(default_factory=list)
-    problems: list[tuple[str, str]] = field(default_factory=list)
+    problems: list[tuple[str, str]] = field(default_factory=list)  # what does not belong there, each with its place
 
 
 def read_html(content: bytes, where: str) -> HtmlPage:
-    """What a certificate's HTML shows."""
     if len(content) > HTML_BYTES.most:
         raise CmmUqError(f"is larger than {HTML_BYTES.most} bytes", where=where, fix=_FIX)
     reader = _Reader(where)
@@ -173,7 +166,6 @@ class _Reader(HTMLParser):
         self._problem(f"has the declaration {data[:40]!r}")
 
     def end(self) -> None:
-        """The page is read."""
         for tag in self._open:
             self._problem(f"does not close <{tag}>")
         page = self.page

@@ -156,10 +156,7 @@ Asked = tuple[str, object, object]
 def check_part_job(
     inquiry: Inquiry, job: PartJob, plan: Plan, measured: Floats | None, data: Mapping[str, Any], file: str
 ) -> None:
-    """Keep what the job says otherwise: names, dates, what the drawing asks for, limits, rule, and measured values.
-
-    ``measured`` (c,) values of the measured points, mm and rad; ``None`` where there are none.
-    """
+    """Keep what the job says otherwise; ``measured``: (c,) values of the measured points, mm and rad."""
     facts, said = job.facts, data["job"]
     part, decision = data["part"], data["decision"]
     prior = None if facts.decision.prior is None else facts.decision.prior.model_dump()

@@ -44,34 +44,25 @@ _UNTOLD = frozenset({"/Type", "/Length", "/Filter"})
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file inside a PDF.
-
-    ``name`` of it; ``content`` its bytes; ``relationship`` to the document (ISO 19005-3): ``Source`` or ``Data``.
-    """
+    """A file inside a PDF."""
 
     name: str
     content: bytes
-    relationship: str
+    relationship: str  # to the document (ISO 19005-3): ``Source`` or ``Data``
 
 
 @dataclass
 class PdfFile:
-    """What a PDF holds.
-
-    ``content`` the file's bytes; ``attachments`` in the order of their names in the file; ``information`` title, dates
-    and the like, as the file says; ``xmp`` the same as its metadata stream says; ``language`` of the text; ``ends``
-    bytes up to the end of each revision; ``signatures`` signature fields; ``problems`` what does not belong there, each
-    with its place; ``reader`` of its pages.
-    """
+    """What a PDF holds."""
 
     content: bytes
     attachments: list[Attachment] = field(default_factory=list)
-    information: dict[str, str] = field(default_factory=dict)
-    xmp: str = ""
+    information: dict[str, str] = field(default_factory=dict)  # title, dates and the like, as the file says
+    xmp: str = ""  # the same as its metadata stream says
     language: str = ""
-    ends: list[int] = field(default_factory=list)
-    signatures: int = 0
-    problems: list[tuple[str, str]] = field(default_factory=list)
+    ends: list[int] = field(default_factory=list)  # bytes up to the end of each revision
+    signatures: int = 0  # fields
+    problems: list[tuple[str, str]] = field(default_factory=list)  # what does not belong there, each with its place
     reader: PdfReader | None = None
     where: str = ""
 
@@ -91,7 +82,6 @@ class PdfFile:
 
 
 def read_pdf(content: bytes, where: str) -> PdfFile:
-    """A certificate's PDF."""
     if len(content) > PDF_BYTES.most:
         raise CmmUqError(f"is larger than {PDF_BYTES.most} bytes", where=where, fix=_FIX)
     found = PdfFile(content, where=where)
@@ -108,10 +98,7 @@ def read_pdf(content: bytes, where: str) -> PdfFile:
 
 
 def _revisions(content: bytes, marks: list[re.Match[bytes]], where: str) -> list[int]:
-    """Bytes up to the end of each revision, the first one first: from the last, each leads to the one before it.
-
-    A PDF that is attached as it is has ends of its own, which are none of the file.
-    """
+    """Bytes up to the end of each, from the last back; a PDF attached as it is has ends of its own, none of the file."""
     of, ends, at = {mark.start(): mark for mark in marks}, list[int](), int(marks[-1][1])
     place = marks[-1].start()
     while True:

@@ -19,10 +19,7 @@ _OPENING = b"http://www.w3.org/2000/09/xmldsig#"
 
 
 def check_signatures(inquiry: Inquiry, given: Given, trust: Trust | None) -> None:
-    """Keep whatever is wrong with the signatures of a certificate.
-
-    ``trust`` whom the reader trusts; ``None`` where that was not said, and then nothing need be signed.
-    """
+    """Keep what is wrong; ``trust``: ``None`` where nobody said whom the reader trusts, and then nothing need be signed."""
     if given.pdf is not None:
         name, pdf = given.pdf
         signed: Sequence[FileSignature] = ()
@@ -66,7 +63,6 @@ def _all(inquiry: Inquiry, name: str, signed: Sequence[FileSignature], trust: Tr
 
 
 def _one(inquiry: Inquiry, name: str, place: str, one: FileSignature, trust: Trust | None) -> None:
-    """One signature: what is wrong with it, or what holds."""
     from cmm_uq.certificate.sign import TEST_NOTE
     from cmm_uq.certificate.sign.chain import NOBODY
 

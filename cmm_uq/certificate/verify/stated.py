@@ -1,13 +1,8 @@
-"""Whether a document states the figures of its ``results.json``, each in its row, rounded as it should.
+"""Whether a document states the figures of its ``results.json``, each in its row, rounded as the package rounds, in its unit.
 
-Whether a document states the figures of ``results.json``, each in its row, rounded as the package rounds, in its unit.
-
-Whatever the language of a document, a quantity is a row with its value, U and k in cells side by side; rows of one table
-follow each other as the quantities do in the file. Names of rows are words, which are compared between the views.
-
-Whether the report of a part states the figures of its ``results.json``, in order, rounded and said as the package does.
-
-Text of a page or of a PDF is searched for each row of its tables; both have the cells of a row one after the other.
+Whatever the language, a quantity is a row with its value, U and k in cells side by side; rows of one table follow each other
+as the quantities do in the file; names of rows are compared between the views. Of a part's report the text is searched for
+each row of its tables: page and PDF have the cells of a row one after the other.
 """
 
 from __future__ import annotations

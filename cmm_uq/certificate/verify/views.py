@@ -1,9 +1,7 @@
-"""Whether PDF and HTML show the same text, and where two PDFs differ.
+"""Whether PDF and HTML show the same text, in order, to the character, and where two PDFs differ.
 
-Whether PDF and HTML show the same text, in the same order, to the character.
-
-Both are views of one document. What a PDF has more is taken off first: the foot of every page, the banner at its head, the
-head of a table that goes on over pages, signs of lists. White space tells nothing: lines break elsewhere.
+What a PDF has more is taken off first: the foot of every page, the banner at its head, the head of a table that goes on over
+pages, signs of lists. White space tells nothing: lines break elsewhere.
 """
 
 from __future__ import annotations
