@@ -13,14 +13,12 @@ from cmm_uq.base.units import UNITS
 from cmm_uq.jobs.importing.encodings import begins_with
 from cmm_uq.jobs.importing.format import Format
 from cmm_uq.jobs.importing.keys import ImportKeys
-from cmm_uq.jobs.importing.sheet import Cell, Sheet
+from cmm_uq.jobs.importing.sheet import Sheet
 
 if TYPE_CHECKING:
     from cmm_uq.jobs.dcc.figures import QuantityFigures
 
 _BY_DSI = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
-
-
 ROOT = "digitalCalibrationCertificate"
 
 
@@ -34,7 +32,7 @@ class Dcc(Format):
         return begins_with(head, ROOT)
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
-        """See :meth:`Format.read`: a sheet for each result that has more than one value of something."""
+        """A sheet for each result that has more than one value of something."""
         from cmm_uq.jobs.dcc import read  # the model of a certificate is made for who has one
         from cmm_uq.jobs.dcc.figures import figures
 
@@ -49,19 +47,19 @@ class Dcc(Format):
         return sheets
 
 
-def heading(one: QuantityFigures) -> str:
+def heading(quantity: QuantityFigures) -> str:
     """Of the column of a quantity: its name, or what it is by its refType, with its unit."""
-    name = one.name or " ".join(one.ref_types)
-    symbol = _BY_DSI.get(one.units[0], one.units[0]) if one.units else ""
+    name = quantity.name or " ".join(quantity.ref_types)
+    symbol = _BY_DSI.get(quantity.units[0], quantity.units[0]) if quantity.units else ""
     return f"{name} [{symbol}]" if symbol not in ("", "1") else name
 
 
-def _column(one: QuantityFigures, where: str) -> tuple[str, list[str]]:
-    units = sorted(set(one.units))
+def _column(quantity: QuantityFigures, where: str) -> tuple[str, list[str]]:
+    units = sorted(set(quantity.units))
     if len(units) > 1:
-        raise CmmUqError(f"{one.name!r} is in {' and '.join(units)}: the list mixes units", where=where,
+        raise CmmUqError(f"{quantity.name!r} is in {' and '.join(units)}: the list mixes units", where=where,
                          fix="Ask the laboratory for one unit a list")  # fmt: skip
-    return heading(one), [str(value) for value in one.values] or list(one.words)
+    return heading(quantity), [str(value) for value in quantity.values] or list(quantity.words)
 
 
 def _sheet(name: str, columns: Sequence[tuple[str, list[str]]], where: str) -> Sheet:
@@ -70,7 +68,5 @@ def _sheet(name: str, columns: Sequence[tuple[str, list[str]]], where: str) -> S
     if odd is not None or count > ROWS.most:
         raise CmmUqError(f"the lists of {name!r} differ in length ({odd!r})", where=where,
                          fix="Ask the laboratory for a certificate whose lists belong together")  # fmt: skip
-    full = [(heading, values if len(values) == count else values * count) for heading, values in columns]
-    rows: list[list[Cell]] = [[heading for heading, _ in full]]
-    rows += [[values[i] for _, values in full] for i in range(count)]
-    return Sheet(name, rows, [1, *range(1, count + 1)], decimal=".")
+    full = ([heading, *(values if len(values) == count else values * count)] for heading, values in columns)
+    return Sheet(name, list(zip(*full, strict=True)), [1, *range(1, count + 1)], decimal=".")

@@ -21,8 +21,7 @@ from cmm_uq.jobs.importing.keys import DELIMITERS, ImportKeys
 from cmm_uq.jobs.importing.sheet import Fact, Sheet
 from cmm_uq.jobs.importing.vocabulary import understood
 
-COLUMNS_OF_TEXT = "  "
-"""Two blanks or more between cells, so that single ones may stand in headings."""
+COLUMNS_OF_TEXT = "  "  # two blanks or more between cells, so that single ones may stand in headings
 
 _TITLES: dict[str, Text] = {
     ",": say("comma"), ";": say("semicolon"), "\t": say("tab"), "|": say("bar"), " ": say("blanks"),
@@ -39,9 +38,8 @@ class Delimited(Format):
     title = say("text table (CSV)")
 
     def recognises(self, head: bytes) -> bool:
-        """See :meth:`Format.recognises`: whatever has no control characters."""
         text = head_text(head)
-        return bool(text.strip()) and len(_CONTROL.findall(text)) == 0
+        return bool(text.strip()) and _CONTROL.search(text) is None
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         text, encoding = decoded(content, where, keys.encoding)
@@ -57,83 +55,80 @@ class Delimited(Format):
 def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
     if keys.delimiter is not None:
         return DELIMITERS[keys.delimiter]
-    scores = {}
+    scores = {",": 0}
     for candidate in _TITLES:
         rows, lines = _rows(text, candidate, where, LINES_BEFORE)
-        sheet = Sheet("", rows, lines)
         if candidate in text or candidate in _BLANKS:
-            if header_of(sheet, keys, where, REFERENCES) is not None:
+            if header_of(Sheet("", rows, lines), keys, where, REFERENCES) is not None:
                 return candidate
             scores[candidate] = max(
                 (sum(understood(cell).column is not None for cell in row) for row in rows), default=0
             )
-    best = max(scores, key=lambda one: scores[one])
-    return best if scores[best] else ","
+    return max(scores, key=lambda candidate: scores[candidate])
 
 
-def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> tuple[list[list[str]], list[int]]:
-    """Cells of every line, or of the first ``most``, and their lines."""
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    if '"' not in text and delimiter not in _BLANKS:
-        return _split(text, delimiter, where, most)
-    taken = lines_within(text, where)
+Rows = tuple[list[list[str]], list[int]]
+"""Cells of every line, and their lines."""
+
+
+def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Rows:
+    """Of every line, or of the first ``most``."""
     if delimiter in _BLANKS:
-        split = _BLANKS[delimiter].split
-        cut: Iterable[tuple[int, list[str]]] = ((i, split(line.strip())) for i, line in enumerate(taken, 1))
-        return _kept(cut if most is None else islice(cut, most), rows, lines, where)
-    reader = csv.reader(taken, delimiter=delimiter, skipinitialspace=True)
-    counted = ((reader.line_num, row) for row in reader)
+        split, lines = _BLANKS[delimiter].split, lines_within(text, where)
+        return _filled(islice(((i, split(line.strip())) for i, line in enumerate(lines, 1)), most), where)
+    if '"' not in text:
+        return _unquoted(text, delimiter, where, most)
+    reader = csv.reader(lines_within(text, where), delimiter=delimiter, skipinitialspace=True)
+    rows: Rows = ([], [])
     try:
-        return _kept(counted if most is None else islice(counted, most), rows, lines, where)
+        return _filled(islice(((reader.line_num, row) for row in reader), most), where, rows)
     except csv.Error as error:
         if most is not None:
-            return rows, lines
+            return rows
         raise CmmUqError(f"cells cannot be told apart: {error}", where=f"{where} line {reader.line_num}",
                          fix="Close every quotation mark on its own line, or leave them out") from None  # fmt: skip
 
 
-def _split(text: str, delimiter: str, where: str, most: int | None) -> tuple[list[list[str]], list[int]]:
-    """The same of a text without quotation marks, as fast as it can be."""
-    every = text.splitlines() if most is None else text[: most * 200].splitlines()[:most]
-    if len(every) > LINES.most or (every and len(max(every, key=len)) > LINE.most):
+def _unquoted(text: str, delimiter: str, where: str, most: int | None) -> Rows:
+    """Of a text without quotation marks, as fast as it can be."""
+    lines = text.splitlines() if most is None else text[: most * 200].splitlines()[:most]
+    longest = max(map(len, lines), default=0)
+    if len(lines) > LINES.most or longest > LINE.most:
         list(lines_within(text, where))
-    rows = [line.split(delimiter) for line in every]
-    short = every and len(max(every, key=len)) <= CELL.most and len(every) <= ROWS.most
-    if short and not _loose("\n".join(every), delimiter) and max(set(map(len, rows))) <= COLUMNS.most:
+    rows = [line.split(delimiter) for line in lines]
+    short = lines and longest <= CELL.most and len(lines) <= ROWS.most and max(map(len, rows)) <= COLUMNS.most
+    if short and not _loose("\n".join(lines), delimiter):
         return rows, list(range(1, len(rows) + 1))
-    return _kept(enumerate(rows, 1), [], [], where)
+    return _filled(enumerate(rows, 1), where)
 
 
 def _loose(text: str, delimiter: str) -> bool:
     """Whether some cell has blanks around it, some row an empty cell at its end, or some line nothing."""
-    edges = [f"\n{blank}" for blank in " \xa0"] + [f"{blank}\n" for blank in " \xa0"]
-    edges += [f"{delimiter}{blank}" for blank in " \xa0\n"] + [f"{blank}{delimiter}" for blank in " \xa0"]
-    return any(edge in f"\n{text}\n" for edge in ("\n\n", *edges))
+    edges = [
+        edge for blank in " \xa0" for edge in (f"\n{blank}", f"{blank}\n", f"{delimiter}{blank}", f"{blank}{delimiter}")
+    ]
+    return any(edge in f"\n{text}\n" for edge in ("\n\n", f"{delimiter}\n", *edges))
 
 
-def _kept(
-    counted: Iterable[tuple[int, list[str]]], rows: list[list[str]], lines: list[int], where: str
-) -> tuple[list[list[str]], list[int]]:
+def _filled(counted: Iterable[tuple[int, list[str]]], where: str, filled: Rows | None = None) -> Rows:
+    """Without empty cells at the ends of rows, and without empty rows; added to ``filled``."""
+    rows, lines = filled or ([], [])
     for line, row in counted:
         cells = [cell.strip() for cell in row]
         while cells and not cells[-1]:
             cells.pop()
         if not cells:
             continue
-        if len(cells) > COLUMNS.most or len(max(cells, key=len)) > CELL.most:
-            what = (
-                f"{len(cells)} cells"
-                if len(cells) > COLUMNS.most
-                else f"a cell of {len(max(cells, key=len))} characters"
-            )
-            limit = COLUMNS if len(cells) > COLUMNS.most else CELL
-            raise CmmUqError(f"has {what}, {limit.most} are the most", where=f"{where} line {line}",
-                             fix="Export the columns that are needed; close every quotation mark on its own line")  # fmt: skip
+        longest = max(map(len, cells))
+        if len(cells) > COLUMNS.most or longest > CELL.most:
+            what, limit = (f"a cell of {longest} characters", CELL)
+            if len(cells) > COLUMNS.most:
+                what, limit = f"{len(cells)} cells", COLUMNS
+            fix = "Export the columns that are needed; close every quotation mark on its own line"
+            raise CmmUqError(f"has {what}, {limit.most} are the most", where=f"{where} line {line}", fix=fix)
         rows.append(cells)
         lines.append(line)
     if len(rows) > ROWS.most + LINES_BEFORE:
-        raise CmmUqError(
-            f"has {len(rows)} rows, {ROWS.most} are the most", where=where, fix="Split or thin out the table"
-        )
+        problem = f"has {len(rows)} rows, {ROWS.most} are the most"
+        raise CmmUqError(problem, where=where, fix="Split or thin out the table")
     return rows, lines

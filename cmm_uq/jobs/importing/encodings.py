@@ -16,8 +16,7 @@ _MARKS = (
 )
 _TITLES = {"utf-8": "UTF-8", "utf-16": "UTF-16", "cp1252": "Windows-1252", "latin-1": "ISO 8859-1"}
 _FIX = "Export it again, or name encoding"
-_REPORT_LINE = 2000
-"""Characters of a line of a report, which has 80 to 200."""
+_REPORT_LINE = 2000  # characters of a line of a report, which has 80 to 200
 
 
 def decoded(content: bytes, where: str, asked: str | None = None) -> tuple[str, str]:
@@ -59,10 +58,10 @@ def report_lines(text: str, where: str) -> list[str]:
     lines = text.splitlines()
     if len(lines) > LINES.most:
         raise CmmUqError(f"has {len(lines)} lines, {LINES.most} are the most", where=where, fix="Split the report")
-    longest = max(range(len(lines)), key=lambda i: len(lines[i]), default=0)
-    if lines and len(lines[longest]) > _REPORT_LINE:
-        raise CmmUqError(f"the line has {len(lines[longest])} characters, {_REPORT_LINE} are the most in a report",
-                         where=f"{where} line {longest + 1}", fix="Export it again as text")  # fmt: skip
+    longest, line = max(((len(line), -i) for i, line in enumerate(lines, 1)), default=(0, 0))
+    if longest > _REPORT_LINE:
+        raise CmmUqError(f"the line has {longest} characters, {_REPORT_LINE} are the most in a report",
+                         where=f"{where} line {-line}", fix="Export it again as text")  # fmt: skip
     return lines
 
 

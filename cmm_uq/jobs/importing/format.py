@@ -13,8 +13,7 @@ from cmm_uq.base.plugins import IMPORTS, Plugin, offered
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Sheet
 
-HEAD = 65_536
-"""Bytes of a file by which it is recognised."""
+HEAD = 65_536  # bytes of a file by which it is recognised
 
 
 class Format(ABC):
@@ -81,33 +80,24 @@ def refuse_unread(head: bytes, where: str) -> None:
         raise CmmUqError("is a web page", where=where, fix="Export the table as CSV or .xlsx")
 
 
+# Asked in this order, after those of other packages; a text that is none of them is a text table.
 BUILT_IN = (
-    "workbooks.Excel",
-    "workbooks.OpenDocument",
-    "qif.Qif",
-    "dcc.Dcc",
-    "calypso.Calypso",
-    "dmis.Dmis",
-    "pcdmis.PcDmis",
-    "ipp.Ipp",
+    *("workbooks.Excel", "workbooks.OpenDocument", "qif.Qif", "dcc.Dcc"),
+    *("reports.Calypso", "reports.Dmis", "reports.PcDmis", "reports.Ipp"),
 )
-"""Asked in this order, after those of other packages; a text that is none of them is a text table."""
-
-TEXT = "delimited.Delimited"
 
 
 def format_of(content: bytes, where: str) -> Format:
     head = content[:HEAD]
     for plugin in offered(IMPORTS, Plugin):
-        found = plugin.loaded(Format)  # type: ignore[type-abstract]
-        if plugin.attempt(partial(found.recognises, head)):
-            return found
+        outside = plugin.loaded(Format)  # type: ignore[type-abstract]
+        if plugin.attempt(partial(outside.recognises, head)):
+            return outside
     for name in BUILT_IN:
-        own = _built_in(name)
-        if own.recognises(head):
+        if (own := _built_in(name)).recognises(head):
             return own
     refuse_unread(head, where)
-    if (text := _built_in(TEXT)).recognises(head):
+    if (text := _built_in("delimited.Delimited")).recognises(head):
         return text
     what = "is empty" if not content.strip() else "is no text, and no format of measurements that is known here"
     raise CmmUqError(what, where=where, fix="Export the recording as CSV, .xlsx or .ods")
@@ -115,6 +105,6 @@ def format_of(content: bytes, where: str) -> Format:
 
 @cache
 def _built_in(name: str) -> Format:
-    module, _, own = name.partition(".")
-    found: Format = getattr(import_module(f"cmm_uq.jobs.importing.{module}"), own)()
-    return found
+    module, _, cls = name.partition(".")
+    form: Format = getattr(import_module(f"cmm_uq.jobs.importing.{module}"), cls)()
+    return form

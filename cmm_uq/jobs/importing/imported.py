@@ -1,7 +1,4 @@
-"""A file of a laboratory as the columns of a recording, with what was recognised on the way.
-
-The file of a recording, whatever its format: the project's own is read as it is, any other is imported.
-"""
+"""The file of a recording, whatever its format: the project's own is read as it is, any other is imported."""
 
 from __future__ import annotations
 
@@ -31,12 +28,7 @@ _UNIT_LINE = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class ImportedTable:
-    """A file, read.
-
-    columns : of a recording, by name, each (n,), in the units of their names.
-    lines : (n,) line of each point in the file.
-    recognised : how it was read.
-    """
+    """A file, read: columns of a recording by name, each (n,), in the units of their names, and each point's line."""
 
     columns: dict[str, Floats]
     lines: Ints
@@ -45,29 +37,29 @@ class ImportedTable:
 
 def imported(content: bytes, where: str, keys: ImportKeys, *, reach_mm: float | None = None) -> ImportedTable:
     """A recording in any format that is known."""
-    found = _read(content, where, keys, POINTS, reach_mm)
-    own = [name for name in found.columns if name.startswith("reference_u_") or name == "reference_U_um"]
-    others = [name for name in own if found.recognised.columns[name] != name and name not in keys.columns]
-    if not others or any(name.startswith("reference_") and name.endswith("_mm") for name in found.columns):
-        return found
-    unused = commas(
-        names([found.recognised.columns[name] for name in others])
-    )  # of the measured point, not of a certificate
-    told = found.recognised
+    table = _read(content, where, keys, POINTS, reach_mm)
+    headings, columns = table.recognised.columns, table.columns
+    uncertainties = [name for name in columns if name.startswith("reference_u_") or name == "reference_U_um"]
+    others = [name for name in uncertainties if headings[name] != name and name not in keys.columns]
+    if not others or any(name.startswith("reference_") and name.endswith("_mm") for name in columns):
+        return table
+    # of the measured point, not of a certificate
+    unused = commas(names([headings[name] for name in others]))
     recognised = replace(
-        told, columns={name: heading for name, heading in told.columns.items() if name not in others},
-        facts=(*told.facts, Fact("uncertainties_not_used", say("Uncertainties not used"), unused)),
+        table.recognised, columns={name: heading for name, heading in headings.items() if name not in others},
+        facts=(*table.recognised.facts, Fact("uncertainties_not_used", say("Uncertainties not used"), unused)),
     )  # fmt: skip
-    columns = {name: values for name, values in found.columns.items() if name not in others}
-    return replace(found, columns=columns, recognised=recognised)
+    return replace(
+        table, columns={name: columns[name] for name in columns if name not in others}, recognised=recognised
+    )
 
 
 def imported_references(content: bytes, where: str, keys: FileKeys) -> ImportedTable:
     """Certified values in any format that is known: distances or places, by the number of their point."""
-    asked = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
-    found = _read(content, where, asked, REFERENCES, None)
-    columns = {f"reference_{name}" if name in POINTS[0] else name: values for name, values in found.columns.items()}
-    return replace(found, columns=columns)
+    every = ImportKeys.model_validate({name: getattr(keys, name) for name in FileKeys.model_fields})
+    table = _read(content, where, every, REFERENCES, None)
+    columns = {f"reference_{name}" if name in POINTS[0] else name: values for name, values in table.columns.items()}
+    return replace(table, columns=columns)
 
 
 def _read(
@@ -78,12 +70,16 @@ def _read(
                          fix="Split it")  # fmt: skip
     form = format_of(content, where)
     sheet, header = _chosen(form.read(content, where, keys), keys, where, wanted)
-    sheet = _with_unit(sheet, header)
+    for row in sheet.rows[: header.row] if sheet.unit is None else ():  # ``Units: mm`` in a line before the table
+        match = _UNIT_LINE.search(";".join(map(str, row)))
+        if match and (unit := length_named(match[1].strip("[]().,;"))):
+            sheet = replace(sheet, unit=unit.name)
+            break
     columns = columns_of(sheet, header, keys, where, reach_mm=reach_mm, points=wanted is POINTS)
     named = (Fact("sheet", say("Sheet"), Verbatim(sheet.name)),) if sheet.name else ()
-    told = Recognition(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
-                      columns.sources, len(columns.lines))  # fmt: skip
-    return ImportedTable(columns.values, columns.lines, told)
+    recognised = Recognition(PurePath(where).name, form.name, form.title, (*named, *sheet.facts, *columns.facts),
+                             columns.sources, len(columns.lines))  # fmt: skip
+    return ImportedTable(columns.values, columns.lines, recognised)
 
 
 def _chosen(
@@ -91,37 +87,19 @@ def _chosen(
 ) -> tuple[Sheet, Header]:
     """The sheet with the table, and its header."""
     if keys.sheet is not None:
-        sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()] or _no_sheet(
-            sheets, keys.sheet, where
-        )
-    found = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
-    if not found:
+        known = [sheet.name for sheet in sheets if sheet.name]
+        sheets = [sheet for sheet in sheets if sheet.name.casefold() == keys.sheet.casefold()]
+        if not sheets:
+            fix = suggestion(keys.sheet, known) if known else "Leave sheet out: the file has only one table"
+            raise CmmUqError(f"has no sheet {keys.sheet!r}", where=where, fix=fix)
+    tables = [(sheet, header) for sheet in sheets if (header := header_of(sheet, keys, where, wanted)) is not None]
+    if not tables:
         raise no_header(sheets, keys, where, wanted)
-    if len(found) > 1:
-        listed = ", ".join(repr(sheet.name) for sheet, _ in found)
-        raise CmmUqError(f"holds {len(found)} tables of points: {listed}", where=where,
-                         fix=f'Say which: sheet = "{found[0][0].name}"')  # fmt: skip
-    return found[0]
-
-
-def _no_sheet(sheets: Sequence[Sheet], name: str, where: str) -> list[Sheet]:
-    known = [sheet.name for sheet in sheets if sheet.name]
-    fix = suggestion(name, known) if known else "Leave sheet out: the file has only one table"
-    raise CmmUqError(f"has no sheet {name!r}", where=where, fix=fix)
-
-
-def _with_unit(sheet: Sheet, header: Header) -> Sheet:
-    """With the unit that a line before the table names: ``Units: mm``."""
-    if sheet.unit is not None:
-        return sheet
-    for row in sheet.rows[: header.row]:
-        found = _UNIT_LINE.search(";".join(str(cell) for cell in row))
-        if found and (unit := length_named(found[1].strip("[]().,;"))):
-            return replace(sheet, unit=unit.name)
-    return sheet
-
-
-_HEAD = 16_384
+    if len(tables) > 1:
+        listed = ", ".join(repr(sheet.name) for sheet, _ in tables)
+        raise CmmUqError(f"holds {len(tables)} tables of points: {listed}", where=where,
+                         fix=f'Say which: sheet = "{tables[0][0].name}"')  # fmt: skip
+    return tables[0]
 
 
 def read_recording_file(
@@ -130,9 +108,10 @@ def read_recording_file(
     """Points of a recording, and how it was read where it is in another format than the project's own."""
     if not keys.asked and is_own(content):
         return read_recording(content, where, machine, without), None
-
-    found = imported(content, where, keys, reach_mm=_reach(machine))
-    return points_of(found.columns, found.lines.tolist(), where, machine), found.recognised
+    spans = machine.travel_mm[:, 1] - machine.travel_mm[:, 0]
+    reach = float(np.linalg.norm(spans)) if np.all(np.isfinite(spans)) else None
+    table = imported(content, where, keys, reach_mm=reach)
+    return points_of(table.columns, table.lines.tolist(), where, machine), table.recognised
 
 
 def is_own(content: bytes) -> bool:
@@ -142,12 +121,6 @@ def is_own(content: bytes) -> bool:
 
 def header(content: bytes) -> list[str]:
     """Names between commas in the first line that is no comment."""
-    text = content[:_HEAD].decode("utf-8-sig", errors="replace")
+    text = content[:16_384].decode("utf-8-sig", errors="replace")
     line = next((line for line in map(str.strip, text.splitlines()) if line and not line.startswith("#")), "")
     return [name.strip().strip('"') for name in line.split(",")]
-
-
-def _reach(machine: Machine) -> float | None:
-    """Diagonal of the travel, mm; ``None`` where the job does not say it."""
-    spans = machine.travel_mm[:, 1] - machine.travel_mm[:, 0]
-    return float(np.linalg.norm(spans)) if np.all(np.isfinite(spans)) else None

@@ -1,7 +1,5 @@
 """What a job says beside the name of a file that is imported, and units as laboratories write them.
 
-Units as laboratories write them, and how they become those of a recording.
-
 Factors are quotients of whole numbers, so that 1.5 inch is the double nearest to 38.1 mm.
 """
 
@@ -21,13 +19,7 @@ from cmm_uq.base.points import Floats
 
 @dataclass(frozen=True)
 class WrittenUnit:
-    """A unit: ``value · up / down + offset`` in the unit of its sort (mm, °C, s, hPa, %).
-
-    name : as it is said.
-    sort : of quantity.
-    up, down : whole numbers.
-    offset : added after.
-    """
+    """A unit: ``value · up / down + offset`` in the unit of its sort of quantity (mm, °C, s, hPa, %)."""
 
     name: str
     sort: str
@@ -69,8 +61,7 @@ _ENDINGS = (("_mm_s", None), ("_mm", (LENGTH, 1)), ("_um", (LENGTH, 1000)), ("_c
 
 def unit_named(text: str) -> WrittenUnit | None:
     """A unit as written, whatever its case where that says nothing; ``None`` where it is none."""
-    plain = text.strip().strip(".").strip()
-    return UNITS.get(plain.casefold())
+    return UNITS.get(text.strip().strip(".").strip().casefold())
 
 
 def length_named(text: str) -> WrittenUnit | None:
@@ -80,20 +71,15 @@ def length_named(text: str) -> WrittenUnit | None:
 
 def sort_of(column: str) -> tuple[str, int] | None:
     """Sort of quantity of a recording's column, and how many of its units one of the sort's is; ``None`` without unit."""
-    return next((found for ending, found in _ENDINGS if column.endswith(ending)), None)
+    return next((sort for ending, sort in _ENDINGS if column.endswith(ending)), None)
 
 
 def converted(values: Floats, unit: WrittenUnit, column: str) -> Floats:
-    """Values of a column in the unit of its name.
-
-    ``values``: (n,) as written.
-    """
+    """Values (n,) as written in a column, in the unit of its name."""
     sort = sort_of(column)
-    up, down = unit.up * (sort[1] if sort else 1), unit.down
-    if up != 1:
-        values = values * up
-    if down != 1:
-        values = values / down
+    up = unit.up * (sort[1] if sort else 1)
+    values = values * up if up != 1 else values
+    values = values / unit.down if unit.down != 1 else values
     return values + unit.offset if unit.offset else values
 
 
@@ -102,9 +88,9 @@ _SUFFIX = re.compile(r"^([+-]?[\d.,' \u00a0\u202f]*\d[.,]?(?:[eE][+-]?\d+)?)\s*(
 
 def apart(cell: str) -> tuple[str, WrittenUnit] | None:
     """A number and the unit written after it in its cell; ``None`` where there is no unit."""
-    found = _SUFFIX.match(cell)
-    unit = unit_named(found[2]) if found else None
-    return (found[1], unit) if found and unit else None
+    match = _SUFFIX.match(cell)
+    unit = unit_named(match[2]) if match else None
+    return (match[1], unit) if match and unit else None
 
 
 Source = str | Annotated[int, Field(ge=1, le=COLUMNS.most)]
@@ -114,6 +100,10 @@ Sources = Source | Annotated[list[Source], Field(min_length=1, max_length=COLUMN
 """One, or several where a row holds several points, in their order."""
 
 DELIMITERS: Mapping[str, str] = {",": ",", ";": ";", "tab": "\t", "blank": " ", "|": "|"}
+
+
+def sources_of(sources: Sources) -> list[Source]:
+    return sources if isinstance(sources, list) else [sources]
 
 
 class FileKeys(JobTable):

@@ -14,13 +14,7 @@ Cell = str | float
 
 @dataclass(frozen=True)
 class Fact:
-    """Something that was recognised.
-
-    Parameters
-    ----------
-    key : in results.json.
-    label, value : as printed.
-    """
+    """Something that was recognised, by its key in results.json."""
 
     key: str
     label: Text
@@ -55,13 +49,7 @@ class Sheet:
     facts: tuple[Fact, ...] = ()
 
     def at(self, where: str, row: int, column: int | None = None, heading: str = "") -> str:
-        """Place of a row, or of a cell, by their indices.
-
-        Parameters
-        ----------
-        where : the file.
-        heading : of the column.
-        """
+        """Place of a row of the file, or of a cell below a heading, by their indices."""
         line = self.lines[row]
         if self.spreadsheet:
             return f"{where}: {self.name} {'row ' if column is None else letters(column)}{line}"
@@ -77,37 +65,32 @@ def letters(column: int) -> str:
     return name
 
 
-Row = tuple[str, list[Cell], int]
+Row = tuple[str, Sequence[Cell], int]
 """Sort of feature, its cells, its line."""
 
 
 def sheets_of(
-    rows: Sequence[Row], headings: Sequence[str], *, unit: str | None, decimal: str | None = None,
+    rows: Sequence[Row],
+    headings: Sequence[str],
+    *,
+    unit: str | None,
+    decimal: str | None = None,
     facts: tuple[Fact, ...] = (),
-) -> list[Sheet]:  # fmt: skip
-    """A sheet for each sort of feature."""
+) -> list[Sheet]:
+    """A sheet for each sort of feature, without columns in which nothing stands."""
     sheets = []
     for sort in dict.fromkeys(sort for sort, _, _ in rows):
-        own = [(cells, line) for of, cells, line in rows if of == sort]
-        kept = [i for i in range(len(headings)) if any(cells[i] != "" for cells, _ in own)]
-        table: list[list[Cell]] = [[headings[i] for i in kept], *([cells[i] for i in kept] for cells, _ in own)]
-        lines = [own[0][1], *(line for _, line in own)]
+        lines = [line for of, _, line in rows if of == sort]
+        columns = zip(headings, *(cells for of, cells, _ in rows if of == sort), strict=True)
+        table = list(zip(*(column for column in columns if any(cell != "" for cell in column[1:])), strict=True))
         name = f"{sort}s" if sort else ""
-        sheets.append(Sheet(name, table, lines, listed=True, unit=unit, decimal=decimal, facts=facts))
+        sheets.append(Sheet(name, table, [lines[0], *lines], listed=True, unit=unit, decimal=decimal, facts=facts))
     return sheets
 
 
 @dataclass(frozen=True)
 class Recognition:
-    """How a file was read.
-
-    file : its name.
-    format : its format's name.
-    title : of the format, as printed.
-    facts : encoding, unit, decimal sign, …
-    columns : heading of the file by column of the recording.
-    points : in the table.
-    """
+    """How a file was read: names of file and format, headings by column of the recording, number of points."""
 
     file: str
     format: str
@@ -126,12 +109,12 @@ class Recognition:
     @property
     def rows(self) -> list[tuple[Text, Text]]:
         """Everything, for a table."""
-        head = [(say("File"), Verbatim(self.file)), (say("Format"), self.title)]
-        columns: list[tuple[Text, Text]] = [
-            (say("Column {name}", name=Verbatim(name)), Verbatim(heading)) for name, heading in self.columns.items()
-        ]
-        count = (say("Rows read"), say("{points}", points=self.points))
-        return [*head, *((fact.label, fact.value) for fact in self.facts), *columns, count]
+        columns = ((say("Column {name}", name=Verbatim(name)), Verbatim(text)) for name, text in self.columns.items())
+        return [
+            (say("File"), Verbatim(self.file)), (say("Format"), self.title),
+            *((fact.label, fact.value) for fact in self.facts), *columns,
+            (say("Rows read"), say("{points}", points=self.points)),
+        ]  # fmt: skip
 
     @property
     def sentence(self) -> Text:

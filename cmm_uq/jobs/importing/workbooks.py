@@ -1,9 +1,7 @@
 """Workbooks: Excel (ISO/IEC 29500, read by openpyxl) and OpenDocument (ISO/IEC 26300), values as they were last computed.
 
-OpenDocument spreadsheets (.ods; ISO/IEC 26300): values as they were last computed, read as a stream.
-
-``office:value`` holds a number to all its digits, whatever the cell shows. Repeated rows and columns are counted, not
-unfolded, so that a file of a few bytes cannot become a table of millions of cells.
+Of OpenDocument ``office:value`` holds a number to all its digits, whatever the cell shows. Repeated rows and columns are
+counted, not unfolded, so that a file of a few bytes cannot become a table of millions of cells.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ import re
 import warnings
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError
 
@@ -27,13 +25,11 @@ from cmm_uq.jobs.importing.header import LINES_BEFORE
 from cmm_uq.jobs.importing.keys import ImportKeys
 from cmm_uq.jobs.importing.sheet import Cell, Sheet
 
-_PROLOG = 65_536
-"""Bytes of a part in which its root begins."""
-
-_ROOT = re.compile(r"<[A-Za-z]")
+_PROLOG = 65_536  # bytes of a part in which its root begins
 _MEMBERS = 2000
-_FIX = "Save the sheet of the recording as a workbook of its own, or as CSV"
-ZIP = b"PK\x03\x04"
+_EMPTY_MOST = 5000  # empty rows in turn after which a sheet has ended
+_TABLE = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
+_OFFICE = "{urn:oasis:names:tc:opendocument:xmlns:office:1.0}"
 
 
 def opened(content: bytes, where: str) -> zipfile.ZipFile:
@@ -46,37 +42,27 @@ def opened(content: bytes, where: str) -> zipfile.ZipFile:
                          fix="Copy or export it again") from None  # fmt: skip
     size = sum(member.file_size for member in members)
     if size > UNPACKED.most or len(members) > _MEMBERS:
-        raise CmmUqError(f"holds {size} bytes in {len(members)} parts once it is unpacked: {UNPACKED.most} are the most",
-                         where=where, fix=_FIX)  # fmt: skip
+        problem = f"holds {size} bytes in {len(members)} parts once it is unpacked: {UNPACKED.most} are the most"
+        fix = "Save the sheet of the recording as a workbook of its own, or as CSV"
+        raise CmmUqError(problem, where=where, fix=fix)
     if any(member.flag_bits & 1 for member in members):
         raise CmmUqError("is encrypted", where=where, fix="Save it without a password")
-    _refuse_entities(archive, where)
+    for name in archive.namelist():
+        if name.endswith((".xml", ".rels")):
+            _refuse_entities(archive, name, where)
     return archive
 
 
-def _refuse_entities(archive: zipfile.ZipFile, where: str) -> None:
+def _refuse_entities(archive: zipfile.ZipFile, name: str, where: str) -> None:
     """Refuse XML that declares a document type, and with it entities, or whose root is not found where it must begin."""
-    for name in archive.namelist():
-        if not name.endswith((".xml", ".rels")):
-            continue
-        try:
-            with archive.open(name) as member:
-                head = head_text(member.read(_PROLOG))
-        except (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError):
-            raise CmmUqError(f"is a damaged workbook: its part {name!r} is spoiled", where=where,
-                             fix="Copy or export it again") from None  # fmt: skip
-        root = _ROOT.search(head)
-        if "<!DOCTYPE" in head or (root is None and len(head) >= _PROLOG // 2):
-            raise CmmUqError(f"declares entities or a document type (in {name!r})", where=where, fix=HOSTILE_FIX)
-
-
-def has(content: bytes, *names: str) -> bool:
-    """Whether the head of an archive names one of these members."""
-    return content.startswith(ZIP) and any(name.encode() in content for name in names)
-
-
-_EMPTY_MOST = 5000
-"""Empty rows in turn after which a sheet has ended."""
+    try:
+        with archive.open(name) as member:
+            head = head_text(member.read(_PROLOG))
+    except (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError):
+        raise CmmUqError(f"is a damaged workbook: its part {name!r} is spoiled", where=where,
+                         fix="Copy or export it again") from None  # fmt: skip
+    if "<!DOCTYPE" in head or (re.search(r"<[A-Za-z]", head) is None and len(head) >= _PROLOG // 2):
+        raise CmmUqError(f"declares entities or a document type (in {name!r})", where=where, fix=HOSTILE_FIX)
 
 
 class Excel(Format):
@@ -86,7 +72,8 @@ class Excel(Format):
     title = say("Excel workbook")
 
     def recognises(self, head: bytes) -> bool:
-        return has(head, "[Content_Types].xml", "xl/workbook.xml", "xl/worksheets", "_rels/.rels")
+        members = (b"[Content_Types].xml", b"xl/workbook.xml", b"xl/worksheets", b"_rels/.rels")
+        return head.startswith(b"PK\x03\x04") and any(name in head for name in members)
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
         with opened(content, where) as archive:
@@ -98,9 +85,7 @@ class Excel(Format):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # of styles and extensions, which are not looked at
                 book = load_workbook(io.BytesIO(content), read_only=True, data_only=True, keep_links=False)
-                sheets = [
-                    _sheet(one.title, _cells(one), where) for one in book.worksheets if one.sheet_state == "visible"
-                ]
+                sheets = [_sheet(sheet, where) for sheet in book.worksheets if sheet.sheet_state == "visible"]
                 book.close()
         except CmmUqError:
             raise
@@ -112,31 +97,24 @@ class Excel(Format):
         return sheets
 
 
-def _cells(sheet: Any) -> Iterable[Sequence[Any]]:
-    sheet.reset_dimensions()
-    found: Iterable[Sequence[Any]] = sheet.iter_rows(values_only=True)
-    return found
-
-
-def _sheet(name: str, found: Iterable[Sequence[Any]], where: str) -> Sheet:
-    """A sheet of the cells of a workbook."""
+def _sheet(sheet: Any, where: str) -> Sheet:
     rows: list[list[Cell]] = []
     lines: list[int] = []
-    for line, values in enumerate(found, 1):
-        cells = [cell_of(value) for value in values]
+    sheet.reset_dimensions()
+    for line, values in enumerate(sheet.iter_rows(values_only=True), 1):
+        cells = [_cell(value) for value in values]
         while cells and cells[-1] == "":
             cells.pop()
-        if not cells:
-            if line - (lines[-1] if lines else 0) > _EMPTY_MOST:
-                break
-            continue
-        check_row(cells, len(rows), f"{where}: {name} row {line}")
-        rows.append(cells)
-        lines.append(line)
-    return Sheet(name, rows, lines, spreadsheet=True)
+        if cells:
+            _check_row(cells, len(rows), f"{where}: {sheet.title} row {line}")
+            rows.append(cells)
+            lines.append(line)
+        elif line - (lines[-1] if lines else 0) > _EMPTY_MOST:
+            break
+    return Sheet(sheet.title, rows, lines, spreadsheet=True)
 
 
-def cell_of(value: Any) -> Cell:
+def _cell(value: Any) -> Cell:
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -148,7 +126,7 @@ def cell_of(value: Any) -> Cell:
     return str(value).strip()
 
 
-def check_row(cells: Sequence[Cell], rows: int, place: str) -> None:
+def _check_row(cells: Sequence[Cell], rows: int, place: str) -> None:
     """Refuse what goes beyond the limits of a table."""
     if len(cells) > COLUMNS.most:
         raise CmmUqError(f"has {len(cells)} cells, {COLUMNS.most} are the most", where=place,
@@ -161,11 +139,6 @@ def check_row(cells: Sequence[Cell], rows: int, place: str) -> None:
         raise CmmUqError(f"has a cell of {longest} characters, {CELL.most} are the most", where=place, fix="Shorten it")
 
 
-_TABLE = "{urn:oasis:names:tc:opendocument:xmlns:table:1.0}"
-_OFFICE = "{urn:oasis:names:tc:opendocument:xmlns:office:1.0}"
-_NUMBERS = ("float", "currency", "percentage")
-
-
 class OpenDocument(Format):
     """A spreadsheet."""
 
@@ -173,7 +146,6 @@ class OpenDocument(Format):
     title = say("OpenDocument spreadsheet")
 
     def recognises(self, head: bytes) -> bool:
-        """See :meth:`Format.recognises`: its first member says so."""
         return b"mimetypeapplication/vnd.oasis.opendocument.spreadsheet" in head[:200]
 
     def read(self, content: bytes, where: str, keys: ImportKeys) -> Sequence[Sheet]:
@@ -203,9 +175,9 @@ def _sheets(events: Iterator[tuple[str, Element]], where: str) -> Iterator[Sheet
             name, line, rows, lines = element.get(f"{_TABLE}name", ""), 0, [], []
         elif event == "end" and element.tag == f"{_TABLE}table-row":
             repeated = _count(element, "number-rows-repeated")
-            cells = _cells_of_opendocument(element, f"{where}: {name} row {line + 1}")
+            cells = _cells(element, f"{where}: {name} row {line + 1}")
             for copy in range(repeated if cells else 0):
-                check_row(cells, len(rows), f"{where}: {name} row {line + copy + 1}")
+                _check_row(cells, len(rows), f"{where}: {name} row {line + copy + 1}")
                 rows.append(cells)
                 lines.append(line + copy + 1)
             line += repeated
@@ -215,7 +187,7 @@ def _sheets(events: Iterator[tuple[str, Element]], where: str) -> Iterator[Sheet
             element.clear()
 
 
-def _cells_of_opendocument(row: Element, place: str) -> list[Cell]:
+def _cells(row: Element, place: str) -> list[Cell]:
     """Cells of a row, without the empty ones at its end."""
     cells: list[Cell] = []
     empty = 0
@@ -226,8 +198,9 @@ def _cells_of_opendocument(row: Element, place: str) -> list[Cell]:
         if value == "":
             empty += repeated
             continue
-        if len(cells) + empty + repeated > COLUMNS.most:
-            raise CmmUqError(f"has {len(cells) + empty + repeated} cells, {COLUMNS.most} are the most", where=place,
+        width = len(cells) + empty + repeated
+        if width > COLUMNS.most:
+            raise CmmUqError(f"has {width} cells, {COLUMNS.most} are the most", where=place,
                              fix="Keep the columns that the job needs")  # fmt: skip
         cells += [""] * empty + [value] * repeated
         empty = 0
@@ -235,12 +208,11 @@ def _cells_of_opendocument(row: Element, place: str) -> list[Cell]:
 
 
 def _value(element: Element) -> Cell:
-    sort = element.get(f"{_OFFICE}value-type")
-    if sort in _NUMBERS:
+    if element.get(f"{_OFFICE}value-type") in ("float", "currency", "percentage"):
         return float(element.get(f"{_OFFICE}value", "nan"))
     for key in ("date-value", "time-value", "boolean-value"):
-        if given := element.get(f"{_OFFICE}{key}"):
-            return given
+        if text := element.get(f"{_OFFICE}{key}"):
+            return text
     return "\n".join("".join(part.itertext()) for part in element if local(part) == "p").strip()
 
 

@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from cmm_uq.base.errors import CmmUqError
-from cmm_uq.jobs.importing.dmis import statements
 from cmm_uq.jobs.importing.encodings import decoded, report_lines
+from cmm_uq.jobs.importing.reports import statements
 from cmm_uq.jobs.part.characteristic import ASKS, What
 from cmm_uq.jobs.part.datums import BETWEEN
 from cmm_uq.jobs.part.dmis_frames import DmisFrame, numbers_of, reference, words_of
