@@ -12,21 +12,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 
-LONGEST_MESSAGE = 300 - len("cmm-uq: ")
-"""Characters of a message."""
-
-_LISTED = 220
-"""Characters of a list of known names; such a list is no longer read."""
-
-_FAMILY = 9
-"""Names that begin with the whole word, up to which all of them are suggested: three axes about three."""
-
-MOST_GATHERED = 50
-"""Problems that are said of one input."""
-
-_COMPARED = 100
-"""Characters of a word that is compared with the known names: none of them is longer."""
-
+LONGEST_MESSAGE = 300 - len("cmm-uq: ")  # characters of a message
+_LISTED = 220  # characters of a list of known names; such a list is no longer read
+_FAMILY = 9  # names that begin with the whole word, up to which all of them are suggested: three axes about three
+MOST_GATHERED = 50  # problems that are said of one input
+_COMPARED = 100  # characters of a word that is compared with the known names: none of them is longer
 _ELLIPSIS = "…"
 _UNSHOWN = frozenset({"Cc", "Cf", "Co", "Cs", "Zl", "Zp"})
 """Categories of characters that break the line, change its direction, steer a terminal, or cannot be encoded."""

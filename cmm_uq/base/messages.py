@@ -50,8 +50,7 @@ class Verbatim(Text):
     __slots__ = ()
 
 
-Argument = Text | float
-"""What stands in a message: another text, or a number that the pattern says how to round."""
+Argument = Text | float  # what stands in a message: another text, or a number that the pattern says how to round
 
 
 class Key(Verbatim):
@@ -61,8 +60,7 @@ class Key(Verbatim):
 
 
 NOTHING = Text("")
-DASH = Number("–")
-"""Where a figure does not exist."""
+DASH = Number("–")  # where a figure does not exist
 
 
 class Message(Text):

@@ -14,8 +14,7 @@ import numpy as np
 from cmm_uq.base.errors import CmmUqError
 from cmm_uq.base.plugins import naming_package
 
-_NOT_FINITE = "infs or NaNs"
-"""In what SciPy says of an array."""
+_NOT_FINITE = "infs or NaNs"  # in what SciPy says of an array
 
 
 @contextmanager

@@ -19,9 +19,7 @@ from cmm_uq.base.units import HOUR
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-AXES = "xyz"
-"""Of coordinates, and of the carriages of a Cartesian machine."""
+AXES = "xyz"  # of coordinates, and of the carriages of a Cartesian machine
 
 _NO_START = 1e6
 """s: a first reading this long after time 0, twelve days, is of a clock that did not start with the job, as a computer's."""

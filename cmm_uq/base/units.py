@@ -19,23 +19,12 @@ from cmm_uq.base.messages import NOTHING, Text, Verbatim
 if TYPE_CHECKING:
     import pint
 
-MICROMETRE = 1e-3
-"""1 µm in mm."""
-
-METRE = 1e3
-"""1 m in mm."""
-
-ARCSECOND = pi / (180 * 3600)
-"""1″ in rad."""
-
-PPM = 1e-6
-"""1 ppm as a ratio."""
-
-HOUR = 3600.0
-"""1 h in s."""
-
-REFERENCE_TEMPERATURE = 20.0
-"""Standard reference temperature for dimensional specification, °C (ISO 1)."""
+MICROMETRE = 1e-3  # 1 µm in mm
+METRE = 1e3  # 1 m in mm
+ARCSECOND = pi / (180 * 3600)  # 1″ in rad
+PPM = 1e-6  # 1 ppm as a ratio
+HOUR = 3600.0  # 1 h in s
+REFERENCE_TEMPERATURE = 20.0  # standard reference temperature for dimensional specification, °C (ISO 1)
 
 
 class Unit(Text):

@@ -22,8 +22,7 @@ from cmm_uq.jobs.tables.origin import MEASURED, SIMULATED
 
 SCHEMA = "cmm-uq/acquired/1"
 ARTEFACT, TIME = "temp_artefact_c", "time_s"
-_NAMED = 5
-"""Gaps and points that a certificate names one by one."""
+_NAMED = 5  # gaps and points that a certificate names one by one
 
 
 class _Said(BaseModel):

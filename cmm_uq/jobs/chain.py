@@ -25,9 +25,7 @@ from cmm_uq.jobs.tables.origin import MEASURED
 Claim = Literal["traceable", "by evidence", "not shown", "none needed"]
 """What a statement of traceability says; the last where nothing that is certified enters."""
 
-Lack = tuple[Text, str]
-"""What a claim lacks, in words without keys, and the key of job.toml that would mend it."""
-
+Lack = tuple[Text, str]  # what a claim lacks, in words without keys, and the key of job.toml that would mend it
 NOT_MEASURED = say("Nobody measured this recording, and no result of it is traceable.")
 OWN_MACHINE = say(
     "The artefact was certified on the machine that is calibrated here. It is no independent reference, so the results are "

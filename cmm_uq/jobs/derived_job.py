@@ -36,8 +36,7 @@ OF_THE_CERTIFICATE = ("number", "replaces", "received", "issued", "recalibration
 """Keys of ``[job]`` that belong to the certificate of the measured recording alone."""
 OF_THE_RECORDED_MACHINE = ("short_gauge", "simulation")
 """Tables that speak of the machine as it was recorded, not of one simulated or compensated."""
-DERIVED_RECORDING = "recording.csv"
-"""Name of a recording that was made from one in another format."""
+DERIVED_RECORDING = "recording.csv"  # name of a recording that was made from one in another format
 IN_THE_RECORDING = ("temperature_log",)
 """Keys of ``[machine]`` whose figures stand in every recording that a command writes."""
 

@@ -32,8 +32,7 @@ from cmm_uq.jobs.tables.machine import MachineFacts
 from cmm_uq.jobs.tables.origin import MEASURED, DerivedFrom, Origin
 from cmm_uq.jobs.tables.plan import AcquireFacts, PlanFacts, ProveFacts
 
-Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]
-"""A permissible size of an effect in its own unit."""
+Tolerance = Annotated[float, Field(gt=0, le=1e9), at_least(1e-9)]  # A permissible size of an effect in its own unit
 
 
 class JobFacts(Identification):

@@ -33,8 +33,7 @@ _OUTWARD = re.compile(
 )
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _EMBEDDED = "data:image/png;base64,"
-_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
-"""Of a PNG, by its type of colour."""
+_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # of a PNG, by its type of colour
 
 
 class _Refuse(Protocol):

@@ -47,8 +47,7 @@ from cmm_uq.jobs.tables.origin import altered, check_examples, check_mark, is_pl
 if TYPE_CHECKING:
     from cmm_uq.jobs.recording.certified import CertifiedValues
 
-PART = "part"
-"""The table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`."""
+PART = "part"  # the table by which the job of a part is told from others; see :mod:`cmm_uq.jobs.part`
 
 
 @dataclass(frozen=True)

@@ -23,9 +23,7 @@ from cmm_uq.jobs.tables.artefact import ArtefactFacts
 from cmm_uq.jobs.tables.origin import EXAMPLE
 
 Schema = dict[str, Any]
-
 DRAFT = "http://json-schema.org/draft-07/schema#"
-
 _REFERENCE = "#/$defs/"
 
 

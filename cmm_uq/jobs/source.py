@@ -21,11 +21,8 @@ _WRITTEN = re.compile(
 )
 """Names that commands write, or attach to a certificate, beside the recording of a job."""
 
-DERIVED = ("truth.toml", "compensation.json")
-"""Names that belong beside a derived recording."""
-
-RESULTS = "results.json"
-"""Name of what another job's report wrote; a job may keep it in a folder of its own."""
+DERIVED = ("truth.toml", "compensation.json")  # names that belong beside a derived recording
+RESULTS = "results.json"  # name of what another job's report wrote; a job may keep it in a folder of its own
 
 _REPORTED = re.compile(r"results\.json|posterior.*\.npz|certificate.*\.pdf", re.IGNORECASE)
 """Names of what another job's report wrote and this one may go by."""
@@ -33,8 +30,7 @@ _REPORTED = re.compile(r"results\.json|posterior.*\.npz|certificate.*\.pdf", re.
 _DEVICE = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³])(\..*)?", re.IGNORECASE)
 """Windows takes these for devices, with any ending."""
 
-_FORBIDDEN = frozenset('<>:"|?*')
-"""On Windows."""
+_FORBIDDEN = frozenset('<>:"|?*')  # on Windows
 
 
 def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Path:

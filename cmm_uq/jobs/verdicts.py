@@ -16,11 +16,8 @@ from cmm_uq.base.units import UNITS, printed_unit
 GRAVEST = ("fail", "conditional fail", "remeasure", "undecided", "incomplete", "conditional pass", "pass")
 """Outcomes of statements, the gravest first: findings in their order; incomplete is what would pass, were it whole."""
 
-NONE = "none"
-"""In place of an outcome where nothing is stated."""
-
-BEYOND = frozenset({"fail", "conditional fail"})
-"""Outcomes that find a machine beyond a limit."""
+NONE = "none"  # in place of an outcome where nothing is stated
+BEYOND = frozenset({"fail", "conditional fail"})  # outcomes that find a machine beyond a limit
 
 STANDS: Mapping[str, Literal["good", "bad"]] = MappingProxyType(
     {"pass": "good", "fail": "bad", "conditional fail": "bad"}
@@ -117,8 +114,7 @@ class Verdicts(tuple[Verdict, ...]):
                     *_of_part(results.get("characteristics") or ())))  # fmt: skip
 
 
-NO_VERDICTS = Verdicts()
-"""Of what states no conformity."""
+NO_VERDICTS = Verdicts()  # of what states no conformity
 
 
 def _read(one: Mapping[str, Any]) -> Verdict:

@@ -13,8 +13,7 @@ from cmm_uq.base.files.content import text_of
 from cmm_uq.base.files.limits import CELL, CELLS, COLUMN_NAME, COLUMNS, LINE, LINES, ROWS, Limit
 from cmm_uq.base.files.numbers import number_problem
 
-FORMULA = tuple("=+-@＝＋－＠")
-"""What makes a spreadsheet compute a cell instead of showing it."""
+FORMULA = tuple("=+-@＝＋－＠")  # what makes a spreadsheet compute a cell instead of showing it
 
 
 @dataclass(frozen=True)

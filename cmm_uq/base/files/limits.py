@@ -40,7 +40,6 @@ KEY_BYTES = Limit(
     1_000_000, "bytes", "file with a key, certificates or revocations", "a key with its chain takes ten thousand"
 )
 SIGNED_BYTES = Limit(64_000_000, "bytes", "signed PDF or XML", "a certificate with its inputs takes a few million")
-
 ROWS = Limit(200_000, "rows", "CSV file", "a scanned surface; larger ones are point clouds")
 MAP_ROWS = Limit(30_000, "rows", "error map", "10 m of each axis by the millimetre")
 COLUMNS = Limit(200, "columns", "CSV file", "every column is searched by a diagnosis")
@@ -64,7 +63,6 @@ WORD = Limit(
     500, "characters", "word of a text in a job", "a page breaks lines between words; web addresses are shorter"
 )
 FILE_NAME = Limit(200, "characters", "file name in a job", "file systems take 255 bytes")
-
 EFFECTS = Limit(100, "entries", "effects, rivals or tolerances of a model", "the catalogue has fewer")
 MAPS = Limit(20, "entries", "error maps of a machine", "one a degree")
 CONFORMITY = Limit(50, "entries", "[[conformity]]", "each is a section of the certificate")

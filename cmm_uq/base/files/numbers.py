@@ -22,11 +22,8 @@ _CHARACTERS = b"0123456789+-.eE"
 """Of what is written with these alone, ``float`` takes exactly the numbers of this module."""
 
 GIVE = "Give a number"
-GIVE_OR_REMOVE = "Give a number, or remove the column"
-"""Of a column that need not be there."""
-MEASURE = "Measure the point again, or leave out its measurement"
-"""Of a coordinate."""
-
+GIVE_OR_REMOVE = "Give a number, or remove the column"  # of a column that need not be there
+MEASURE = "Measure the point again, or leave out its measurement"  # of a coordinate
 _SHOWN = 40
 
 

@@ -120,9 +120,7 @@ _CHOICE = re.compile("GuardBand|FalseAccept|UncertaintyRatio|PosteriorProbabilit
 """Of the names that stand in a location for one of several tables that a key may have, none of which the user wrote."""
 
 _ONE_MEANT = re.compile(r"Did you mean '([^']*)'\?")
-
-_SHOWN = 60
-"""Characters of a key or a value in a message."""
+_SHOWN = 60  # characters of a key or a value in a message
 
 
 def checked(

@@ -30,11 +30,8 @@ from typing import Any, Literal, Self, get_args
 
 from cmm_uq.base.messages import Argument, Day, Message, Number, PatternFormatter, Plural, Text, fields_of
 
-Code = Literal["en", "de", "fr", "ja"]
-"""Of a language, by BCP 47."""
-
-ENGLISH: Code = "en"
-"""What every text is written in; no catalogue is read for it."""
+Code = Literal["en", "de", "fr", "ja"]  # of a language, by BCP 47
+ENGLISH: Code = "en"  # what every text is written in; no catalogue is read for it
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,7 @@ from typing import Protocol
 PATIENCE_S = 1.2
 """How long to wait for files that are just being put in place: the process ends within two seconds of a signal."""
 
-_LONGER_S = 5 * PATIENCE_S
-"""Longer than the process has left."""
+_LONGER_S = 5 * PATIENCE_S  # longer than the process has left
 
 
 class Unplaced(Protocol):

@@ -16,8 +16,7 @@ from cmm_uq import __version__
 
 MANIFEST = "manifest.json"
 SCHEMA = "cmm-uq/manifest/1"
-LARGEST = 4 * 2**20
-"""Bytes of a manifest beyond which it is somebody else's file: a set has a dozen files."""
+LARGEST = 4 * 2**20  # bytes of a manifest beyond which it is somebody else's file: a set has a dozen files
 
 
 @dataclass(frozen=True)

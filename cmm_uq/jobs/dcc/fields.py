@@ -95,7 +95,6 @@ def _bytes(text: str) -> bytes:
 
 
 _UNSIGNED = r"((\d*\.\d+)|(\d+\.\d*)|(\d+\.?))([Ee][-+]?\d+)?"
-
 STRING = Simple("a text", "words", str)
 NOT_EMPTY = Simple("a text without spaces at its ends", "words", _not_empty)
 COUNTRY = matching("a country of ISO 3166-1, two capital letters", "[A-Z]{2}")

@@ -12,7 +12,6 @@ from cmm_uq.jobs.dcc.certificate import Certificate, Hash, Measurement, Statemen
 from cmm_uq.jobs.dcc.figures import QuantityFigures, ValueUncertainty, figures, of_data, statements
 
 _SYMBOLS = {unit.dsi: str.__str__(unit) for unit in UNITS.values()}
-
 Rows = tuple[tuple[str, str], ...]
 
 

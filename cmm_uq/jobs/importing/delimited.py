@@ -67,8 +67,7 @@ def _delimiter(text: str, where: str, keys: ImportKeys) -> str:
     return max(scores, key=lambda candidate: scores[candidate])
 
 
-Rows = tuple[list[list[str]], list[int]]
-"""Cells of every line, and their lines."""
+Rows = tuple[list[list[str]], list[int]]  # cells of every line, and their lines
 
 
 def _rows(text: str, delimiter: str, where: str, most: int | None = None) -> Rows:

@@ -93,8 +93,7 @@ def apart(cell: str) -> tuple[str, WrittenUnit] | None:
     return (match[1], unit) if match and unit else None
 
 
-Source = str | Annotated[int, Field(ge=1, le=COLUMNS.most)]
-"""A column of the file: its heading, or its number from 1."""
+Source = str | Annotated[int, Field(ge=1, le=COLUMNS.most)]  # A column of the file: its heading, or its number from 1
 
 Sources = Source | Annotated[list[Source], Field(min_length=1, max_length=COLUMNS.most)]
 """One, or several where a row holds several points, in their order."""

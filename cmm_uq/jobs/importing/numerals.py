@@ -41,8 +41,7 @@ _GROUPED = {
 }
 """A number with groups of three digits."""
 
-At = Callable[[int, int], str]
-"""Place of a cell, by indices of column and row."""
+At = Callable[[int, int], str]  # place of a cell, by indices of column and row
 
 
 def decimal_sign(columns: Sequence[Sequence[Cell]], at: At, asked: str | None) -> str:

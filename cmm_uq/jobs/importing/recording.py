@@ -33,8 +33,7 @@ WHOLE = ("measurement", "point", "repeat")
 QUANTITIES: Mapping[str, str] = MappingProxyType(
     {re.sub(r"_(mm|um|c|s|hpa|pct|deg|mm_s)$", "", name): name for name in (*REQUIRED, *OPTIONAL)}
 )
-LARGEST_NUMBER = 1e9
-"""Of a measurement, point or repeat."""
+LARGEST_NUMBER = 1e9  # of a measurement, point or repeat
 
 LARGEST_OF: Mapping[str, float] = MappingProxyType({"_mm": LONGEST_MM, "_um": 1e9, "_c": 1e5, "_pct": 1e6, "_deg": 1e6})
 """By the ending of a column's name: far beyond any recording in its unit, so that a mistaken unit is still told as one."""

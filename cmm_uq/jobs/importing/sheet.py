@@ -65,8 +65,7 @@ def letters(column: int) -> str:
     return name
 
 
-Row = tuple[str, Sequence[Cell], int]
-"""Sort of feature, its cells, its line."""
+Row = tuple[str, Sequence[Cell], int]  # sort of feature, its cells, its line
 
 
 def sheets_of(

@@ -15,8 +15,7 @@ from functools import lru_cache
 from cmm_uq.jobs.importing.keys import WrittenUnit, unit_named
 from cmm_uq.jobs.importing.recording import OPTIONAL, REQUIRED
 
-NAME = "name"
-"""Of the point or feature, by which it may be numbered; no column of a recording."""
+NAME = "name"  # of the point or feature, by which it may be numbered; no column of a recording
 
 
 def _set(words: str) -> frozenset[str]:
@@ -74,9 +73,7 @@ _TEMPERATURE = _set("temp temperature temperatur temperatura t scale massstab re
 _NORMAL = _set("normal normale normala vector vektor vecteur vettore n")
 _TIP = _set("tip taster stylus tastkopf palpeur tastatore palpador offset")
 _SMALL = _set("no nr n number nummer numero num")
-
-_LONGEST = 120
-"""Characters of a heading; longer text is none."""
+_LONGEST = 120  # characters of a heading; longer text is none
 
 COVERAGE = re.compile(r"[\[(,;]?\s*\bk\s*=\s*(\d+(?:[.,]\d+)?)\s*[\])]?", re.IGNORECASE)
 """Coverage factor in a heading, as ``U (µm), k = 2``."""

@@ -43,14 +43,9 @@ _METRES = {unit.dsi: Decimal(str(unit.si)) for unit in UNITS.values() if unit.ds
 _NO_RESULT = ("nominal", "nenn", "deviation", "abweichung", "error", "écart")
 """Parts of names, and of refTypes, of what is no certified value."""
 
-_RECALIBRATION = "basic_recalibration"
-"""What the good practice of DCC calls the statement of the next calibration."""
-
-_TRACEABLE = "basic_metrologicallyTraceableToSI"
-"""And the statement of traceability."""
-
-SAME = 1e-9
-"""Relative difference of two numbers that say the same."""
+_RECALIBRATION = "basic_recalibration"  # what the good practice of DCC calls the statement of the next calibration
+_TRACEABLE = "basic_metrologicallyTraceableToSI"  # and the statement of traceability
+SAME = 1e-9  # relative difference of two numbers that say the same
 
 
 @dataclass(frozen=True, eq=False)

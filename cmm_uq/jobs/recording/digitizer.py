@@ -16,7 +16,6 @@ from cmm_uq.jobs.tables.machine import DigitizerFacts, Pose
 from cmm_uq.jobs.tables.origin import SIMULATED, Origin
 
 KEY = "[machine] digitizer"
-
 _FIX = "Name the results.json that cmm-uq report wrote of a job of kind digitizer"
 
 
@@ -38,7 +37,6 @@ class _Pose(ResultsPart):
 
 
 Three = tuple[float, float, float]
-
 _Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 

@@ -38,11 +38,8 @@ KEY = "[simulation]"
 UNIT_MM = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "um": 1e-3, "inch": 25.4}
 """Millimetres in each unit that predicted coordinates and lengths may have."""
 
-_OF_A_FILE = ("length_mm", "unit", "columns")
-"""Keys that say how a file is to be read."""
-
-NOMINAL_C = 20.0
-"""°C of a map that is named without its temperature."""
+_OF_A_FILE = ("length_mm", "unit", "columns")  # keys that say how a file is to be read
+NOMINAL_C = 20.0  # °C of a map that is named without its temperature
 
 
 class SimulationFacts(JobTable):
@@ -89,9 +86,7 @@ class SimulationFacts(JobTable):
 
 LENGTH, UNCERTAINTY = "length_mm", "u_um"
 KNOWN = (*WHOLE, *COORDINATES, LENGTH, UNCERTAINTY)
-
 _OF_A_MAP = ("axis", "position_mm")
-
 _FIX = "Save it as CSV in UTF-8"
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d*([eEdD][+-]?\d+)?")
 _FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")

@@ -126,8 +126,7 @@ def _rows_by_point(numbers: list[float], lines: list[int], place: str) -> dict[i
     return rows
 
 
-NOISE_RATIO = "noise_ratio"
-"""Column: standard uncertainty of a difference over that of one coordinate."""
+NOISE_RATIO = "noise_ratio"  # column: standard uncertainty of a difference over that of one coordinate
 
 
 def against_earlier(later: Points, earlier: Points, cte_per_k: float, where: str) -> Points:

@@ -199,9 +199,7 @@ def _moment(table: CsvTable, row: int) -> datetime:
         ) from None
 
 
-COLUMNS = tuple(f"temp_{axis}_c" for axis in AXES)
-"""What a log gives the recording."""
-
+COLUMNS = tuple(f"temp_{axis}_c" for axis in AXES)  # what a log gives the recording
 KEY = "[machine] temperature_log"
 
 

@@ -168,7 +168,6 @@ LINE_KEYS = {
 """Key of each line of the test uncertainty but the calibration, which ``[artefact]`` states."""
 
 TEST_KEYS = tuple(LINE_KEYS.values())
-
 Limits = Annotated[list[Temperature], Field(min_length=2, max_length=2)]
 Kelvins = Annotated[float, Field(gt=0, le=1000)]
 

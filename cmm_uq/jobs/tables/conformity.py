@@ -107,7 +107,6 @@ RuleName = Literal[
 """Rules by name, with or without their edition."""
 
 Rule = RuleName | GuardBand | FalseAccept | UncertaintyRatio | PosteriorProbability | UnconditionalRisk
-
 _BY_PRIOR = ("JCGM 106", "JCGM 106:2012", "Z540.3", "ANSI/NCSL Z540.3", "ANSI/NCSL Z540.3-2006")
 
 

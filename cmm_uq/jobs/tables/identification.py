@@ -12,8 +12,7 @@ from cmm_uq.base.files.table import JobTable, Limit, at_least
 from cmm_uq.base.languages.translation import ENGLISH, Code
 from cmm_uq.jobs.source import device_name
 
-RequiredText = Annotated[str, Field(min_length=1, pattern=r"\S")]
-"""Words that must not be left out."""
+RequiredText = Annotated[str, Field(min_length=1, pattern=r"\S")]  # words that must not be left out
 
 REPLACED = "replaced-results.json"
 """Results of the certificate that is replaced, as the records have them: an input, so that anybody can compare again."""
@@ -136,9 +135,7 @@ class Identification(JobTable):
         return self
 
 
-_LENGTHS = {"mm": 1e-3, "µm": 1.0}
-"""Units of lengths, and how many of each a micrometre is."""
-
+_LENGTHS = {"mm": 1e-3, "µm": 1.0}  # units of lengths, and how many of each a micrometre is
 _RATIOS, _ANGLES = ("ppm", "µm/m"), ("″",)
 
 

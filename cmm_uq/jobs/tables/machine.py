@@ -11,7 +11,6 @@ from cmm_uq.base.files.limits import COLUMNS, LISTED, MAPS
 from cmm_uq.base.files.table import Column, JobTable, Number, Range, Temperature, Triple, at_least
 
 Method = Literal["fixed", "A3", "S2", "staircase", "control chart", "drift"]
-
 Months = Annotated[int, Field(ge=1, le=600)]
 
 
@@ -42,20 +41,11 @@ class Recalibration(JobTable):
         return self
 
 
-HOTTEST_C = 100.0
-"""°C at which a machine may be mapped: far beyond any, and far below any temperature in kelvin."""
-
-ZERO_C = 273.15
-"""K."""
-
-SHORTEST_TRAVEL_MM = 1e-3
-"""Positions are divided by the travel."""
-
-Angle = Annotated[float, Field(ge=-36_000, le=36_000)]
-"""A squareness error, ″: ten degrees."""
-
-Turn = Annotated[float, Field(ge=-360, le=360)]
-"""An angle of a pose, °."""
+HOTTEST_C = 100.0  # °C at which a machine may be mapped: far beyond any, and far below any temperature in kelvin
+ZERO_C = 273.15  # K
+SHORTEST_TRAVEL_MM = 1e-3  # positions are divided by the travel
+Angle = Annotated[float, Field(ge=-36_000, le=36_000)]  # A squareness error, ″: ten degrees
+Turn = Annotated[float, Field(ge=-360, le=360)]  # an angle of a pose, °
 
 Sensors = Annotated[list[Column], Field(min_length=1, max_length=COLUMNS.most)]
 """Columns of the thermocouples on one scale."""

@@ -29,12 +29,8 @@ PLANNED = "# planned, nothing is measured yet: nominal coordinates\n"
 """First line of the recording that a plan writes for the operator to fill in."""
 
 _PLANNED = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:#[^\n]*\n)*?# planned, nothing is measured yet")
-
-EXAMPLE = "EXAMPLE"
-"""First word behind a figure of a new job.toml that nobody has stated yet."""
-
+EXAMPLE = "EXAMPLE"  # first word behind a figure of a new job.toml that nobody has stated yet
 _EXAMPLE = re.compile(r"[ \t]*([A-Za-z_]+)[ \t]*=.*# EXAMPLE\b")
-
 Digest = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 

@@ -11,10 +11,7 @@ from cmm_uq.base.files.limits import COLUMNS, LISTED
 from cmm_uq.base.files.table import AnyFloat, Column, Duration, JobTable, Length, Names, Range, Uncertainty, at_least
 
 Criterion = Literal["separation", "D", "A", "worst"]
-
-_SHORTEST = 1e-6
-"""Length of a direction below which it is none."""
-
+_SHORTEST = 1e-6  # length of a direction below which it is none
 Direction = Annotated[list[Annotated[float, Field(ge=-1e6, le=1e6)]], Field(min_length=3, max_length=3)]
 
 
