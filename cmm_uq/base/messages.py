@@ -66,9 +66,7 @@ DASH = Number("–")  # where a figure does not exist
 class Message(Text):
     """A sentence, or words: the English text, with its pattern and arguments.
 
-    pattern : with placeholders as for ``str.format``; ``{why:capital}`` begins with a capital letter, ``{what:small}`` with a
-        small one.
-    arguments : by name.
+    Placeholders are those of ``str.format``; ``{why:capital}`` begins with a capital, ``{what:small}`` with a small letter.
     """
 
     __slots__ = ("arguments", "pattern")
@@ -88,11 +86,7 @@ class Message(Text):
 
 
 class Plural(Message):
-    """A message in two forms, for one and for many; a language with other forms chooses by the count.
-
-    number : of what is spoken of.
-    one, many : the forms of English.
-    """
+    """A message in the two forms of English, for one and for many; another language chooses by the ``number`` spoken of."""
 
     __slots__ = ("many", "number", "one")
 

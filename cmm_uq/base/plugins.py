@@ -34,11 +34,7 @@ class BrokenPluginError(CmmUqError):
 
 @dataclass(frozen=True)
 class Plugin:
-    """Something that another package offers.
-
-    package, version : of the package.
-    entry : its entry point, of the name of what it offers.
-    """
+    """Something that a version of another package offers, by an entry point of its name."""
 
     package: str
     version: str

@@ -98,11 +98,7 @@ class AcquisitionRecord(_Said):
 
 @dataclass(frozen=True)
 class Provenance:
-    """Of a job's recording.
-
-    said : what stands in the file.
-    changed : whether the recording was changed after it was taken.
-    """
+    """Of a job's recording: what stands in the file, and whether the recording was changed after it was taken."""
 
     said: AcquisitionRecord
     changed: bool

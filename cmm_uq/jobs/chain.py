@@ -57,14 +57,10 @@ _NO_EVIDENCE = say("no arrangement covers this calibration, and no evidence of t
 
 @dataclass(frozen=True)
 class Link:
-    """One certificate that results rest on.
+    """A certificate that results rest on: of what, stated in which table of job.toml, on the day of the measurement.
 
-    what : was calibrated.
-    table : of job.toml that states it.
-    chain : the certificate; ``None`` where none is stated.
-    day : of the measurement.
-    kelvin : whether temperatures rest on it, and no lengths.
-    another : serial number of the instrument that a live recording names in place of this one.
+    ``kelvin``: whether temperatures rest on it, and no lengths; ``another``: serial number of the instrument that a live
+    recording names in place of this one.
     """
 
     what: Text
@@ -167,12 +163,7 @@ def right(chain: Traceability) -> Text:
 
 @dataclass(frozen=True)
 class TraceabilityChain:
-    """To what the results of a job are traceable.
-
-    links : the certificates that they rest on.
-    said : the statement where it follows from no certificate, or stands before what does.
-    claim : what is said.
-    """
+    """What results are traceable to, a statement that follows from no certificate or stands before it, the claim."""
 
     links: tuple[Link, ...]
     said: Text

@@ -48,11 +48,7 @@ _FIX = "Export it as plain SVG with its texts as paths, or as PNG"
 
 @dataclass(frozen=True)
 class Logo:
-    """A checked picture.
-
-    format : by its content.
-    content : of the file.
-    """
+    """A checked picture, with its format by its content."""
 
     format: Literal["svg", "png"]
     content: bytes

@@ -52,11 +52,7 @@ PART = "part"  # the table by which the job of a part is told from others; see :
 
 @dataclass(frozen=True)
 class Nameable:
-    """What a job may name.
-
-    tables, kinds : of the kinds of measurement, and their names.
-    standards : of conformity.
-    """
+    """What a job may name: tables and names of the kinds of measurement, standards of conformity."""
 
     tables: Tables
     kinds: Callable[[], Sequence[str]]
@@ -64,10 +60,7 @@ class Nameable:
 
 
 def read_job(folder: Path, nameable: Nameable, *, recorded: bool = True) -> Job:
-    """Read and check a job.
-
-    ``recorded``: whether the recording must be there; otherwise a job still to be measured has no points.
-    """
+    """Read and check a job; one still to be measured has no points, where it need not be ``recorded``."""
     path = folder if folder.suffix == ".toml" else folder / "job.toml"
     finish_interrupted(path.parent)
     return _beside_replaced(_read(FilesInFolder(path), nameable, recorded=recorded), FilesInFolder(path))

@@ -152,10 +152,7 @@ class _ResultsWithNoise(ResultsFile):
 
 @dataclass(frozen=True)
 class EarlierNoise:
-    """Standard deviation of a reading along each axis, of a set-up offset and of growing noise, µm.
-
-    The last two are ``None`` where the recording could not show them.
-    """
+    """Standard deviations, µm, of a reading along each axis, and of set-up offset and growth, where it shows them."""
 
     reading_um: tuple[float, float, float]
     placing_um: float | None

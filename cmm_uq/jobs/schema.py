@@ -176,11 +176,9 @@ def commented(
     schema: AnySchema, given: Mapping[str, Any], leave_out: Iterable[str] = (), asked_by: str = "", comment: bool = True,
     examples: Collection[str] = (),
 ) -> str:  # fmt: skip
-    """Tables of a file, in the order of its schema.
+    """Tables of a file, in the order of its schema; ``asked_by``: value by which the keys of a table are chosen.
 
-    ``asked_by``: value by which the keys of a table are chosen (see :func:`cmm_uq.jobs.schema.chosen_by`); ``comment``:
-    whether what is not given stands there as a comment; ``examples``: dotted keys whose values are an example's, and are
-    said to be.
+    ``comment``: whether what is not given stands there as a comment; ``examples``: dotted keys with an example's values.
     """
     out, parts = set(leave_out), []
     for name, table in schema["properties"].items():

@@ -34,10 +34,7 @@ _FORBIDDEN = frozenset('<>:"|?*')  # on Windows
 
 
 def inside(folder: Path, name: str, where: str, *, written: bool = False) -> Path:
-    """Path of a file that a job names.
-
-    ``written``: whether a command wrote it, with the recording that it derived.
-    """
+    """Path of a file that a job names; ``written`` by a command, it lies beside the recording that it derived."""
     check_name(name, where, written=written)
     try:
         path = (folder / name).resolve()

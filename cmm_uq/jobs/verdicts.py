@@ -43,15 +43,9 @@ def gravest(outcomes: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One statement of conformity, by a standard or by a tolerance that the job sets.
+    """One statement of conformity, by a standard and its edition or, where ``by`` is empty, by a limit of the job.
 
-    name : of what is decided: ``E0``; ``scale_x.ppm``; the name of a characteristic of a part.
-    outcome : one of :data:`GRAVEST`.
-    value, U, limit : in ``unit``; ``None`` where there is none.
-    unit : as printed.
-    by : the standard with its edition; empty where it is by a tolerance or a limit of the job.
-    title : what is decided, in words.
-    missing : what it lacks, a sentence each.
+    ``name``: of what is decided, ``E0``, ``scale_x.ppm``, a characteristic of a part; ``missing``: sentences on what it lacks.
     """
 
     name: str

@@ -18,13 +18,7 @@ FORMULA = tuple("=+-@＝＋－＠")  # what makes a spreadsheet compute a cell i
 
 @dataclass(frozen=True)
 class Cells:
-    """The rows of a CSV file, the first of which names the columns.
-
-    header : first row that is neither empty nor a comment; empty where there is none.
-    header_line : its line in the file.
-    rows : the others.
-    lines : their lines.
-    """
+    """The rows of a CSV file: the first that is neither empty nor a comment names the columns, with its line; the others."""
 
     header: list[str]
     header_line: int
@@ -104,13 +98,7 @@ def lines_within(text: str, where: str) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class CsvTable:
-    """A header and its rows.
-
-    where : the file's name, for messages.
-    header : column names, without the blanks around them.
-    rows : cells as text, each row as long as the header.
-    lines : line of each row in the file.
-    """
+    """A header and its rows of text, each as long as the header, with the line of each in the file ``where``."""
 
     where: str
     header: tuple[str, ...]

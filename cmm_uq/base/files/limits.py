@@ -10,13 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Limit:
-    """A limit.
-
-    most : what is still read.
-    unit : of it.
-    what : is limited.
-    why : it is.
-    """
+    """What is limited, the most that is still read of it, in which unit, and why."""
 
     most: int
     unit: str

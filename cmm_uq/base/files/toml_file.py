@@ -145,10 +145,7 @@ def checked(
 
 
 def as_toml(data: Mapping[str, Any], where: str) -> bytes:
-    """What a TOML file says, as its bytes.
-
-    ``data``: tables, lists, texts, numbers, dates, truth values; ``None`` leaves its key out.
-    """
+    """Tables, lists, texts, numbers, dates and truth values as the bytes of a TOML file; ``None`` leaves its key out."""
     try:
         return tomlkit.dumps(_plain(data)).encode()
     except (TOMLKitError, TypeError, ValueError) as error:

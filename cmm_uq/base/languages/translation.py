@@ -38,12 +38,8 @@ ENGLISH: Code = "en"  # what every text is written in; no catalogue is read for 
 class Language:
     """How a language writes what is no sentence.
 
-    code : by BCP 47.
-    decimal : its decimal sign.
-    day : pattern of a date.
-    singular : whether the form for one is said of a count; ``None`` where there is one form for all.
-    parting : what parts figures in a row, where a comma is their decimal sign.
-    cases : whether it has capital and small letters to begin a sentence with.
+    ``day``: pattern of a date; ``singular``: whether the form for one is said of a count, ``None`` where there is one form for
+    all; ``parting``: what parts figures in a row with decimal commas; ``cases``: whether it has capital and small letters.
     """
 
     code: Code
@@ -87,11 +83,7 @@ def code_of(tag: str) -> Code:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Patterns in one language, by the English ones.
-
-    single : of messages.
-    plural : of plurals, by both forms of English: the forms of the language, that for one first.
-    """
+    """Patterns in one language, by the English ones; of a plural by both forms of English, that for one first."""
 
     single: Mapping[str, str]
     plural: Mapping[tuple[str, str], tuple[str, ...]]
@@ -155,11 +147,7 @@ _ESCAPED, _MEANT = re.compile(r"\\(.)"), {"n": "\n", "t": "\t"}
 
 
 class Translation(Text):
-    """A text as it stands in a language, and what was said.
-
-    text : in the language.
-    source : what it was in English.
-    """
+    """A text as it stands in a language, and what it was in English."""
 
     __slots__ = ("source",)
 

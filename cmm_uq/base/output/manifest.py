@@ -21,12 +21,7 @@ LARGEST = 4 * 2**20  # bytes of a manifest beyond which it is somebody else's fi
 
 @dataclass(frozen=True)
 class Owner:
-    """Who writes a set; only the same owner may replace it.
-
-    command : of ``cmm-uq``.
-    job : id of the job that it was asked for.
-    origin : of that job's recording.
-    """
+    """Who writes a set, for the job of an id and the origin of its recording; only the same owner may replace it."""
 
     command: str
     job: str

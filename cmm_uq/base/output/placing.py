@@ -18,13 +18,9 @@ PREVIOUS = ".previous"
 
 @dataclass(frozen=True)
 class Journal:
-    """What is to be done.
+    """What is to be done: SHA-256 of each new file, of those of the former set that it replaces, and of those that it has not.
 
-    token : of the stage.
-    new : SHA-256 of each new file, by name.
-    replaced : SHA-256 of the files of the former set that new ones replace, by name.
-    kept : new name of each file that stands in the way and is kept.
-    stale : SHA-256 of files of the former set that the new set does not have, by name.
+    ``kept``: new name of each file that stands in the way.
     """
 
     token: str
@@ -108,10 +104,7 @@ WAY_OUT = "Choose another folder with --out, or give --force to keep what is the
 def journal_for(
     folder: Path, owner: Owner, files: Mapping[str, str], *, inputs: Iterable[Path], force: bool, token: str = ""
 ) -> Journal:
-    """What has to happen to the files of a folder for a new set to take their place.
-
-    ``force``: whether what is not the owner's may be renamed.
-    """
+    """What has to happen to the files of a folder for a new set; ``force`` renames what is not the owner's."""
     old = read_manifest(folder)
     stranger = old is not None and old.owner != owner
     if stranger and old is not None and not force:

@@ -30,10 +30,7 @@ from cmm_uq.base.output.placing import JOURNAL, NEW, Journal, journal_for, place
 
 
 def locked(path: Path, *, create: bool) -> int | None:
-    """Take the lock of a file without waiting.
-
-    Returns descriptor that holds the lock until it is closed; ``None`` where another process holds it, or the file is gone.
-    """
+    """Descriptor that holds the lock of a file until it is closed; ``None`` where another process does, or it is gone."""
     try:
         descriptor = os.open(path, os.O_RDWR | (os.O_CREAT | os.O_EXCL if create else 0), 0o600)
     except (FileNotFoundError, FileExistsError):

@@ -69,10 +69,7 @@ def read_recording(content: bytes, name: str, machine: Machine, without: Collect
 def points_of(
     table: Mapping[str, Floats], lines: Sequence[int], name: str, machine: Machine, wrong: Gathered | None = None
 ) -> Points:
-    """Points of the columns of a recording.
-
-    ``table``: columns by name, each (n,), those of :data:`REQUIRED` among them.
-    """
+    """Points of the columns of a recording, each (n,), those of :data:`REQUIRED` among them."""
     wrong = wrong or Gathered()
 
     def refuse(bad: NDArray[np.bool_], problem: Callable[[float], str], fix: str, column: str, of: Floats) -> None:

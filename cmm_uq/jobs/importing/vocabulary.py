@@ -91,13 +91,7 @@ _WORDS = re.compile(r"[^\W\d_]+|\d+")
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's heading, understood.
-
-    column : of a recording, or :data:`NAME`; ``None`` where it is none that is known.
-    index : number of the point in a row of several.
-    unit : named in it.
-    odd_unit : what stands in brackets and is no known unit.
-    """
+    """A column's heading, understood; ``index``: number of the point in a row; ``odd_unit``: brackets that name none."""
 
     column: str | None = None
     index: int | None = None

@@ -50,11 +50,9 @@ SAME = 1e-9  # relative difference of two numbers that say the same
 
 @dataclass(frozen=True, eq=False)
 class PointUncertainties:
-    """Uncertainties of certified points.
+    """Uncertainties of certified points by their numbers: (f,) standard uncertainties, µm, by column of the recording.
 
-    numbers : of the points.
-    u : (f,) standard uncertainty of each, µm, by column of the recording.
-    covariances : (f, f) µm², in the order of ``u``; none where the certificate gives none.
+    ``covariances``: (f, f) µm², in the order of ``u``; none where the certificate gives none.
     """
 
     numbers: tuple[int, ...]
@@ -72,11 +70,9 @@ class PointUncertainties:
 
 @dataclass(frozen=True)
 class CertifiedValues:
-    """What a digital certificate says.
+    """What a digital certificate says: keys of ``[artefact]``, those of its certificate in a table of their own.
 
-    table : keys of ``[artefact]``, those of its certificate in a table of their own.
-    recognised : how values that stand alone were read; ``None`` where points are joined to the recording.
-    places : uncertainties of such points; ``None`` where the certificate states none of them.
+    ``recognised``: how values that stand alone were read; ``places``: of points that are joined to the recording.
     """
 
     table: Mapping[str, Any]

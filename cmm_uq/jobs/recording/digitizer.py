@@ -58,13 +58,7 @@ class _Results(ResultsFile):
 
 @dataclass(frozen=True)
 class DescribedDigitizer:
-    """A digitizer ready for use.
-
-    offset_mm : [U1 V1 W1].
-    poses : by their numbers.
-    covariance_mm2 : (3, 3) of the offset; ``None`` where the job gives the numbers themselves.
-    file, job : that it was calibrated in; ``None`` likewise.
-    """
+    """A digitizer ready for use: offset [U1 V1 W1], mm, its covariance (3, 3), poses by number; where it was calibrated."""
 
     offset_mm: Three
     poses: tuple[Pose, ...]

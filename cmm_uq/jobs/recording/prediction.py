@@ -94,16 +94,10 @@ _FORTRAN = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))[dD]([+-]?\d+)")
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What a simulation predicts, row by row.
+    """What a simulation predicts, (r,) rows with their lines: coordinates (r, 3) or lengths (r,), mm; the other has none.
 
-    where : file, for messages.
-    measurement : (r,).
-    point : (r,); zeros of predicted lengths.
-    repeat : (r,); ``None`` where the prediction has no repeats and holds for all.
-    xyz : (r, 3) mm; (0, 3) of predicted lengths.
-    length : (r,) mm; (0,) of predicted coordinates.
-    u : (r,) standard uncertainty of a coordinate, or of the length, mm.
-    lines : (r,) of the file.
+    ``u``: standard uncertainty of a coordinate, or of the length, mm; ``point``: zeros of lengths; ``repeat``: ``None`` where
+    the prediction holds for all.
     """
 
     where: str

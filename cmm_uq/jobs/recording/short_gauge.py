@@ -62,12 +62,7 @@ class ShortGaugeFacts(JobTable):
 
 @dataclass(frozen=True, eq=False)
 class ShortGauge:
-    """A short gauge as recorded, q times.
-
-    facts : what the job says of it.
-    points : the recording.
-    rows : (q, 2) of points 1 and 2 of each (measurement, repeat), by these.
-    """
+    """A short gauge as recorded: rows (q, 2) of points 1 and 2 of each (measurement, repeat)."""
 
     facts: ShortGaugeFacts
     points: Points

@@ -31,14 +31,9 @@ BRIDGED = 2.5
 
 @dataclass(frozen=True, eq=False)
 class TemperatureLog:
-    """Mean temperature of each scale over time.
+    """Mean temperature of the thermocouples on scales x, y, z, (m, 3) °C, and their spread, K, over times (m,), s.
 
-    times : (m,) s, increasing; where the log gives dates, since the start that was told, or since 1970.
-    scales : (m, 3) mean of the thermocouples on scales x, y, z, °C.
-    spread : (m, 3) largest less smallest of them, K: how far one number describes a scale.
-    source : file.
-    max_gap : longest interval between two entries that is interpolated over, s.
-    dated : whether the log gives dates.
+    Times are since the start that was told, or since 1970, where the log is ``dated``; over ``max_gap``, s, it interpolates.
     """
 
     times: Floats
@@ -107,10 +102,7 @@ def parse_temperature_log(
     start: datetime | None = None,
     max_gap: float | None = None,
 ) -> TemperatureLog:
-    """Temperature log from the content of a CSV file.
-
-    ``max_gap``: longest interval that is interpolated over, s; :data:`BRIDGED` median intervals when left out.
-    """
+    """Temperature log of a CSV file; ``max_gap``, s, is :data:`BRIDGED` median intervals when left out."""
     table = csv_table(content, where, ())
     times = _seconds(table, start)
     early = np.flatnonzero(np.diff(times) <= 0)

@@ -25,13 +25,10 @@ from cmm_uq.jobs.tables.length_formula import Factor, Freedom, Growing, LengthUn
 
 @dataclass(frozen=True)
 class CertifiedValue:
-    """A value of ``[artefact]`` that a digital certificate may state.
+    """A value of ``[artefact]`` that a digital certificate may state, and the key of its standard uncertainty, µm, if any.
 
-    key : of it; with a dot where it stands in a table of its own, which the job must have.
-    u_key : of its standard uncertainty, µm; empty where it has none.
-    words : parts of the names by which certificates call it, in small letters.
-    count : of values; of several the largest uncertainty is taken, where they have one key.
-    needed : whether a certificate without it is of no use.
+    ``words``: parts of the names by which certificates call it, in small letters; ``count``: of values, of which the largest
+    uncertainty is taken; ``needed``: whether a certificate without it is of no use.
     """
 
     key: str
@@ -253,10 +250,7 @@ class ReferencedFacts(ArtefactFacts):
         return self.model_copy(update={"u_um": self._largest_um}) if by_points else self
 
     def with_covariances(self, numbers: Sequence[int], covariances: Sequence[Floats]) -> Self:
-        """The same with the covariances that a digital certificate gives of its points.
-
-        ``covariances``: (f, f) µm², for the distances, or for each coordinate.
-        """
+        """The same with covariances (f, f) µm² of its points, for the distances, or for each coordinate."""
         found = self.model_copy()
         found._covariances = tuple(numbers), tuple(covariances)
         return found

@@ -45,10 +45,7 @@ HOW_MPE = (
 
 
 def mpe_of(text: str) -> dict[str, float]:
-    """Keys of the table that says the same.
-
-    ``text``: A + L/K, A + B·L/K, min(A + L/K; B) or A; ``±`` before it and ``µm`` behind it change nothing.
-    """
+    """Keys of the table that says A + L/K, A + B·L/K, min(A + L/K; B) or A; ``±`` before and ``µm`` behind change nothing."""
     plain = re.sub(r"\s+", "", text)
     plain = re.sub(r"^±\((.*)\)(?:µm|μm|um)?$|^±(.*)$", lambda found: found[1] or found[2], plain)
     plain = re.sub(r"(?:µm|μm|um)$", "", plain)
@@ -110,11 +107,7 @@ _LEADING_ZERO = re.compile(r"(?<![\d.,])0,(?=\d)")
 
 @dataclass(frozen=True)
 class Growing:
-    """Uncertainty of a length, µm, that grows with it: ``fixed_um`` + ``per_mm`` · L, or the root of the sum of both squares.
-
-    fixed_um, per_mm : µm, and µm per mm.
-    squares : whether the squares are added.
-    """
+    """Uncertainty of a length, µm: ``fixed_um`` + ``per_mm`` · L, or the root of the sum of both squares."""
 
     fixed_um: float
     per_mm: float
@@ -190,10 +183,7 @@ def factor_of(k: float | None, degrees_of_freedom: float | None) -> float | None
 
 
 def with_standard_uncertainty(data: Any, *, columns: bool = False) -> Any:
-    """A table with ``u_um`` beside ``U_um``, which stays as stated, or as it is where it has none.
-
-    ``columns``: whether ``k`` may belong to a column of the recording alone.
-    """
+    """A table with ``u_um`` beside ``U_um``; ``columns``: whether ``k`` may belong to a column of the recording alone."""
     if not (isinstance(data, dict) and {"U_um", "k"} & data.keys()):
         return data
     if columns and not {"U_um", "u_um"} & data.keys():
