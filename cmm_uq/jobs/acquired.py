@@ -111,10 +111,10 @@ class Provenance:
     @property
     def sentence(self) -> Text:
         """How it was taken, for a certificate."""
-        said = self.said
+        said, program, sessions = self.said, Verbatim(self.said.program), len(self.said.sessions)
         parts: list[Text] = [plural(
-            len(said.sessions), one=say("taken live by {program}", program=Verbatim(said.program)),
-            many=say("taken live by {program} in {count} sessions", program=Verbatim(said.program), count=len(said.sessions)),
+            sessions, one=say("taken live by {program}", program=program),
+            many=say("taken live by {program} in {count} sessions", program=program, count=sessions),
         )]  # fmt: skip
         if said.typed:
             parts.append(plural(said.typed, one=say("1 point was typed by the operator"),
@@ -146,7 +146,7 @@ class Provenance:
     @property
     def instruments(self) -> list[Text]:
         """Each instrument with what identifies it."""
-        return [_instrument(one) for one in self.said.instruments]
+        return [_instrument(instrument) for instrument in self.said.instruments]
 
     @property
     def joins(self) -> list[Text]:
@@ -156,11 +156,10 @@ class Provenance:
     @property
     def gaps(self) -> list[Text]:
         """When instruments were silent, the first of them one by one; and jumps of the clock."""
-        told = [_silence(gap) for gap in self.said.gaps[:_NAMED]]
+        gaps = [_silence(gap) for gap in self.said.gaps[:_NAMED]]
         if (more := len(self.said.gaps) - _NAMED) > 0:
-            told.append(say("{more} further gaps are in the journal", more=more))
-        jumps = [say("the computer's clock was moved by {s:.3g} s", s=s) for s in self.said.clock_jumps_s]
-        return [*told, *jumps]
+            gaps.append(say("{more} further gaps are in the journal", more=more))
+        return [*gaps, *(say("the computer's clock was moved by {s:.3g} s", s=s) for s in self.said.clock_jumps_s)]
 
     @property
     def data(self) -> dict[str, Any]:
@@ -211,37 +210,36 @@ def as_file(said: Mapping[str, Any]) -> bytes:
     return (AcquisitionRecord.model_validate(said).model_dump_json(indent=2, by_alias=True) + "\n").encode()
 
 
-def _instrument(one: Instrument) -> Text:
-    what = " ".join(part for part in (one.maker, one.model) if part)
-    parts: list[Text] = [Verbatim(one.name), *names(filter(None, (what,)))]
-    if one.serial:
-        parts.append(say("serial number {serial}", serial=Verbatim(one.serial)))
-    if one.firmware:
-        parts.append(say("firmware {firmware}", firmware=Verbatim(one.firmware)))
-    parts.append(say("certificate {number}", number=Verbatim(one.certificate)) if one.certificate
-                 else say("no certificate stated"))  # fmt: skip
-    return commas(parts)
+def _instrument(instrument: Instrument) -> Text:
+    model = " ".join(filter(None, (instrument.maker, instrument.model)))
+    parts: list[Text] = [Verbatim(instrument.name), *names(filter(None, (model,)))]
+    if instrument.serial:
+        parts.append(say("serial number {serial}", serial=Verbatim(instrument.serial)))
+    if instrument.firmware:
+        parts.append(say("firmware {firmware}", firmware=Verbatim(instrument.firmware)))
+    number = instrument.certificate
+    stated = say("certificate {number}", number=Verbatim(number)) if number else say("no certificate stated")
+    return commas([*parts, stated])
 
 
 def _join(name: str, column: JoinedColumn) -> Text:
     joined: Text = say("{name}: u = {u:.2g} by interpolation in time, {largest:.2g} at most", name=Verbatim(name), u=column.u,
-                     largest=column.u_largest)  # fmt: skip
-    told = say("{name}: not known of every point", name=Verbatim(name)) if name == TIME else joined
+                       largest=column.u_largest)  # fmt: skip
+    if name == TIME:
+        joined = say("{name}: not known of every point", name=Verbatim(name))
     if not column.missing:
-        return told
-    points = [
-        say("{m}/{p}/{r}", m=measurement, p=point, r=repeat) for measurement, point, repeat in column.missing[:_NAMED]
-    ]
+        return joined
+    points = [say("{m}/{p}/{r}", m=m, p=p, r=r) for m, p, r in column.missing[:_NAMED]]
     more = len(column.missing) - _NAMED
     listed = commas([*points, *([say("{more} more", more=more)] if more > 0 else [])])
-    return say("{told}; without a value, and so not used: measurement/point/repeat {points}", told=told, points=listed)
+    return say(
+        "{told}; without a value, and so not used: measurement/point/repeat {points}", told=joined, points=listed
+    )
 
 
 def _silence(gap: Silence) -> Text:
+    instrument, why = Verbatim(gap.instrument), Verbatim(gap.why)
     if gap.lasted_s is None:
-        return say("{instrument} from {since:.0f} s on: {why}", instrument=Verbatim(gap.instrument), since=gap.since_s,
-                   why=Verbatim(gap.why))  # fmt: skip
-    return say(
-        "{instrument} from {since:.0f} s for {lasted:.3g} s: {why}", instrument=Verbatim(gap.instrument),
-        since=gap.since_s, lasted=gap.lasted_s, why=Verbatim(gap.why),
-    )  # fmt: skip
+        return say("{instrument} from {since:.0f} s on: {why}", instrument=instrument, since=gap.since_s, why=why)
+    return say("{instrument} from {since:.0f} s for {lasted:.3g} s: {why}", instrument=instrument, since=gap.since_s,
+               lasted=gap.lasted_s, why=why)  # fmt: skip

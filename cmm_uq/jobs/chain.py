@@ -72,7 +72,6 @@ class Link:
 
     @property
     def claim(self) -> Claim:
-        """What may be said of it."""
         if tuple(self.lacks()):
             return "not shown"
         return "traceable" if self.chain is not None and _covered(self.chain) else "by evidence"
@@ -133,7 +132,6 @@ class Link:
 
 
 def _covered(chain: Traceability) -> bool:
-    """Whether an arrangement covers the calibration."""
     return chain.issuer in (NATIONAL, ACCREDITED) and chain.arrangement is not None
 
 
@@ -175,16 +173,15 @@ class TraceabilityChain:
         if self.said and not self.links:
             return self.said
         head = _KELVIN if self.claim == "traceable" and any(link.kelvin for link in self.links) else _HEADS[self.claim]
-        told = [link for link in self.links if self.claim != "not shown" or link.claim == "not shown"]
-        return sentences([*([self.said] if self.said else []), head, *(link.sentence for link in told)])
+        links = [link for link in self.links if self.claim != "not shown" or link.claim == "not shown"]
+        return sentences([*([self.said] if self.said else []), head, *(link.sentence for link in links)])
 
     @property
     def lacks(self) -> tuple[Lack, ...]:
         """All that a claim of traceability lacks."""
         if self.said == OWN_MACHINE:
-            return (
-                (say("traceability (artefact: a certificate from another machine)"), "[artefact.certificate] machine"),
-            )
+            lack = say("traceability (artefact: a certificate from another machine)")
+            return ((lack, "[artefact.certificate] machine"),)
         return tuple(
             (say("traceability ({what}: {lack})", what=link.what, lack=lack), key)
             for link in self.links for lack, key in link.lacks()
@@ -198,23 +195,19 @@ def chain_of(job: Job, read: Collection[str] = ()) -> TraceabilityChain:
         return TraceabilityChain((), NOT_MEASURED, "not shown")
     if facts.recording.earlier:
         return TraceabilityChain((), CHANGES, "none needed")
-    links = tuple(_lengths(facts))
+    certified = ((facts.artefact.traced and facts.artefact, say("artefact"), "artefact"),
+                 (facts.short_gauge, say("short gauge"), "short_gauge"))  # fmt: skip
+    links = [
+        Link(what, f"[{table}.certificate]", of.certificate, facts.job.date) for of, what, table in certified if of
+    ]
     if not links:
         return TraceabilityChain((), UNCALIBRATED, "none needed")
-    links = (*links, *_temperatures(job, read))
+    links += _temperatures(job, read)
     if facts.artefact.traced and certified_on_this_machine(facts):
         return TraceabilityChain((), OWN_MACHINE, "not shown")
     claims = {link.claim for link in links}
     worst: Claim = "not shown" if "not shown" in claims else "by evidence" if "by evidence" in claims else "traceable"
-    return TraceabilityChain(links, NOTHING if facts.artefact.traced else GAUGE_ALONE, worst)
-
-
-def _lengths(facts: JobFile) -> Iterator[Link]:
-    """Of what of the artefact, and of the short gauge, is certified."""
-    if facts.artefact.traced:
-        yield Link(say("artefact"), "[artefact.certificate]", facts.artefact.certificate, facts.job.date)
-    if facts.short_gauge is not None:
-        yield Link(say("short gauge"), "[short_gauge.certificate]", facts.short_gauge.certificate, facts.job.date)
+    return TraceabilityChain(tuple(links), NOTHING if facts.artefact.traced else GAUGE_ALONE, worst)
 
 
 def _temperatures(job: Job, read: Collection[str]) -> Iterator[Link]:
@@ -240,11 +233,9 @@ def _nameless(columns: Iterable[str]) -> Text:
 
 def _another(job: Job, columns: Collection[str], serial: str) -> str:
     """Serial number of the instrument that a live recording has these columns from, where it is another."""
-    taken = [] if job.acquired is None else job.acquired.said.instruments
-    return next(
-        (one.serial for one in taken if one.serial and one.serial != serial and {*one.columns.values()} & {*columns}),
-        "",
-    )
+    instruments = [] if job.acquired is None else job.acquired.said.instruments
+    taken = (one.serial for one in instruments if not {*one.columns.values()}.isdisjoint(columns))
+    return next((number for number in taken if number and number != serial), "")
 
 
 def holds_on(chain: Traceability, day: dt.date) -> bool:

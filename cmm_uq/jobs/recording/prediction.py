@@ -1,20 +1,15 @@
 """``[simulation]``: what a simulation, by whatever program, predicts for a recording, and the reading of it.
 
-``[simulation]`` of job.toml: what a simulation, by whatever program, predicts for the recording.
-
-It names a file of predicted coordinates or lengths (:mod:`cmm_uq.jobs.recording.prediction`), or error maps of the machine.
-
-Reads what a simulation predicts for a recording, as whatever program wrote it.
-
-A CSV with one row a point: ``measurement, point, repeat, x_mm, y_mm, z_mm``; or, for lengths, one row a measurement with
-``length_mm``. Optional ``u_um``. Cells are separated by commas, semicolons or tabs; where they are not separated by commas, a
-number may have a decimal comma. Exponents may be written with E or D. Further columns are passed over.
+It names error maps of the machine or a CSV with one row a point: ``measurement, point, repeat, x_mm, y_mm, z_mm``; or, for
+lengths, one row a measurement with ``length_mm``. Optional ``u_um``. Cells are separated by commas, semicolons or tabs; where
+they are not separated by commas, a number may have a decimal comma. Exponents may be written with E or D. Further columns are
+passed over.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, Literal, Self
@@ -35,8 +30,7 @@ from cmm_uq.jobs.tables.machine import ErrorMapFile
 
 KEY = "[simulation]"
 
-UNIT_MM = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "um": 1e-3, "inch": 25.4}
-"""Millimetres in each unit that predicted coordinates and lengths may have."""
+UNIT_MM = {"mm": 1.0, "m": 1000.0, "cm": 10.0, "um": 1e-3, "inch": 25.4}  # of predicted coordinates and lengths
 
 _OF_A_FILE = ("length_mm", "unit", "columns")  # keys that say how a file is to be read
 NOMINAL_C = 20.0  # °C of a map that is named without its temperature
@@ -116,24 +110,23 @@ class Prediction:
 
 def read_prediction(content: bytes, where: str, facts: SimulationFacts) -> Prediction:
     cells = _table(content, where)
-    place = _places(cells, where, facts)
-    unit = UNIT_MM[facts.unit]
     table: dict[str, Floats] = {}
-    for column, i in place.items():
-        values = numbers([row[i] for row in cells.rows], partial(_at, cells, where, i))
-        table[column] = values * (unit if column in (*COORDINATES, LENGTH) else 1.0)
-        _check_size(table[column], column, cells, where, i)
+    for column, i in _places(cells, where, facts).items():
+        at = partial(_at, cells, where, i)
+        values = numbers([row[i] for row in cells.rows], at)
+        table[column] = values * (UNIT_MM[facts.unit] if column in (*COORDINATES, LENGTH) else 1.0)
+        _check_size(table[column], column, at)
     whole = {name: table[name].astype(np.int64) for name in WHOLE if name in table}
-    count, point = len(cells.rows), whole.get("point")
-    lengths = LENGTH in table
-    u = MICROMETRE * table.get(UNCERTAINTY, np.full(count, facts.u_um))
-    found = Prediction(
-        where, whole["measurement"], np.zeros(count, dtype=np.int64) if point is None or lengths else point,
-        whole.get("repeat"), np.column_stack([table[n] for n in COORDINATES]) if not lengths else np.zeros((0, 3)),
-        table[LENGTH] if lengths else np.zeros(0), u, np.array(cells.lines, dtype=np.int64),
+    count, lengths = len(cells.rows), LENGTH in table
+    none = np.zeros(count, dtype=np.int64)
+    prediction = Prediction(
+        where, whole["measurement"], none if lengths else whole.get("point", none), whole.get("repeat"),
+        np.zeros((0, 3)) if lengths else np.column_stack([table[name] for name in COORDINATES]),
+        table[LENGTH] if lengths else np.zeros(0), MICROMETRE * table.get(UNCERTAINTY, np.full(count, facts.u_um)),
+        np.array(cells.lines, dtype=np.int64),
     )  # fmt: skip
-    _check_unique(found)
-    return found
+    _check_unique(prediction)
+    return prediction
 
 
 def is_error_map(content: bytes, where: str) -> bool:
@@ -147,13 +140,13 @@ def _table(content: bytes, where: str) -> Cells:
     cells = cells_of(content, where, _FIX, delimiter=delimiter)
     if not cells.rows:
         raise CmmUqError("has no rows", where=where, fix="The first line names the columns, then one row a point")
-    header = cells.header
+    width = len(cells.header)
     for row, line in zip(cells.rows, cells.lines, strict=True):
-        if len(row) != len(header) and not (len(row) == len(header) + 1 and not row[-1]):
-            raise CmmUqError(f"has {len(row)} cells where the header has {len(header)}", where=f"{where} line {line}",
+        if len(row) != width and not (len(row) == width + 1 and not row[-1]):
+            raise CmmUqError(f"has {len(row)} cells where the header has {width}", where=f"{where} line {line}",
                              fix="Complete the row; a decimal comma needs semicolons between cells")  # fmt: skip
     rows = [[_plain(cell, decimal_comma=delimiter != ",") for cell in row] for row in cells.rows]
-    return Cells(header, cells.header_line, rows, cells.lines)
+    return Cells(cells.header, cells.header_line, rows, cells.lines)
 
 
 def _header(text: str) -> str:
@@ -176,53 +169,52 @@ def _places(cells: Cells, where: str, facts: SimulationFacts) -> dict[str, int]:
                          fix=suggestion(unknown, KNOWN))  # fmt: skip
     if set(_OF_A_MAP) <= set(header):
         raise CmmUqError("is an error map", where=at, fix=f"Name it as map in job.toml {KEY}, not as file")
-    found: dict[str, int] = {}
+    places: dict[str, int] = {}
     for name in KNOWN:
-        told = facts.columns.get(name, name)
-        if header.count(told) > 1:
-            raise CmmUqError(f"the column {told!r} is there twice", where=at, fix="Keep one")
-        if told in header:
-            found[name] = header.index(told)
+        heading = facts.columns.get(name, name)
+        if header.count(heading) > 1:
+            raise CmmUqError(f"the column {heading!r} is there twice", where=at, fix="Keep one")
+        if heading in header:
+            places[name] = header.index(heading)
         elif name in facts.columns:
-            raise CmmUqError(f"there is no column {told!r}", where=at,
-                             fix=f"{suggestion(told, header)}, in job.toml {KEY} columns")  # fmt: skip
-    needed = ("measurement", LENGTH) if LENGTH in found else ("measurement", "point", *COORDINATES)
-    if missing := next((name for name in needed if name not in found), None):
+            raise CmmUqError(f"there is no column {heading!r}", where=at,
+                             fix=f"{suggestion(heading, header)}, in job.toml {KEY} columns")  # fmt: skip
+    needed = ("measurement", LENGTH) if LENGTH in places else ("measurement", "point", *COORDINATES)
+    if missing := next((name for name in needed if name not in places), None):
         raise CmmUqError(f"no column {missing!r}", where=at,
                          fix=f'Say which it is in job.toml {KEY}: columns = {{ {missing} = "…" }}, unit = "mm"')  # fmt: skip
-    if LENGTH in found and "x_mm" in found:
+    if LENGTH in places and "x_mm" in places:
         raise CmmUqError("predicts coordinates and lengths", where=at, fix="Leave one of them out")
-    return found
+    return places
 
 
 def _at(cells: Cells, where: str, column: int, row: int) -> str:
     return f"{where} line {cells.lines[row]}, column {cells.header[column]}"
 
 
-def _check_size(values: Floats, column: str, cells: Cells, where: str, place: int) -> None:
+def _check_size(values: Floats, column: str, at: Callable[[int], str]) -> None:
+    bad, why = np.zeros(len(values), dtype=bool), ""
     if column in WHOLE:
         bad, why = values != np.round(values), "is not a whole number"
     elif column == UNCERTAINTY:
         bad, why = values < 0, "is no standard uncertainty"
     elif column == LENGTH:
         bad, why = values <= 0, "is no length"
-    else:
-        bad, why = np.zeros(len(values), dtype=bool), ""
     beyond = np.abs(values) > largest(column)
     if np.any(bad | beyond):
         i = int(np.argmax(bad | beyond))
-        raise CmmUqError(f"{values[i]:g} {'is more than anything that is measured' if beyond[i] else why}",
-                         where=_at(cells, where, place, i), fix="Check the column and its unit")  # fmt: skip
+        raise CmmUqError(f"{values[i]:g} {'is more than anything that is measured' if beyond[i] else why}", where=at(i),
+                         fix="Check the column and its unit")  # fmt: skip
 
 
-def _check_unique(found: Prediction) -> None:
-    repeat: Sequence[int] = [1] * len(found.lines) if found.repeat is None else found.repeat.tolist()
-    seen: dict[tuple[int, int, int], int] = {}
-    for *key, line in zip(found.measurement.tolist(), found.point.tolist(), repeat, found.lines.tolist(), strict=True):
-        one = (key[0], key[1], key[2])
-        if one in seen:
-            point = "" if found.of_lengths else f", point {one[1]}"
-            raise CmmUqError(f"measurement {one[0]}{point} is predicted twice",
-                             where=f"{found.where} lines {seen[one]} and {line}",
+def _check_unique(prediction: Prediction) -> None:
+    repeat = np.ones_like(prediction.lines) if prediction.repeat is None else prediction.repeat
+    seen: dict[tuple[int, ...], int] = {}
+    keys = np.column_stack([prediction.measurement, prediction.point, repeat]).tolist()
+    for key, line in zip(map(tuple, keys), prediction.lines.tolist(), strict=True):
+        if key in seen:
+            point = "" if prediction.of_lengths else f", point {key[1]}"
+            raise CmmUqError(f"measurement {key[0]}{point} is predicted twice",
+                             where=f"{prediction.where} lines {seen[key]} and {line}",
                              fix="Number repeats in a column repeat, as the recording does, or keep one")  # fmt: skip
-        seen[one] = line
+        seen[key] = line
